@@ -1,0 +1,92 @@
+"""TOML to schema, strictly: every fault of a file at once, each with its path inside the file."""
+
+import hashlib
+import tomllib
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from config.errors import ConfigError
+from config.robot import RobotConfig
+from config.run import RunConfig
+from config.world import WorldConfig
+
+M = TypeVar("M", bound=BaseModel)
+Kind = Literal["robots", "worlds", "runs"]
+
+
+def shipped(kind: Kind) -> tuple[str, ...]:
+    """Names of the shipped configurations of a kind, sorted."""
+    return tuple(sorted(p.name[:-5] for p in _folder(kind).iterdir() if p.name.endswith(".toml")))
+
+
+def locate(kind: Kind, name_or_path: str, beside: Path | None = None) -> Path:
+    """Path of a shipped name or of a ``.toml`` file (relative to ``beside`` if given)."""
+    if not name_or_path.endswith(".toml"):
+        path = _folder(kind) / f"{name_or_path}.toml"
+        if path.is_file():
+            return path
+        raise ConfigError(
+            f"{name_or_path}: no such {kind[:-1]}; shipped are {', '.join(shipped(kind))}; "
+            "a file of your own ends in .toml"
+        )
+    path = Path(name_or_path)
+    if beside is not None and not path.is_absolute() and (beside / path).is_file():
+        path = beside / path
+    if not path.is_file():
+        raise ConfigError(f"{path}: no such file")
+    return path
+
+
+def load(path: Path, model: type[M]) -> M:
+    """Read one TOML file into ``model``.
+
+    Raises:
+        ConfigError: missing file, broken TOML, or schema faults, all of them, one line each.
+
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not TOML: {error}") from None
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise ConfigError([_line(path, fault) for fault in error.errors()]) from None  # type: ignore[arg-type]
+
+
+def load_robot(name_or_path: str, beside: Path | None = None) -> RobotConfig:
+    """Load a robot by shipped name or path."""
+    return load(locate("robots", name_or_path, beside), RobotConfig)
+
+
+def load_world(name_or_path: str, beside: Path | None = None) -> WorldConfig:
+    """Load a world by shipped name or path."""
+    return load(locate("worlds", name_or_path, beside), WorldConfig)
+
+
+def load_run(name_or_path: str) -> RunConfig:
+    """Load a run by shipped name or path."""
+    return load(locate("runs", name_or_path), RunConfig)
+
+
+def digest(*models: BaseModel) -> str:
+    """SHA-256 (16 hex digits) over the canonical JSON of the models: the configuration hash."""
+    text = "\n".join(model.model_dump_json() for model in models)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _folder(kind: Kind) -> Path:
+    return Path(__file__).parent / kind
+
+
+def _line(path: Path, fault: dict[str, object]) -> str:
+    loc = fault["loc"]
+    where = ".".join(str(p) for p in loc) if isinstance(loc, tuple) else str(loc)
+    given = fault.get("input")
+    shown = f" (got {given!r})" if isinstance(given, int | float | str | bool) else ""
+    said = {"extra_forbidden": "unknown key", "missing": "is required"}
+    return f"{path}: {where or 'file'}: {said.get(str(fault['type']), fault['msg'])}{shown}"

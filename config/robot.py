@@ -1,0 +1,79 @@
+"""What the robot is: links, joints and servos of one chain, head first."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from config.base import Strict
+
+Baud = Literal[9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000]
+
+
+class ServoConfig(Strict):
+    """One servo type, the same along the chain."""
+
+    model: str = Field("XM430-W350", description="name as printed on the servo")
+    first_id: int = Field(1, ge=0, le=252, description="ID of the joint next to the head")
+    baud: Baud = 1_000_000
+    supply_v: float = Field(12.0, ge=3.0, le=26.0)
+    position_p_gain: int = Field(800, ge=0, le=16383, description="register 84")
+    pitch_current_limit_a: float = Field(
+        0.6, gt=0.0, description="goal current of the pitch joints: current-based position mode"
+    )
+
+
+class RobotConfig(Strict):
+    """A chain of links joined by servos; lengths in metres, index 0 is the head."""
+
+    name: str
+    joint_axes: str = Field(
+        pattern=r"^[yp]+$", description="one letter a joint from the head: y = yaw, p = pitch"
+    )
+    link_length_m: float = Field(0.07, gt=0.005, le=1.0, description="joint axis to joint axis")
+    body_radius_m: float = Field(0.03, gt=0.002, le=0.5)
+    link_mass_kg: float = Field(0.11, gt=0.001, le=20.0)
+    yaw_limit_rad: float = Field(1.5, gt=0.05, le=3.1)
+    pitch_limit_rad: float = Field(1.2, gt=0.05, le=3.1)
+    joint_speed_limit_rad_s: float = Field(2.0, gt=0.0, description="what a plan may ask")
+    joint_acceleration_limit_rad_s2: float = Field(25.0, gt=0.0, description="what a plan may ask")
+    torque_limit_n_m: float = Field(2.0, gt=0.0, description="what a plan may ask of a joint")
+    servo: ServoConfig = ServoConfig()
+
+    @model_validator(mode="after")
+    def _ids_fit_the_bus(self) -> Self:
+        last = self.servo.first_id + self.joint_count - 1
+        if last > 252:
+            raise ValueError(f"servo IDs would run to {last}; the bus has 0 to 252")
+        return self
+
+    @property
+    def joint_count(self) -> int:
+        """Number of servos J; the chain has J + 1 links."""
+        return len(self.joint_axes)
+
+    @property
+    def length_m(self) -> float:
+        """Body length: J + 1 links."""
+        return self.link_length_m * (self.joint_count + 1)
+
+    @property
+    def servo_ids(self) -> tuple[int, ...]:
+        """Bus IDs, head first."""
+        return tuple(range(self.servo.first_id, self.servo.first_id + self.joint_count))
+
+    @property
+    def yaw_joints(self) -> tuple[int, ...]:
+        """Indices of the joints that turn about the vertical."""
+        return tuple(i for i, axis in enumerate(self.joint_axes) if axis == "y")
+
+    @property
+    def pitch_joints(self) -> tuple[int, ...]:
+        """Indices of the joints that lift."""
+        return tuple(i for i, axis in enumerate(self.joint_axes) if axis == "p")
+
+    @property
+    def limit_rad(self) -> tuple[float, ...]:
+        """Half range of each joint, rad, head first."""
+        return tuple(
+            self.yaw_limit_rad if axis == "y" else self.pitch_limit_rad for axis in self.joint_axes
+        )

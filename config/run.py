@@ -1,0 +1,72 @@
+"""What a run is: robot, world, recording, waypoints, motion and safety, by name or by path."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from config.base import Strict
+
+MotionName = Literal["walk", "walk-printed", "walk-blind", "serpenoid"]
+
+
+class StatesConfig(Strict):
+    """The library of body shapes ([PT] 2.5)."""
+
+    coefficients: int = Field(7, ge=1, le=20)
+    random_count: int = Field(200, ge=0, le=100_000)
+    gain_limit: float = Field(0.6, ge=0.0, le=1.0, description="least quasi-static eta_q kept")
+
+
+class WalkConfig(Strict):
+    """How states follow each other and how the measured pose steers (METHOD section 12)."""
+
+    decision_fraction: float = Field(0.5, gt=0.05, le=1.0, description="of a body per decision")
+    carrot_m: float = Field(0.6, gt=0.05)
+    heading_tolerance_rad: float = Field(0.5, gt=0.0)
+    ramp_limit_rad: float = Field(0.8, ge=0.0)
+    nearest_count: int = Field(12, ge=1, description="taken when no state is within tolerance")
+
+
+class BehaviourConfig(Strict):
+    """[PT] 2.6.6: what a user may turn."""
+
+    pulse_body_lengths_s: float = Field(0.25, gt=0.0, le=3.0)
+    sliding: float = Field(0.0, ge=0.0, lt=1.0, description="w_d")
+    curvature: float = Field(1.0, gt=0.0, le=2.0, description="scales every shape's bends")
+
+
+class SafetyConfig(Strict):
+    """Limits below the controller; a command beyond them is clamped, or vetoed and latched."""
+
+    goal_rate_rad_s: float = Field(4.0, gt=0.0)
+    goal_lead_rad: float = Field(0.8, gt=0.0, description="goal minus measured")
+    current_limit_a: float = Field(2.0, gt=0.0)
+    current_time_s: float = Field(0.5, ge=0.0, description="how long it may be exceeded")
+    temperature_limit_c: float = Field(70.0, gt=0.0)
+    voltage_min_v: float = Field(10.0, gt=0.0)
+    voltage_max_v: float = Field(14.8, gt=0.0)
+    stale_limit_s: float = Field(0.1, gt=0.0)
+    advance_fraction: float = Field(0.5, ge=0.0, lt=1.0, description="alarm below this share")
+    watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="register 98, 20 ms steps")
+
+
+class RunConfig(Strict):
+    """One run of the main job."""
+
+    name: str
+    robot: str = Field("yaw16", description="a shipped robot's name or a TOML path")
+    world: str = Field("flat", description="a shipped world's name or a TOML path")
+    track: str = Field("lamprey-like", description="a shipped recording's name or a file")
+    motion: MotionName = "walk"
+    waypoints_m: tuple[tuple[float, float], ...] = Field(min_length=1)
+    start_m: tuple[float, float] = Field((0.0, 0.0), description="where the head starts")
+    start_heading_rad: float | None = Field(None, description="default: towards the path")
+    waypoint_radius_m: float = Field(0.3, gt=0.0)
+    seed: int = Field(0, ge=0)
+    cycle_hz: float = Field(50.0, gt=0.0, le=1000.0)
+    physics_step_s: float = Field(0.002, gt=0.0, le=0.01)
+    time_limit_s: float = Field(240.0, gt=0.0)
+    states: StatesConfig = StatesConfig()
+    walk: WalkConfig = WalkConfig()
+    behaviour: BehaviourConfig = BehaviourConfig()
+    safety: SafetyConfig = SafetyConfig()

@@ -1,0 +1,1 @@
+"""Commands, report and film: the only place that joins controller, bus and simulation."""

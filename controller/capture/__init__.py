@@ -1,0 +1,1 @@
+"""Recordings in: tracked midlines, keypoints and joint angles become one Track."""

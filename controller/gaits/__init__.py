@@ -1,0 +1,1 @@
+"""Closed-form gaits that need no recording."""

@@ -1,0 +1,1 @@
+"""From states to joints: angle track, velocity, points, ground step, retargeting, retiming."""

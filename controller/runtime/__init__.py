@@ -1,0 +1,1 @@
+"""The loop: steering by the measured pose, absolute deadlines, ramps, alarms."""

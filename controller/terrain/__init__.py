@@ -1,0 +1,1 @@
+"""The ground as the planner sees it: height field in, safe path out."""

@@ -1,0 +1,33 @@
+"""Time as a thing that is handed in: the only module that reads the wall clock."""
+
+import time
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """A monotonic clock that can also wait."""
+
+    def now_s(self) -> float:
+        """Seconds since the clock's own zero."""
+        ...
+
+    def sleep_until_s(self, time_s: float) -> None:
+        """Return when ``now_s() >= time_s``; at once if that is past."""
+        ...
+
+
+class WallClock:
+    """Real time, monotonic, zero at creation."""
+
+    def __init__(self) -> None:
+        self._zero_s = time.monotonic()
+
+    def now_s(self) -> float:
+        """Seconds since creation."""
+        return time.monotonic() - self._zero_s
+
+    def sleep_until_s(self, time_s: float) -> None:
+        """Sleep until ``time_s``."""
+        wait_s = time_s - self.now_s()
+        if wait_s > 0.0:
+            time.sleep(wait_s)

@@ -1,0 +1,61 @@
+"""The vocabulary between controller and servos: read-only arrays in SI units, head first."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class JointCommand:
+    """What the joints shall do now."""
+
+    time_s: float
+    """Clock time for which it was made."""
+    goal_rad: Floats
+    """(J,) goal positions; 0 is straight, positive yaw bends the body to the left."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointState:
+    """What the servos last said; a failed read keeps the old value and ages: never a zero."""
+
+    time_s: float
+    """Clock time at the end of the read."""
+    position_rad: Floats
+    """(J,)"""
+    velocity_rad_s: Floats
+    """(J,)"""
+    current_a: Floats
+    """(J,)"""
+    temperature_c: Floats
+    """(J,) from the slow round; NaN until first read."""
+    voltage_v: Floats
+    """(J,) from the slow round; NaN until first read."""
+    hardware_error: NDArray[np.uint8]
+    """(J,) register 70, from the slow round or at once when a status packet carries the alert."""
+    error: NDArray[np.uint8]
+    """(J,) error byte of the last status packet."""
+    age_s: Floats
+    """(J,) since position, velocity and current were last read."""
+    valid: Bools
+    """(J,) whether this cycle's read succeeded."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodyPose:
+    """Where the head link is, by whatever measures it (simulator, camera)."""
+
+    time_s: float
+    head_in_world_m: Floats
+    """(3,) centre of the head link."""
+    rotation: Floats
+    """(3, 3) columns: the head link's forward, left and up axes in the world."""
+
+    @property
+    def heading_rad(self) -> float:
+        """Direction of the head link in the horizontal plane, rad, in (-pi, pi]."""
+        return float(np.arctan2(self.rotation[1, 0], self.rotation[0, 0]))

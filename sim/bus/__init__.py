@@ -1,0 +1,1 @@
+"""Simulated servos behind a simulated half-duplex line: bytes in, bytes out, time moved."""

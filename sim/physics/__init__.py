@@ -1,0 +1,1 @@
+"""The body and the ground in MuJoCo, with the snake's anisotropic friction applied by us."""

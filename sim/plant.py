@@ -1,0 +1,72 @@
+"""The seam between servos and mechanics.
+
+Servos (``sim.bus``) own a ``ServoDrive``: one array per quantity, one entry per joint, written when
+registers change. A ``Plant`` (``sim.physics``, or a bench model in tests) owns shafts, reads the
+drive in every step, and writes back what the motors did.
+"""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class ServoDrive:
+    """What the plant needs of J servos in every step; contiguous float64 arrays (J,).
+
+    Position control as the firmware does it: ``pwm = clip(p_gain * (goal - q), +-pwm_limit)``,
+    ``volts = pwm * supply``, ``i = (volts - k_e w) / R``, clipped to ``+-current_limit_a`` in
+    current-based mode, ``torque = k_t i``; an unpowered bridge (``torque_on`` 0) is open: no
+    current.
+    """
+
+    torque_on: Floats
+    goal_rad: Floats
+    p_gain_per_rad: Floats
+    """PWM fraction per radian of position error."""
+    pwm_limit: Floats
+    """Fraction of the supply, 0..1."""
+    supply_v: Floats
+    resistance_ohm: Floats
+    torque_constant_n_m_a: Floats
+    """k_t at the output shaft; k_e in V s/rad is the no-load voltage over speed."""
+    back_emf_v_s: Floats
+    current_limit_a: Floats
+    """Inf where the operating mode does not limit it."""
+    # written by the plant, in its last step
+    current_a: Floats = field(init=False)
+    torque_n_m: Floats = field(init=False)
+    pwm: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        joints = len(self.torque_on)
+        self.current_a = np.zeros(joints)
+        self.torque_n_m = np.zeros(joints)
+        self.pwm = np.zeros(joints)
+
+
+class Plant(Protocol):
+    """Mechanics with J shafts, stepped up to a time when someone looks."""
+
+    @property
+    def time_s(self) -> float:
+        """Time of the state that the shafts show."""
+        ...
+
+    @property
+    def position_rad(self) -> Floats:
+        """(J,) shaft angles; the array may be a live view."""
+        ...
+
+    @property
+    def velocity_rad_s(self) -> Floats:
+        """(J,) rad/s."""
+        ...
+
+    def advance(self, until_s: float, drive: ServoDrive) -> None:
+        """Step to the last whole step at or before ``until_s`` under ``drive``."""
+        ...
