@@ -1,0 +1,49 @@
+"""Where to aim: a carrot ahead on the path, and the heading error of a shape towards it."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+
+class Path(Protocol):
+    """A way over the ground, by arc length from its start."""
+
+    @property
+    def length_m(self) -> float:
+        """Arc length of the whole path."""
+        ...
+
+    def position(self, s_m: ArrayLike) -> Floats:
+        """(..., 2) points at arc lengths, clamped to the ends."""
+        ...
+
+    def nearest(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
+        """Arc length of the closest point at or after ``from_s_m``, not far beyond it."""
+        ...
+
+
+def wrap(angle_rad: ArrayLike) -> Floats:
+    """Angles in [-pi, pi)."""
+    return np.asarray((np.asarray(angle_rad, float) + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def aim_rad(path: Path, from_m: Floats, along_m: float, carrot_m: float) -> float:
+    """Direction from a point to the carrot ``carrot_m`` beyond ``along_m`` on the path.
+
+    The path is taken to go on straight past its end, or the last carrot would turn the body around.
+    """
+    at = along_m + carrot_m
+    carrot = path.position(min(at, path.length_m))
+    if at > path.length_m:
+        before = path.position(path.length_m - 0.05)
+        step = carrot - before
+        carrot = carrot + step / max(float(np.hypot(*step)), 1e-9) * (at - path.length_m)
+    return float(np.arctan2(carrot[1] - from_m[1], carrot[0] - from_m[0]))
+
+
+def offset_rad(measured_rad: Floats, believed_rad: Floats) -> float:
+    """Rotation from believed to measured link headings: their circular mean difference."""
+    return float(np.angle(np.mean(np.exp(1j * (measured_rad - believed_rad)))))

@@ -1,0 +1,100 @@
+"""The snake walk as a motion source: shapes appended to the angle track, steered by the pose.
+
+[PT] 2.6.2 with what a body with friction needs (METHOD 12): a decision every half state, of which
+only the tail half is appended; a carrot on the path; a linear ramp that cancels the heading error
+of the chosen shape. ``decision_fraction = 1`` and ``ramp_limit_rad = 0`` is the printed rule.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.run import WalkConfig
+from controller.motion.angle_track import AngleTrack
+from controller.motion.steering import wrap
+
+Floats = NDArray[np.float64]
+Order = Callable[[Floats], NDArray[np.intp]]
+Accept = Callable[[Floats], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What was chosen, and from what."""
+
+    state: int
+    heading_error_rad: float
+    """Mean heading of the placed shape minus the aim, before the ramp."""
+    ramp_rad: float
+    candidates: int
+    """Shapes within the heading tolerance; 0 means that the nearest few were taken instead."""
+    visited: int
+    """Distinct states visited so far."""
+
+
+class Walker:
+    """Grows an ``AngleTrack`` from a library of shapes (S, N), head first."""
+
+    def __init__(self, shapes_rad: Floats, walk: WalkConfig, accept: Accept | None = None) -> None:
+        if len(shapes_rad) == 0:
+            raise ValueError("the walk needs at least one shape")
+        self._shapes = shapes_rad
+        self._walk = walk
+        self._accept = accept
+        self._visits = np.zeros(len(shapes_rad), dtype=np.int64)
+        self._failures = np.zeros(len(shapes_rad), dtype=np.int64)
+        self._current = 0
+        self._visits[0] = 1
+        self.track = AngleTrack(shapes_rad[0] - shapes_rad[0].mean())
+
+    def decide(self, offset_rad: float, aim_rad: float) -> Decision:
+        """Choose the next shape and append its tail part.
+
+        Args:
+            offset_rad: rotation from the track's angles to the world.
+            aim_rad: where the next shape shall head, in the world.
+
+        """
+        walk, track = self._walk, self.track
+        placed = self._shapes + (track.last_rad - self._shapes[:, -1])[:, None]
+        error = wrap(placed.mean(axis=1) + offset_rad - aim_rad)
+        size = np.abs(error)
+        size[self._current] = np.inf  # a walk leaves its state
+        near = np.flatnonzero(size <= walk.heading_tolerance_rad)
+        pool = near if len(near) else np.argsort(size, kind="stable")[: walk.nearest_count]
+        ordered = pool[self._order(pool, size[pool])]
+        state = next((int(k) for k in ordered if self._fits(self._piece(placed[k], error[k]))), -1)
+        state = int(ordered[0]) if state < 0 else state
+        track.append(self._piece(placed[state], error[state]))
+        if self._visits[state]:
+            self._failures[self._current] += 1  # left for a state already visited (corrected F)
+        self._visits[state] += 1
+        self._current = state
+        visited = int(np.count_nonzero(self._visits))
+        ramp = self._ramp(error[state])
+        return Decision(state, float(error[state]), ramp, len(near), visited)
+
+    def _order(self, pool: NDArray[np.intp], size: Floats) -> NDArray[np.intp]:
+        """Positions in ``pool``, best first: W of [PT] Eq. 7 on a star, where every degree is 1."""
+        m, f = self._visits[pool], self._failures[pool]
+        group = np.where(m == 0, 0, np.where(f == 0, 1, 2))
+        load = np.where(m == 0, 0.0, np.log2(np.maximum(m, 1)) + f)  # log2 of M 2^F: no overflow
+        return np.lexsort((size, load, group))
+
+    def _ramp(self, error_rad: float) -> float:
+        return float(np.clip(-error_rad, -self._walk.ramp_limit_rad, self._walk.ramp_limit_rad))
+
+    def _piece(self, placed_rad: Floats, error_rad: float) -> Floats:
+        """Tail part of a placed shape, oldest first, bent towards the aim."""
+        keep = max(1, round(self._walk.decision_fraction * self.track.points))
+        bend = self._ramp(error_rad) * np.linspace(0.0, 1.0, keep)
+        return np.asarray(placed_rad[::-1][:keep] + bend)
+
+    def _fits(self, piece_rad: Floats) -> bool:
+        """Whether the body is acceptable when the piece has become its front."""
+        if self._accept is None:
+            return True
+        old = self.track.body_rad(self.track.end)[: self.track.points - len(piece_rad)]
+        return self._accept(np.concatenate([piece_rad[::-1], old]))
