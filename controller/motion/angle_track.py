@@ -48,3 +48,8 @@ class AngleTrack:
             raise ValueError(f"head at {head:.2f}; the track serves {self.points} to {self.end}")
         at = head - np.arange(1, self.points + 1)
         return np.asarray(np.interp(at, np.arange(self.end), self._samples))
+
+    def way(self, start: int, stop: int, rotation_rad: float = 0.0) -> Floats:
+        """Displacement (2,), in segments, of a head that follows the samples without slip."""
+        angles = self._samples[start:stop] + rotation_rad
+        return np.array([np.cos(angles).sum(), np.sin(angles).sum()])

@@ -1,0 +1,50 @@
+"""A serpenoid on the angle track: the baseline and fallback, steered by bending its mean line."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.motion.angle_track import AngleTrack
+from controller.motion.steering import wrap
+from controller.motion.walker import Decision
+
+
+@dataclass(frozen=True, slots=True)
+class SerpentineParameters:
+    """Hirose's serpenoid, ``theta = base + A sin(2 pi k s / L)``, over a body of length L."""
+
+    amplitude_rad: float = 0.7
+    waves: float = 1.2
+    """k, on the body."""
+    turn_limit_rad: float = 1.2
+    """Largest bend of the mean line over one body length."""
+    pieces: int = 10
+    """Decisions per body length."""
+
+
+class Serpentine:
+    """Appends short pieces of a travelling sine whose mean line turns towards the aim."""
+
+    def __init__(self, points: int, parameters: SerpentineParameters | None = None) -> None:
+        self._p = parameters or SerpentineParameters()
+        self._base_rad = 0.0
+        self._at = points  # samples so far
+        self._points = points
+        self.track = AngleTrack(self._wave(np.arange(points))[::-1])
+
+    def decide(self, offset_rad: float, aim_rad: float) -> Decision:
+        """Append the next piece; same contract as ``Walker.decide``."""
+        p = self._p
+        keep = max(1, round(self._points / p.pieces))
+        error = float(wrap(self._base_rad + offset_rad - aim_rad))
+        limit = p.turn_limit_rad * keep / self._points
+        bend = float(np.clip(-error, -limit, limit))
+        line = self._base_rad + bend * np.arange(1, keep + 1) / keep
+        self.track.append(line + self._wave(self._at + np.arange(keep)))
+        self._base_rad += bend
+        self._at += keep
+        return Decision(0, error, bend, 1, 1)
+
+    def _wave(self, sample: np.ndarray) -> np.ndarray:
+        p = self._p
+        return np.asarray(p.amplitude_rad * np.sin(2.0 * np.pi * p.waves * sample / self._points))

@@ -1,0 +1,112 @@
+"""A run on paper: the pilot steers a quasi-static body, so that a plan is judged before torque.
+
+Each step asks the pilot for joint goals, lets the shape change, and finds the rigid velocity that
+balances Coulomb friction (``controller.motion.rigid``). No inertia, no servo lag, level ground.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import RobotConfig
+from config.world import FrictionConfig
+from controller.motion.rigid import rigid_velocity
+from controller.runtime.body import BodyView, body_in_world
+from controller.runtime.pilot import Pilot
+from drivers.types import BodyPose
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """What the plan should do, if the friction is as configured."""
+
+    time_s: Floats
+    """(T,)"""
+    joint_rad: Floats
+    """(T, J)"""
+    centre_m: Floats
+    """(T, 2) centre of mass in the world."""
+    pulse_m: float
+    """How far the shape has travelled along the body."""
+    reached: int
+    missed: int
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last step."""
+        return float(self.time_s[-1])
+
+    @property
+    def joint_speed_rad_s(self) -> Floats:
+        """(J,) largest speed asked of each joint."""
+        speeds = np.diff(self.joint_rad, axis=0) / np.diff(self.time_s)[:, None]
+        return np.asarray(np.abs(speeds).max(axis=0))
+
+
+def pose_at(position_m: Floats, heading_rad: float, time_s: float = 0.0) -> BodyPose:
+    """Build the pose of a level head link."""
+    c, s = np.cos(heading_rad), np.sin(heading_rad)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return BodyPose(time_s, np.append(position_m[:2], 0.0), rotation)
+
+
+def mean_heading_rad(robot: RobotConfig, joint_rad: Floats) -> float:
+    """Mean link heading relative to the head link; a body is laid out by it, not by its head."""
+    return float(body_in_world(robot, pose_at(np.zeros(2), 0.0), joint_rad).headings_rad.mean())
+
+
+def forecast(
+    pilot: Pilot,
+    robot: RobotConfig,
+    friction: FrictionConfig,
+    *,
+    start_m: Floats,
+    heading_rad: float,
+    step_s: float = 0.04,
+    limit_s: float = 240.0,
+) -> Forecast:
+    """Run ``pilot`` on a quasi-static body until it is done or the time is up.
+
+    Args:
+        pilot: used up by this; the run takes a fresh one.
+        robot: links and joints.
+        friction: the ellipse, the same under every link.
+        start_m: (2,) centre of the head link.
+        heading_rad: of the mean body line.
+        step_s: of the simulation and of the pilot.
+        limit_s: when to give up.
+
+    """
+    joints = pilot.first_goal_rad()
+    head_m = np.array(start_m[:2], dtype=float)
+    head_rad = heading_rad - mean_heading_rad(robot, joints)
+    velocity = np.zeros(3)
+    times, angles, centres, pulse_m = [0.0], [joints], [], 0.0
+    while True:
+        view = body_in_world(robot, pose_at(head_m, head_rad), joints)
+        centres.append(view.centre_m[:2])
+        if pilot.done or times[-1] >= limit_s:
+            break
+        goal = pilot.step(step_s, view)
+        before, after = _in_head_frame(robot, joints), _in_head_frame(robot, goal)
+        shape_m_s = (after.link_m - before.link_m)[:, :2] / step_s
+        velocity = rigid_velocity(
+            before.link_m[:, :2], before.headings_rad, shape_m_s, friction, velocity
+        )
+        c, s = np.cos(head_rad), np.sin(head_rad)
+        head_m = head_m + step_s * np.array([[c, -s], [s, c]]) @ velocity[:2]
+        head_rad += step_s * velocity[2]
+        joints = goal
+        pulse_m += step_s * pilot.pulse_m_s
+        times.append(times[-1] + step_s)
+        angles.append(joints)
+    return Forecast(
+        np.array(times), np.array(angles), np.array(centres), pulse_m, pilot.reached, pilot.missed
+    )
+
+
+def _in_head_frame(robot: RobotConfig, joint_rad: Floats) -> BodyView:
+    return body_in_world(robot, pose_at(np.zeros(2), 0.0), joint_rad)

@@ -1,0 +1,153 @@
+"""The pilot: measured body in, joint goals out; decides when the track runs out, counts waypoints.
+
+With ``feedback`` off it believes that the body goes where the track goes, without slip: the printed
+method, kept to show what a body with friction makes of it.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.motion.angle_track import AngleTrack
+from controller.motion.pulse import Pulse
+from controller.motion.steering import Path, aim_rad, offset_rad
+from controller.motion.walker import Decision
+from controller.runtime.body import BodyView
+
+Floats = NDArray[np.float64]
+
+
+Planner = Callable[[Floats], Path]
+"""Lays a path through (n, 2) points in order."""
+
+
+class TrackSource(Protocol):
+    """What grows the angle track."""
+
+    track: AngleTrack
+
+    def decide(self, offset_rad: float, aim_rad: float) -> Decision:
+        """Append the next piece towards the aim."""
+        ...
+
+
+class Pilot:
+    """Steers a track source along a path through waypoints."""
+
+    def __init__(
+        self,
+        source: TrackSource,
+        pulse: Pulse,
+        joints_of: Callable[[Floats], Floats],
+        *,
+        plan: Planner,
+        start_m: Floats,
+        waypoints_m: Sequence[tuple[float, float]],
+        length_m: float,
+        carrot_m: float,
+        waypoint_radius_m: float,
+        feedback: bool = True,
+        aim_at_waypoint: bool = False,
+    ) -> None:
+        self._source = source
+        self._pulse = pulse
+        self._joints_of = joints_of
+        self._plan = plan
+        self._waypoints_m = np.asarray(waypoints_m, float)
+        self._along_m = self._head_along_m = 0.0
+        self._lay_path(np.asarray(start_m, float), 0)
+        self._segment_m = length_m / source.track.points
+        self._carrot_m = carrot_m
+        self._radius_m = waypoint_radius_m
+        self._feedback = feedback
+        self._aim_at_waypoint = aim_at_waypoint
+        self._start: tuple[Floats, float] | None = None
+        self.head = float(source.track.points)
+        self.reached = 0
+        self.missed = 0
+        """How often a waypoint was passed outside its radius, and a new path laid to it."""
+        self.decision: Decision | None = None
+        """Made in the last step, if one was."""
+
+    @property
+    def done(self) -> bool:
+        """Whether every waypoint has been reached."""
+        return self.reached == len(self._waypoints_m)
+
+    @property
+    def along_m(self) -> float:
+        """Arc length of the path point nearest to the body's centre."""
+        return self._along_m
+
+    @property
+    def pulse_m_s(self) -> float:
+        """Pulse speed u: how fast the shape travels along the body."""
+        return self._pulse.speed_segments_s * self._segment_m
+
+    def first_goal_rad(self) -> Floats:
+        """Joint angles of the initial shape."""
+        return self._joints_of(self._source.track.body_rad(self.head))
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Advance by ``dt_s`` and return the joint goals (J,)."""
+        centre, head_m = view.centre_m[:2], view.link_m[0, :2]
+        self._along_m = self.path.nearest(centre, self._along_m)
+        self._head_along_m = self.path.nearest(head_m, self._head_along_m)
+        self._count(centre, head_m)
+        track = self._source.track
+        self.decision = None
+        if self.head >= track.end - 1e-9:
+            self.decision = self._source.decide(*self._aim(view))
+        self.head = self._pulse.advance(track, self.head, dt_s)
+        return self._joints_of(track.body_rad(self.head))
+
+    def _count(self, centre_m: Floats, head_m: Floats) -> None:
+        """Count a waypoint when the centre is near it; when it was passed by, go back for it."""
+        if self.done:
+            return
+        if np.hypot(*(self._waypoints_m[self.reached] - centre_m)) <= self._radius_m:
+            self.reached += 1
+        elif self._feedback and self._along_m > self._passed_m[self.reached] + self._radius_m:
+            self.missed += 1
+            self._lay_path(head_m, self.reached)
+
+    def _lay_path(self, from_m: Floats, first: int) -> None:
+        """Plan from a point through the waypoints from ``first`` on."""
+        self.path = self._plan(np.vstack([from_m, self._waypoints_m[first:]]))
+        self._along_m = self._head_along_m = 0.0
+        self._passed_m = np.zeros(len(self._waypoints_m))
+        at = 0.0
+        for k in range(first, len(self._waypoints_m)):
+            at = self._passed_m[k] = self.path.nearest(self._waypoints_m[k], at)
+
+    def _aim(self, view: BodyView) -> tuple[float, float]:
+        """Offset from track to world, and the direction wanted there."""
+        offset, head_m, centre_m = self._measured(view)
+        if self._start is None:
+            self._start = (head_m, offset)
+        along_m = self._head_along_m
+        if not self._feedback:
+            offset = self._start[1]
+            head_m, centre_m = self._believed(self._start[0], offset)
+            along_m = self.path.nearest(head_m, self._along_m)
+        if self._aim_at_waypoint:
+            target = self._waypoints_m[min(self.reached, len(self._waypoints_m) - 1)]
+            return offset, float(np.arctan2(*(target - centre_m)[::-1]))
+        return offset, aim_rad(self.path, head_m, along_m, self._carrot_m)
+
+    def _measured(self, view: BodyView) -> tuple[float, Floats, Floats]:
+        body = self._source.track.body_rad(self.head)
+        links = len(view.link_m)
+        at = (np.arange(links) + 0.5) * self._source.track.points / links - 0.5
+        believed = np.interp(at, np.arange(len(body)), body)
+        return offset_rad(view.headings_rad, believed), view.link_m[0, :2], view.centre_m[:2]
+
+    def _believed(self, start_m: Floats, offset: float) -> tuple[Floats, Floats]:
+        """Head and centre of a body that never slipped since the first decision."""
+        track = self._source.track
+        head_m = start_m + self._segment_m * track.way(track.points, round(self.head), offset)
+        body = track.body_rad(self.head) + offset
+        behind = np.cumsum(np.stack([np.cos(body), np.sin(body)], axis=1), axis=0)
+        return head_m, head_m - self._segment_m * behind.mean(axis=0)

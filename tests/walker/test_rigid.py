@@ -1,0 +1,82 @@
+"""The force balance: closed forms of bodies that change shape on Coulomb friction."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from config.world import FrictionConfig
+from controller.motion.rigid import rigid_velocity
+
+RNG = np.random.default_rng(11)
+SNAKE = FrictionConfig(along=0.1, across=0.7)
+SAME = FrictionConfig(along=0.4, across=0.4)
+X = np.linspace(0.0, -1.0, 17)
+LINE = np.stack([X, np.zeros(17)], axis=1)
+
+
+def wave(shift: float, amplitude: float = 0.7) -> tuple[np.ndarray, np.ndarray]:
+    """Points (fixed head) and headings of a travelling sine."""
+    heading = amplitude * np.sin(2 * np.pi * 1.2 * (shift - np.arange(17) / 17))
+    step = np.stack([np.cos(heading), np.sin(heading)], axis=1) / 17
+    points = -np.cumsum(0.5 * (step + np.vstack([np.zeros(2), step[:-1]])), axis=0)
+    return points, heading
+
+
+def net(w: np.ndarray, points, headings, shape, friction) -> np.ndarray:
+    """Independent sum of friction forces and moment per unit load."""
+    total = np.zeros(3)
+    for p, h, change in zip(points, headings, shape, strict=True):
+        v = change + w[:2] + w[2] * np.array([-p[1], p[0]])
+        axes = np.array([[np.cos(h), np.sin(h)], [-np.sin(h), np.cos(h)]])
+        mu = np.array([friction.along, friction.across])
+        local = axes @ v
+        force = -axes.T @ (mu**2 * local) / max(np.hypot(*(mu * local)), 1e-12)
+        total += [*force, p[0] * force[1] - p[1] * force[0]]
+    return total / len(points)
+
+
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-2, 2))
+def test_a_rigid_motion_of_the_shape_is_undone(vx: float, vy: float, omega: float) -> None:
+    shape = np.array([vx, vy]) + omega * np.stack([-LINE[:, 1], LINE[:, 0]], axis=1)
+    w = rigid_velocity(LINE, np.zeros(17), shape, SNAKE)
+    np.testing.assert_allclose(w, [-vx, -vy, -omega], atol=1e-5)
+
+
+@pytest.mark.parametrize("friction", [SNAKE, SAME])
+def test_forces_and_moment_balance(friction: FrictionConfig) -> None:
+    for shift in RNG.uniform(0, 2, 10):
+        (p0, h0), (p1, _) = wave(shift), wave(shift + 1e-4)
+        shape = (p1 - p0) / 1e-4 * 0.3
+        w = rigid_velocity(p0, h0, shape, friction)
+        np.testing.assert_allclose(net(w, p0, h0, shape, friction), 0.0, atol=1e-3)
+
+
+def advance(friction: FrictionConfig) -> float:
+    """Forward way of the centre over one period of the wave, in body lengths per unit of pulse."""
+    steps, x, angle, w = 200, np.zeros(2), 0.0, np.zeros(3)
+    start = None
+    for k in range(steps + 1):
+        (p0, h0), (p1, _) = wave(k / steps / 1.2), wave((k + 1) / steps / 1.2)
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, -s], [s, c]])
+        centre = x + turn @ p0.mean(axis=0)
+        start = centre if start is None else start
+        w = rigid_velocity(p0, h0, p1 - p0, friction, w)
+        x, angle = x + turn @ w[:2], angle + w[2]
+    return float((centre - start)[0] * 1.2)
+
+
+def test_a_travelling_wave_pushes_forward_only_where_sliding_along_is_easier() -> None:
+    assert advance(FrictionConfig(along=0.01, across=1.0)) > advance(SNAKE) > 0.4
+    assert advance(SAME) < 0.0
+
+
+def test_the_scale_of_friction_does_not_matter() -> None:
+    (p0, h0), (p1, _) = wave(0.3), wave(0.301)
+    double = FrictionConfig(along=0.2, across=1.4)
+    np.testing.assert_allclose(
+        rigid_velocity(p0, h0, (p1 - p0) * 300, SNAKE),
+        rigid_velocity(p0, h0, (p1 - p0) * 300, double),
+        atol=1e-6,
+    )
