@@ -56,7 +56,7 @@ class RunConfig(Strict):
     name: str
     robot: str = Field("yaw16", description="a shipped robot's name or a TOML path")
     world: str = Field("flat", description="a shipped world's name or a TOML path")
-    track: str = Field("lamprey-like", description="a shipped recording's name or a file")
+    track: str = Field("worm-like", description="a shipped recording's name or a file")
     motion: MotionName = "walk"
     waypoints_m: tuple[tuple[float, float], ...] = Field(min_length=1)
     start_m: tuple[float, float] = Field((0.0, 0.0), description="where the head starts")

@@ -1,0 +1,81 @@
+"""The library of shapes: recorded and random states that this robot can make and that push."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.errors import InputError
+from controller.shape.states import random_states, to_angles, to_states
+
+Floats = NDArray[np.float64]
+Refuse = Callable[[Floats], NDArray[np.bool_]]
+"""Shapes (S, N) to a mask (S,) of those that cannot be used."""
+
+_ROUNDS = 50
+
+
+@dataclass(frozen=True, slots=True)
+class StateLibrary:
+    """Shapes that passed every test, and how many did not."""
+
+    shapes_rad: Floats
+    """(S, N) tangent angles, head first, zero mean."""
+    recorded: int
+    """The first so many come from the recording, the rest are random."""
+    rejected: dict[str, int]
+    """Random and recorded states refused, by the first reason."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """For the log and the report."""
+        refused = {f"rejected: {reason}": n for reason, n in self.rejected.items()}
+        made = {"recorded": self.recorded, "random": len(self.shapes_rad) - self.recorded}
+        return made | refused
+
+
+def build_library(
+    track_rad: Floats,
+    tests: dict[str, Refuse],
+    *,
+    coefficients: int,
+    random_count: int,
+    curvature: float,
+    rng: np.random.Generator,
+) -> StateLibrary:
+    """Turn tangent angles (T, N) into states, add ``random_count`` random ones, filter all.
+
+    Raises:
+        InputError: too few random states pass: the robot cannot make these motions.
+
+    """
+    states = curvature * to_states(track_rad, coefficients)
+    rejected = dict.fromkeys(tests, 0)
+    recorded = _passing(to_angles(states, track_rad.shape[-1]), tests, rejected)
+    made: list[Floats] = []
+    for _ in range(_ROUNDS):
+        missing = random_count - sum(map(len, made))
+        if missing <= 0:
+            break
+        drawn = to_angles(random_states(states, max(missing, 20), rng), track_rad.shape[-1])
+        made.append(_passing(drawn, tests, rejected)[:missing])
+    fresh = np.concatenate([np.empty((0, track_rad.shape[-1])), *made])
+    if len(fresh) < random_count or len(recorded) + len(fresh) < 2:
+        reasons = ", ".join(f"{name}: {count}" for name, count in rejected.items())
+        raise InputError(
+            f"states: only {len(fresh)} of {random_count} random states can be used by this robot "
+            f"(refused for {reasons}); lower behaviour.curvature or states.gain_limit, raise the "
+            "robot's joint limits, or take another track"
+        )
+    return StateLibrary(np.concatenate([recorded, fresh]), len(recorded), rejected)
+
+
+def _passing(shapes: Floats, tests: dict[str, Refuse], rejected: dict[str, int]) -> Floats:
+    for name, refuse in tests.items():
+        if len(shapes) == 0:
+            break
+        bad = refuse(shapes)
+        rejected[name] += int(bad.sum())
+        shapes = shapes[~bad]
+    return shapes

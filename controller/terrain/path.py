@@ -1,0 +1,58 @@
+"""A smooth path: a cubic spline through points in order, by arc length ([PT] 2.6.1)."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from config.errors import InputError
+
+Floats = NDArray[np.float64]
+_STEP_M = 0.01
+
+
+class SplinePath:
+    """Natural cubic spline over chord length, tabulated every centimetre.
+
+    Raises:
+        InputError: fewer than two distinct points.
+
+    """
+
+    def __init__(self, points_m: ArrayLike) -> None:
+        points = np.asarray(points_m, dtype=float)
+        apart = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
+        points = points[apart]
+        if len(points) < 2:
+            raise InputError("a path needs two different points: the start and a waypoint")
+        chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        spline = CubicSpline(chord, points, bc_type="natural")
+        fine = spline(np.linspace(0.0, chord[-1], max(2, round(chord[-1] / _STEP_M) + 1)))
+        self._s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
+        self._points = fine
+
+    @property
+    def length_m(self) -> float:
+        """Arc length of the whole path."""
+        return float(self._s[-1])
+
+    def position(self, s_m: ArrayLike) -> Floats:
+        """(..., 2) points at arc lengths, clamped to the ends."""
+        s = np.asarray(s_m, dtype=float)
+        x, y = (np.interp(s, self._s, self._points[:, k]) for k in (0, 1))
+        return np.stack([x, y], axis=-1)
+
+    def heading_rad(self, s_m: float) -> float:
+        """Direction of the path at an arc length."""
+        before, after = self.position(np.array([s_m - _STEP_M, s_m + _STEP_M]))
+        return float(np.arctan2(*(after - before)[::-1]))
+
+    def nearest(self, point_m: ArrayLike, from_s_m: float = 0.0, window_m: float = 1.5) -> float:
+        """Arc length of the closest point in ``[from_s_m, from_s_m + window_m]``.
+
+        The window keeps a follower on its own lap where a path crosses or closes on itself.
+        """
+        low = int(np.searchsorted(self._s, from_s_m - 1e-9))
+        high = int(np.searchsorted(self._s, from_s_m + window_m, side="right"))
+        low = min(low, len(self._s) - 1)
+        gap = self._points[low : max(high, low + 1)] - np.asarray(point_m, dtype=float)[:2]
+        return float(self._s[low + int(np.argmin(np.hypot(gap[:, 0], gap[:, 1])))])
