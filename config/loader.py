@@ -3,7 +3,7 @@
 import hashlib
 import tomllib
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -52,10 +52,20 @@ def load(path: Path, model: type[M]) -> M:
         raise ConfigError(f"{path}: {error.strerror or error}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: not TOML: {error}") from None
+    return checked(model, data, str(path))
+
+
+def checked(model: type[M], data: dict[str, Any], source: str) -> M:
+    """Validate ``data``; ``source`` leads each line of the faults.
+
+    Raises:
+        ConfigError: schema faults, all of them, one line each.
+
+    """
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise ConfigError([_line(path, fault) for fault in error.errors()]) from None  # type: ignore[arg-type]
+        raise ConfigError([_line(source, dict(fault)) for fault in error.errors()]) from None
 
 
 def load_robot(name_or_path: str, beside: Path | None = None) -> RobotConfig:
@@ -83,7 +93,7 @@ def _folder(kind: Kind) -> Path:
     return Path(__file__).parent / kind
 
 
-def _line(path: Path, fault: dict[str, object]) -> str:
+def _line(path: str, fault: dict[str, Any]) -> str:
     loc = fault["loc"]
     where = ".".join(str(p) for p in loc) if isinstance(loc, tuple) else str(loc)
     given = fault.get("input")

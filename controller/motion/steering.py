@@ -20,8 +20,8 @@ class Path(Protocol):
         """(..., 2) points at arc lengths, clamped to the ends."""
         ...
 
-    def nearest(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
-        """Arc length of the closest point at or after ``from_s_m``, not far beyond it."""
+    def nearest(self, point_m: ArrayLike, from_s_m: float = 0.0, window_m: float = 1.5) -> float:
+        """Arc length of the closest point in ``[from_s_m, from_s_m + window_m]``."""
         ...
 
 

@@ -118,9 +118,11 @@ class Pilot:
         self.path = self._plan(np.vstack([from_m, self._waypoints_m[first:]]))
         self._along_m = self._head_along_m = 0.0
         self._passed_m = np.zeros(len(self._waypoints_m))
-        at = 0.0
+        at, last = 0.0, from_m
         for k in range(first, len(self._waypoints_m)):
-            at = self._passed_m[k] = self.path.nearest(self._waypoints_m[k], at)
+            chord_m = float(np.hypot(*(self._waypoints_m[k] - last)))
+            at = self.path.nearest(self._waypoints_m[k], at, window_m=1.6 * chord_m + 0.1)
+            self._passed_m[k], last = at, self._waypoints_m[k]
 
     def _aim(self, view: BodyView) -> tuple[float, float]:
         """Offset from track to world, and the direction wanted there."""

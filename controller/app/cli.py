@@ -1,0 +1,102 @@
+"""The command line: ``snakewalk COMMAND --help``."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from config.errors import InputError
+from config.loader import load_robot, load_run, load_world, shipped
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Run gaits on a DYNAMIXEL servo snake, or on a simulated one that answers the same bytes.",
+)
+console = Console(highlight=False)
+
+RunName = Annotated[str, typer.Argument(help="shipped run, or a RUN.toml", show_default=True)]
+Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
+Seed = Annotated[int | None, typer.Option(help="of every random choice")]
+Motion = Annotated[str | None, typer.Option(help="walk, walk-printed, walk-blind or serpenoid")]
+
+
+@app.command("list", epilog="Example: [bold]snakewalk list --json[/bold]")
+def list_(as_json: Json = False) -> None:
+    """List the shipped runs, robots and worlds."""
+    rows = {
+        "runs": [[n, f"{(r := load_run(n)).robot} on {r.world}"] for n in shipped("runs")],
+        "robots": [
+            [n, f"{(b := load_robot(n)).joint_count} {b.servo.model}, {b.length_m:.2f} m"]
+            for n in shipped("robots")
+        ],
+        "worlds": [[n, load_world(n).ground.kind] for n in shipped("worlds")],
+    }
+    if as_json:
+        print(json.dumps({kind: [name for name, _ in rs] for kind, rs in rows.items()}))
+        return
+    for kind, lines in rows.items():
+        table = Table(title=kind, title_justify="left", box=None, show_header=False)
+        for line in lines:
+            table.add_row(f"  {line[0]}", line[1])
+        console.print(table)
+
+
+@app.command(
+    epilog="Examples: [bold]snakewalk plan[/bold]   "
+    "[bold]snakewalk plan flat-slalom --motion serpenoid --json[/bold]"
+)
+def plan(
+    run: RunName = "flat-square", seed: Seed = None, motion: Motion = None, as_json: Json = False
+) -> None:
+    """Judge a run on paper: library, path and joint limits, with no servo and no simulator."""
+    from controller.app.prepare import prepare  # noqa: PLC0415  heavy; --help stays quick
+
+    prepared = prepare(run, seed=seed, motion=motion)
+    ahead = prepared.forecast()
+    found: dict[str, object] = {
+        "run": prepared.run.name,
+        "robot": prepared.robot.name,
+        "motion": prepared.run.motion,
+        "seed": prepared.run.seed,
+        "waypoints": len(prepared.run.waypoints_m),
+        "waypoints_reached": ahead.reached,
+        "passed_by": ahead.missed,
+        "path_m": round(prepared.path.length_m, 3),
+        "duration_s": round(ahead.duration_s, 2),
+        "joint_speed_rad_s": round(float(ahead.joint_speed_rad_s.max()), 3),
+        "joint_reach_rad": round(float(abs(ahead.joint_rad).max()), 3),
+        "predicted_gain": round(prepared.gain, 3),
+    }
+    if prepared.run.motion != "serpenoid":
+        found["states"] = prepared.library.counts
+    _show(found, as_json)
+
+
+def _show(found: dict[str, object], as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(found))
+        return
+    table = Table(box=None, show_header=False)
+    for key, value in found.items():
+        text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
+        table.add_row(key.replace("_", " "), str(text))
+    console.print(table)
+
+
+def main() -> None:
+    """Run the command line; bad input ends with exit code 2 and one line per fault."""
+    try:
+        app()
+    except InputError as error:
+        for line in error.faults:
+            print(f"snakewalk: {line}", file=sys.stderr)
+        raise SystemExit(2) from None
+    except OSError as error:
+        print(f"snakewalk: {Path(str(error.filename or ''))}: {error.strerror}", file=sys.stderr)
+        raise SystemExit(2) from None
