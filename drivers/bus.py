@@ -1,0 +1,267 @@
+"""The bus: service work through the DYNAMIXEL SDK, its known defects fenced off.
+
+What is guarded, with dynamixel-sdk 4.1.0:
+
+- It never stuffs what it sends, and what it unstuffs is not always what was stuffed: packets that
+  hold ``FF FF`` are sent, or asked for again, by this package's own codec.
+- A status packet with an error and without data counts as success: the error byte is looked at
+  first, and the data's length after it.
+- An exception in the port leaves it busy for ever: it is freed again.
+- A broadcast ping waits 0.8 s for 252 servos: ``find`` pings the expected ones.
+
+The control cycle does not go through the SDK: see ``drivers.cycle``.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import dynamixel_sdk as sdk
+
+from drivers.control_table import ControlTable, Register, load_control_table
+from drivers.cycle import GroupCycle
+from drivers.errors import BusError, NoAnswerError, ServoError
+from drivers.port import BytePort
+from drivers.protocol.packet import (
+    ALERT,
+    BROADCAST_ID,
+    Instruction,
+    InstructionPacket,
+    ResultError,
+    StatusPacket,
+    encode_instruction,
+)
+from drivers.protocol.parser import PacketReader
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A servo that answered a ping."""
+
+    servo_id: int
+    model_number: int
+    firmware: int | None
+    """None where only the ping was asked."""
+    alert: bool
+    """It reports a hardware error (register 70)."""
+
+
+class DynamixelBus:
+    """Servos of one model on one byte port."""
+
+    def __init__(
+        self,
+        port: BytePort,
+        model: str = "XM430-W350",
+        *,
+        latency_s: float = 0.004,
+        tries: int = 3,
+    ) -> None:
+        self.port = port
+        self.table: ControlTable = load_control_table(model)
+        self.latency_s = latency_s
+        """How long adapter and driver may hold bytes back (FTDI: its latency timer)."""
+        self._tries = tries
+        self._sdk = sdk.PacketHandler(2.0)
+
+    def ping(self, servo_id: int) -> Found:
+        """Ask one servo who it is.
+
+        Raises:
+            NoAnswerError: nobody answered.
+
+        """
+
+        def once() -> Found:
+            number, result, error = self._sdk.ping(self.port, servo_id)
+            self._came(result, servo_id, "ping")
+            return Found(servo_id, number, None, bool(error & ALERT))
+
+        return self._retry(once)
+
+    def find(self, servo_ids: Iterable[int]) -> dict[int, Found]:
+        """Ping each; those that answered."""
+        found = {}
+        for servo_id in servo_ids:
+            try:
+                found[servo_id] = self.ping(servo_id)
+            except NoAnswerError:
+                continue
+        return found
+
+    def scan(self) -> dict[int, Found]:
+        """All servos at the port's baud rate, by a broadcast ping; takes most of a second."""
+        answers, _ = self._guarded(lambda: self._sdk.broadcastPing(self.port))
+        return {
+            servo_id: Found(servo_id, number, firmware, False)
+            for servo_id, (number, firmware) in sorted(answers.items())
+        }
+
+    def read(self, servo_id: int, name: str) -> int:
+        """Value of a register by its name.
+
+        Raises:
+            ControlTableError: no such register.
+            NoAnswerError: nobody answered.
+            ServoError: the servo refused.
+
+        """
+        register = self.table.register(name)
+        return register.decode(self._retry(lambda: self._read(servo_id, register)))
+
+    def write(self, servo_id: int, name: str, value: int) -> None:
+        """Write a register by its name.
+
+        Raises:
+            ControlTableError: no such register, or the value does not fit it.
+            NoAnswerError: nobody answered.
+            ServoError: the servo refused.
+
+        """
+        register = self.table.register(name)
+        data = register.encode(value)
+        self._retry(lambda: self._write(servo_id, register, data))
+
+    def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
+        """Write one value to all at once; nobody confirms it.
+
+        Raises:
+            ControlTableError: no such register, or the value does not fit it.
+
+        """
+        register = self.table.register(name)
+        data = register.encode(value)
+        params = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
+        params += b"".join(bytes([servo_id]) + data for servo_id in servo_ids)
+        packet = InstructionPacket(BROADCAST_ID, Instruction.SYNC_WRITE, params)
+        self.port.write(encode_instruction(packet))
+
+    def write_verified(self, servo_id: int, name: str, value: int) -> None:
+        """Write a register if it differs, and read it back: EEPROM wears, and writes get lost.
+
+        Raises:
+            BusError: it does not read back as written.
+
+        """
+        if self.read(servo_id, name) == value:
+            return
+        self.write(servo_id, name, value)
+        got = self.read(servo_id, name)
+        if got != value:
+            raise BusError(f"servo {servo_id}: {name}: wrote {value}, reads back {got}")
+
+    def reboot(self, servo_id: int) -> None:
+        """Restart a servo: clears hardware errors, torque goes off, its turn count is lost."""
+
+        def once() -> None:
+            result, error = self._sdk.reboot(self.port, servo_id)
+            self._came(result, servo_id, "reboot")
+            self._accepted(servo_id, "reboot", error)
+
+        self._retry(once)
+
+    def cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> GroupCycle:
+        """Codec of the control cycle for these servos: Goal Position out, current to position in.
+
+        Raises:
+            ControlTableError: the model lacks one of the registers.
+
+        """
+        return self._cycle(servo_ids, "Present Current", "Present Position", fast)
+
+    def slow_cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> GroupCycle:
+        """Codec that reads voltage and temperature.
+
+        Raises:
+            ControlTableError: the model lacks one of the registers.
+
+        """
+        return self._cycle(servo_ids, "Present Input Voltage", "Present Temperature", fast)
+
+    def _cycle(self, servo_ids: Sequence[int], first: str, last: str, fast: bool) -> GroupCycle:
+        start, end = self.table[first].address, self.table[last].address + self.table[last].size
+        return GroupCycle(
+            self.port,
+            servo_ids,
+            goal_address=self.table["Goal Position"].address,
+            read_address=start,
+            read_bytes=end - start,
+            fast=fast,
+            latency_s=self.latency_s,
+        )
+
+    def _read(self, servo_id: int, register: Register) -> bytes:
+        data, result, error = self._sdk.readTxRx(
+            self.port, servo_id, register.address, register.size
+        )
+        if result == sdk.COMM_SUCCESS and error & ~ALERT == 0:
+            plain = bytes(data)
+            if len(plain) == register.size and b"\xff\xff" not in plain:
+                return plain
+        span = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
+        status = self._exchange(InstructionPacket(servo_id, Instruction.READ, span))
+        self._accepted(servo_id, f"read {register.name}", status.error)
+        if len(status.params) != register.size:
+            raise BusError(
+                f"servo {servo_id}: read {register.name}: {len(status.params)} bytes came, "
+                f"not {register.size}"
+            )
+        return status.params
+
+    def _write(self, servo_id: int, register: Register, data: bytes) -> None:
+        what = f"write {register.name}"
+        if b"\xff\xff" in data:
+            params = register.address.to_bytes(2, "little") + data
+            status = self._exchange(InstructionPacket(servo_id, Instruction.WRITE, params))
+            self._accepted(servo_id, what, status.error)
+            return
+        result, error = self._sdk.writeTxRx(
+            self.port, servo_id, register.address, len(data), list(data)
+        )
+        self._came(result, servo_id, what)
+        self._accepted(servo_id, what, error)
+
+    def _exchange(self, packet: InstructionPacket) -> StatusPacket:
+        """Send and wait for the servo's status packet, by our own strict codec."""
+        port, reader = self.port, PacketReader()
+        port.clearPort()
+        raw = encode_instruction(packet)
+        port.setPacketTimeout(len(raw) + 32)
+        port.write(raw)
+        while not port.isPacketTimeout():
+            for answer in reader.feed(port.readPort(256)):
+                if isinstance(answer, StatusPacket) and answer.servo_id == packet.servo_id:
+                    return answer
+        raise NoAnswerError(f"servo {packet.servo_id}: no answer at {port.getBaudRate()} baud")
+
+    def _retry(self, once: Callable[[], T]) -> T:
+        """Run an exchange, again after silence or damage; what the servo refuses is final."""
+        for _ in range(self._tries - 1):
+            try:
+                return self._guarded(once)
+            except NoAnswerError:
+                self.port.drain_until_quiet(self.latency_s)
+        return self._guarded(once)
+
+    def _guarded(self, call: Callable[[], T]) -> T:
+        try:
+            return call()
+        finally:
+            self.port.is_using = False
+
+    def _came(self, result: int, servo_id: int, what: str) -> None:
+        if result != sdk.COMM_SUCCESS:
+            said = self._sdk.getTxRxResult(result).removeprefix("[TxRxResult] ")
+            raise NoAnswerError(
+                f"servo {servo_id}: {what}: {said} at {self.port.getBaudRate()} baud"
+            )
+
+    @staticmethod
+    def _accepted(servo_id: int, what: str, error: int) -> None:
+        code = error & ~ALERT
+        if code:
+            known = code in ResultError._value2member_map_
+            name = ResultError(code).name.lower().replace("_", " ") if known else f"error {code}"
+            raise ServoError(f"servo {servo_id}: {what}: refused: {name}", error)

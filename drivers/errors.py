@@ -1,0 +1,69 @@
+"""What can go wrong between radians and bytes.
+
+::
+
+    DriverError                    everything below
+    ├── ProtocolError              bytes that are not a packet
+    │   └── StuffingError          ``FF FF FD`` in a payload without its stuffed ``FD``
+    ├── BusError                   a servo did not do as told
+    │   ├── NoAnswerError          no status packet before the deadline
+    │   └── ServoError             a status packet that carries a result error
+    ├── SafetyTrippedError         the safety layer has latched; an operator must reset it
+    ├── PortError (InputError)     the port is missing, denied, busy, or vanished
+    ├── ChainError (InputError)    the servos found are not the robot described
+    ├── ControlTableError (InputError)  unknown servo model, register or unit
+    └── BudgetError (InputError)   the cycle does not fit the wire
+
+The last four say what a user gave that cannot be used, one line a fault; the command line prints
+the lines and ends with exit code 2.
+"""
+
+from config.errors import InputError
+
+
+class DriverError(Exception):
+    """Root of the tree."""
+
+
+class ProtocolError(DriverError):
+    """Bytes that cannot be a Protocol 2.0 packet."""
+
+
+class StuffingError(ProtocolError):
+    """Malformed byte stuffing."""
+
+
+class BusError(DriverError):
+    """A servo did not do as told."""
+
+
+class NoAnswerError(BusError):
+    """No status packet came before the deadline."""
+
+
+class ServoError(BusError):
+    """The servo answered with a result error; ``error`` is the byte of its status packet."""
+
+    def __init__(self, message: str, error: int) -> None:
+        super().__init__(message)
+        self.error = error
+
+
+class SafetyTrippedError(DriverError):
+    """The safety layer has latched and sends nothing until an operator resets it."""
+
+
+class PortError(InputError, DriverError):
+    """The port is missing, denied, busy, or vanished."""
+
+
+class ChainError(InputError, DriverError):
+    """The servos found on the bus are not the robot that was described."""
+
+
+class ControlTableError(InputError, DriverError):
+    """Unknown servo model, register, or unit."""
+
+
+class BudgetError(InputError, DriverError):
+    """The control cycle does not fit the wire."""

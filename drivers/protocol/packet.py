@@ -1,0 +1,127 @@
+"""Protocol 2.0 packets, both ways, shared by host and servo side.
+
+``FF FF FD 00 | id | length (2) | instruction | [error] parameters, stuffed | CRC (2)``; the length
+counts all behind itself. Source: e-manual, DYNAMIXEL Protocol 2.0.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from drivers.errors import ProtocolError
+from drivers.protocol.crc import crc16
+from drivers.protocol.stuffing import stuff
+
+HEADER = b"\xff\xff\xfd\x00"
+BROADCAST_ID = 0xFE
+MAX_ID = 0xFC
+STATUS = 0x55
+"""What stands in the instruction field of a status packet."""
+ALERT = 0x80
+"""Bit of the error byte: register 70 (Hardware Error Status) is not zero."""
+
+
+class Instruction(IntEnum):
+    """What a host may ask."""
+
+    PING = 0x01
+    READ = 0x02
+    WRITE = 0x03
+    REG_WRITE = 0x04
+    ACTION = 0x05
+    FACTORY_RESET = 0x06
+    REBOOT = 0x08
+    CLEAR = 0x10
+    CONTROL_TABLE_BACKUP = 0x20
+    SYNC_READ = 0x82
+    SYNC_WRITE = 0x83
+    FAST_SYNC_READ = 0x8A
+    BULK_READ = 0x92
+    BULK_WRITE = 0x93
+    FAST_BULK_READ = 0x9A
+
+
+class ResultError(IntEnum):
+    """Low seven bits of a status packet's error byte."""
+
+    NONE = 0
+    RESULT_FAIL = 1
+    INSTRUCTION = 2
+    CRC = 3
+    DATA_RANGE = 4
+    DATA_LENGTH = 5
+    DATA_LIMIT = 6
+    ACCESS = 7
+
+
+@dataclass(frozen=True, slots=True)
+class InstructionPacket:
+    """Host to servo."""
+
+    servo_id: int
+    instruction: int
+    """An ``Instruction``; other numbers are kept, so that a servo can refuse them."""
+    params: bytes = b""
+    """Without stuffing."""
+
+
+@dataclass(frozen=True, slots=True)
+class StatusPacket:
+    """Servo to host; with id 0xFE the answer to a fast read, ``params`` then all behind ``error``.
+
+    A fast read's answer is one packet that the servos say in turn: for each an error byte, its id,
+    its data and the CRC of everything so far; the last CRC is the packet's. ``error`` is that of
+    the first servo, and ``params`` lacks the last CRC.
+    """
+
+    servo_id: int
+    error: int
+    params: bytes = b""
+    """Without stuffing."""
+
+    @property
+    def result(self) -> int:
+        """Error code without the alert bit; a ``ResultError`` if the servo keeps to the manual."""
+        return self.error & ~ALERT
+
+    @property
+    def alert(self) -> bool:
+        """Whether the servo reports a hardware error (register 70)."""
+        return bool(self.error & ALERT)
+
+
+Packet = InstructionPacket | StatusPacket
+
+
+def encode_instruction(packet: InstructionPacket) -> bytes:
+    """Bytes of an instruction packet, stuffed.
+
+    Raises:
+        ProtocolError: an id or a length that the protocol does not have.
+
+    """
+    return _frame(packet.servo_id, packet.instruction, stuff(packet.params))
+
+
+def encode_status(packet: StatusPacket) -> bytes:
+    """Bytes of a status packet; stuffed unless it is a fast read's answer (id 0xFE).
+
+    Raises:
+        ProtocolError: an id or a length that the protocol does not have.
+
+    """
+    payload = bytes([packet.error]) + packet.params
+    if packet.servo_id != BROADCAST_ID:
+        payload = stuff(payload)
+    return _frame(packet.servo_id, STATUS, payload)
+
+
+def _frame(servo_id: int, instruction: int, payload: bytes) -> bytes:
+    if not (0 <= servo_id <= MAX_ID or servo_id == BROADCAST_ID):
+        raise ProtocolError(f"id {servo_id}: a bus has 0 to {MAX_ID}, and {BROADCAST_ID} for all")
+    length = len(payload) + 3
+    if length > 0xFFFF:
+        raise ProtocolError(f"packet of length {length}: the length field ends at 65535")
+    body = (
+        HEADER + bytes([servo_id]) + length.to_bytes(2, "little") + bytes([instruction]) + payload
+    )
+    return body + crc16(body).to_bytes(2, "little")

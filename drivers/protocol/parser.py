@@ -1,0 +1,108 @@
+"""Bytes to packets, through noise, cuts and false headers."""
+
+from drivers.errors import StuffingError
+from drivers.protocol.crc import crc16
+from drivers.protocol.packet import (
+    BROADCAST_ID,
+    HEADER,
+    MAX_ID,
+    STATUS,
+    InstructionPacket,
+    Packet,
+    StatusPacket,
+)
+from drivers.protocol.stuffing import unstuff
+
+_FIXED = 7  # header, id and length field, in front of what the length counts
+
+
+class PacketReader:
+    """Cuts a byte stream into packets; what is not one is skipped and counted.
+
+    A header whose length or CRC is wrong costs only its first byte: the search goes on right
+    behind it, so a damaged packet never hides the good one that follows. Memory is bounded by one
+    longest packet plus what is fed at once.
+    """
+
+    def __init__(self, max_length: int = 4096) -> None:
+        self.max_length = max_length
+        """Largest length field believed; more is taken for noise."""
+        self.crc_errors = 0
+        """Candidates with a whole frame but a wrong CRC."""
+        self.stuffing_errors = 0
+        """Frames with a right CRC whose payload no strict sender can have made."""
+        self.dropped_bytes = 0
+        """Bytes that belonged to no packet."""
+        self._buffer = bytearray()
+
+    @property
+    def pending(self) -> int:
+        """Bytes held of a packet that is not yet whole."""
+        return len(self._buffer)
+
+    def reset(self) -> None:
+        """Forget a partial packet: the line has gone quiet, the rest will not come."""
+        self.dropped_bytes += len(self._buffer)
+        self._buffer.clear()
+
+    def feed(self, data: bytes) -> list[Packet]:
+        """Take bytes in; return the packets that they complete, in order."""
+        buffer = self._buffer
+        buffer += data
+        packets: list[Packet] = []
+        at = 0
+        while True:
+            found = self._next_header(at)
+            self.dropped_bytes += found - at
+            at = found
+            if len(buffer) - at < _FIXED + 3:
+                break
+            servo_id, length = buffer[at + 4], buffer[at + 5] | buffer[at + 6] << 8
+            shortest = 4 if buffer[at + 7] == STATUS else 3
+            possible = servo_id <= MAX_ID or servo_id == BROADCAST_ID
+            if not possible or not shortest <= length <= self.max_length:
+                at = self._skip(at)
+                continue
+            end = at + _FIXED + length
+            if end > len(buffer):
+                break
+            if crc16(buffer[at : end - 2]) != buffer[end - 2] | buffer[end - 1] << 8:
+                self.crc_errors += 1
+                at = self._skip(at)
+                continue
+            packet = self._decode(servo_id, buffer[at + 7], bytes(buffer[at + 8 : end - 2]))
+            if packet is not None:
+                packets.append(packet)
+            else:
+                self.stuffing_errors += 1
+                self.dropped_bytes += end - at
+            at = end
+        del buffer[:at]
+        return packets
+
+    def _skip(self, at: int) -> int:
+        self.dropped_bytes += 1
+        return at + 1
+
+    def _next_header(self, at: int) -> int:
+        """Index of the next header at or behind ``at``, or of where one may have begun."""
+        found = self._buffer.find(HEADER, at)
+        if found >= 0:
+            return found
+        for kept in (3, 2, 1):
+            if len(self._buffer) - at >= kept and self._buffer.endswith(HEADER[:kept]):
+                return len(self._buffer) - kept
+        return len(self._buffer)
+
+    @staticmethod
+    def _decode(servo_id: int, instruction: int, payload: bytes) -> Packet | None:
+        """Packet of a frame with a right CRC; None if its stuffing is malformed."""
+        if servo_id == BROADCAST_ID and instruction == STATUS:
+            return StatusPacket(servo_id, payload[0], payload[1:])  # fast reads are not stuffed
+        try:
+            plain = unstuff(payload)
+        except StuffingError:
+            return None
+        if instruction == STATUS:
+            return StatusPacket(servo_id, plain[0], plain[1:])
+        return InstructionPacket(servo_id, instruction, plain)

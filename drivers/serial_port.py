@@ -1,0 +1,193 @@
+# ruff: noqa: N802, D102 - the SDK chose the names; `drivers.port` describes them
+
+"""The byte port on a serial device."""
+
+from __future__ import annotations
+
+import errno
+import os
+from types import TracebackType
+
+import serial
+from serial.tools import list_ports
+
+from drivers.clock import Clock, WallClock
+from drivers.errors import PortError
+
+_LATENCY_MS = 16.0
+"""What an FTDI adapter may hold bytes back by default (its ``latency_timer``)."""
+_NOISE_LIMIT_BYTES = 1 << 16
+
+
+class SerialPort:
+    """A serial device, opened for this program alone; implements ``BytePort``.
+
+    Raises:
+        PortError: (when opened) missing, denied, busy, or a baud rate that it cannot; (later) gone.
+
+    """
+
+    def __init__(self, device: str, baud: int = 1_000_000, clock: Clock | None = None) -> None:
+        self.is_using = False
+        self._device = device
+        self._baud = baud
+        self._clock: Clock = clock if clock is not None else WallClock()
+        self._timeout_at_s = 0.0
+        self._serial: serial.Serial | None = None
+        self._open()
+
+    def __enter__(self) -> SerialPort:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.closePort()
+
+    @property
+    def clock(self) -> Clock:
+        """Wall time."""
+        return self._clock
+
+    @property
+    def name(self) -> str:
+        """The device's path."""
+        return self._device
+
+    @property
+    def latency_timer_ms(self) -> int | None:
+        """How long the USB adapter's driver may hold bytes back; None where it does not say."""
+        tty = os.path.basename(os.path.realpath(self._device))
+        try:
+            with open(f"/sys/bus/usb-serial/devices/{tty}/latency_timer", encoding="ascii") as file:
+                return int(file.read())
+        except (OSError, ValueError):
+            return None  # not a USB adapter, or one without the setting: nothing to report
+
+    def write(self, data: bytes) -> None:
+        """Send all of ``data``."""
+        try:
+            self._line.write(data)
+        except (serial.SerialException, OSError) as error:
+            raise self._gone(error) from error
+
+    def read_until(self, count: int, deadline_s: float) -> bytes:
+        """Wait for ``count`` bytes, at most until ``deadline_s``."""
+        line = self._line
+        try:
+            line.timeout = max(0.0, deadline_s - self._clock.now_s())
+            return bytes(line.read(count))
+        except (serial.SerialException, OSError) as error:
+            raise self._gone(error) from error
+
+    def drain_until_quiet(self, quiet_s: float) -> int:
+        """Throw bytes away until none has come for ``quiet_s``.
+
+        Raises:
+            PortError: the line never falls quiet.
+
+        """
+        thrown = 0
+        quiet_at_s = self._clock.now_s() + quiet_s
+        while self._clock.now_s() < quiet_at_s:
+            waiting = max(1, self.getBytesAvailable())
+            got = len(self.read_until(waiting, quiet_at_s))
+            if got:
+                thrown += got
+                quiet_at_s = self._clock.now_s() + quiet_s
+            if thrown > _NOISE_LIMIT_BYTES:
+                raise PortError(
+                    f"{self._device}: the line does not fall quiet; something else talks on it, "
+                    "or the baud rate is wrong"
+                )
+        return thrown
+
+    # what the SDK calls
+
+    def openPort(self) -> bool:
+        if self._serial is None:
+            self._open()
+        return True
+
+    def closePort(self) -> None:
+        if self._serial is not None:
+            self._serial.close()
+            self._serial = None
+        self.is_using = False
+
+    def clearPort(self) -> None:
+        try:
+            self._line.reset_input_buffer()
+        except (serial.SerialException, OSError) as error:
+            raise self._gone(error) from error
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        try:
+            self._line.baudrate = baudrate
+        except (ValueError, serial.SerialException, OSError):
+            return False
+        self._baud = baudrate
+        return True
+
+    def getBaudRate(self) -> int:
+        return self._baud
+
+    def getBytesAvailable(self) -> int:
+        try:
+            return int(self._line.in_waiting)
+        except (serial.SerialException, OSError) as error:
+            raise self._gone(error) from error
+
+    def readPort(self, length: int) -> bytes:
+        """Up to ``length`` bytes; sleeps for the first one, so that the SDK does not spin."""
+        waiting = self.getBytesAvailable()
+        if waiting:
+            return self.read_until(min(length, waiting), self._clock.now_s())
+        return self.read_until(1, min(self._timeout_at_s, self._clock.now_s() + 0.01))
+
+    def writePort(self, packet: bytes | list[int]) -> int:
+        self.write(bytes(packet))
+        return len(packet)
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        wire_ms = packet_length * 10_000.0 / self._baud
+        self.setPacketTimeoutMillis(wire_ms + 2.0 * _LATENCY_MS + 2.0)
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        self._timeout_at_s = self._clock.now_s() + msec / 1000.0
+
+    def isPacketTimeout(self) -> bool:
+        return self._clock.now_s() > self._timeout_at_s
+
+    @property
+    def _line(self) -> serial.Serial:
+        if self._serial is None:
+            raise PortError(f"{self._device}: is closed")
+        return self._serial
+
+    def _open(self) -> None:
+        try:
+            self._serial = serial.Serial(self._device, self._baud, timeout=0.0, exclusive=True)
+            self._serial.reset_input_buffer()
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise PortError(self._why(error)) from error
+
+    def _gone(self, error: Exception) -> PortError:
+        self.is_using = False
+        return PortError(f"{self._device}: the port is gone: {error}")
+
+    def _why(self, error: Exception) -> str:
+        number = getattr(error, "errno", None)
+        if number == errno.ENOENT:
+            there = ", ".join(sorted(port.device for port in list_ports.comports()))
+            return f"{self._device}: no such port; there is {there or 'none: is it plugged in?'}"
+        if number in (errno.EACCES, errno.EPERM):
+            return f"{self._device}: no permission; join the group that owns it (often 'dialout')"
+        if number in (errno.EBUSY, errno.EAGAIN):
+            return f"{self._device}: another program has it open"
+        if isinstance(error, ValueError):
+            return f"{self._device}: {self._baud} bit/s is not possible here: {error}"
+        return f"{self._device}: cannot be opened: {error}"

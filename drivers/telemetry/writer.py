@@ -1,0 +1,236 @@
+"""Writes the log row by row: a kill costs at most the last second, a disk fault stops the run."""
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Literal, Self
+
+import numpy as np
+from mcap.writer import Writer
+from numpy.typing import ArrayLike
+
+from config.heightfield import HeightField
+from config.loader import digest
+from config.robot import RobotConfig
+from config.run import RunConfig
+from config.world import WorldConfig
+from drivers.telemetry.encode import encode, exact, floats, number, thinned
+from drivers.telemetry.record import PlanSummary
+from drivers.telemetry.schema import FORMAT, TOPICS, schema_json, schema_name
+from drivers.types import JointState
+
+Level = Literal["info", "warning", "error"]
+VerdictKind = Literal["pass", "clamp", "veto"]
+
+_FLUSH_S: Final = 1.0
+_CHUNK_BYTES: Final = 1 << 20
+
+
+class RunLog:
+    """One run's log; a context manager. Writes ``<path>.part``, renamed to ``path`` on leaving.
+
+    Times must not be negative. Any method raises OSError when the disk does not take the bytes.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._part = part_path(path)
+        self._file = self._part.open("wb")
+        self._writer: Any = Writer(  # half untyped
+            self._file, chunk_size=_CHUNK_BYTES, enable_data_crcs=True
+        )
+        self._writer.start(profile="", library=f"snakewalk {version('snakewalk')}")
+        self._channels: dict[str, int] = {}
+        for topic in TOPICS:
+            schema = self._writer.register_schema(
+                schema_name(topic), "jsonschema", schema_json(topic)
+            )
+            self._channels[topic] = self._writer.register_channel(topic, "json", schema)
+        self._flushed_s = 0.0
+        self._slow = b""
+
+    def __enter__(self) -> Self:
+        """Start at once."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Finish the file also when the run ends with an error: the log says how it came to it."""
+        self._writer.finish()
+        self._file.close()
+        self._part.replace(self.path)
+
+    def config(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        world: WorldConfig,
+        *,
+        backend: str,
+        plan: PlanSummary,
+        ground: HeightField | None = None,
+        torque_constant_n_m_a: float = float("nan"),
+    ) -> None:
+        """Say once, first, what runs; the ground is thinned, so that a report can draw it."""
+        row = {
+            "format": FORMAT,
+            "software": version("snakewalk"),
+            "backend": backend,
+            "config_hash": digest(run, robot, world),
+            "seed": run.seed,
+            "run": run.model_dump(mode="json"),
+            "robot": robot.model_dump(mode="json"),
+            "world": world.model_dump(mode="json"),
+            "torque_constant_n_m_a": number(torque_constant_n_m_a),
+            "plan": {
+                "path_m": floats(plan.path_m),
+                "waypoints_m": floats(plan.waypoints_m),
+                "waypoint_radius_m": number(plan.waypoint_radius_m),
+                "predicted_speed_m_s": number(plan.predicted_speed_m_s),
+                "states": dict(plan.states or {}),
+            },
+            "ground": None if ground is None else thinned(ground),
+        }
+        self._add("/config", 0.0, row)
+        self._writer.flush()
+
+    def cycle(
+        self,
+        time_s: float,
+        asked_rad: ArrayLike,
+        sent_rad: ArrayLike,
+        state: JointState,
+        *,
+        deadline_s: float,
+        lateness_s: float,
+        wire_busy_s: float = float("nan"),
+        verdict: VerdictKind = "pass",
+        reason: str = "",
+        joints: Sequence[int] = (),
+    ) -> None:
+        """One control cycle; writes ``/slow`` too when temperature, voltage or alarms changed."""
+        measured = floats(
+            np.stack([state.position_rad, state.velocity_rad_s, state.current_a, state.age_s])
+        )
+        row = {
+            "time_s": time_s,
+            "asked_rad": exact(asked_rad),
+            "sent_rad": exact(sent_rad),
+            "measured_rad": measured[0],
+            "velocity_rad_s": measured[1],
+            "current_a": measured[2],
+            "age_s": measured[3],
+            "valid": state.valid.tolist(),
+            "error": state.error.tolist(),
+            "deadline_s": deadline_s,
+            "lateness_s": number(lateness_s),
+            "wire_busy_s": number(wire_busy_s),
+            "verdict": verdict,
+            "reason": reason,
+            "joints": [int(j) for j in joints],
+        }
+        self._add("/cycle", time_s, row)
+        self._slow_row(time_s, state)
+
+    def pose(
+        self,
+        time_s: float,
+        head_m: ArrayLike,
+        rotation: ArrayLike,
+        *,
+        links_m: ArrayLike | None = None,
+        centre_m: ArrayLike,
+        speed_m_s: float = float("nan"),
+        predicted_speed_m_s: float = float("nan"),
+        pulse_m_s: float = float("nan"),
+        path_s_m: float = float("nan"),
+        target: int = 0,
+    ) -> None:
+        """Where the body is: head (3,), rotation (3, 3), links (L, 3), centre of mass (3,)."""
+        row = {
+            "time_s": time_s,
+            "head_m": floats(head_m),
+            "rotation": floats(np.ravel(rotation)),
+            "links_m": None if links_m is None else floats(links_m),
+            "centre_m": floats(centre_m),
+            "speed_m_s": number(speed_m_s),
+            "predicted_speed_m_s": number(predicted_speed_m_s),
+            "pulse_m_s": number(pulse_m_s),
+            "path_s_m": number(path_s_m),
+            "target": int(target),
+        }
+        self._add("/pose", time_s, row)
+
+    def path_laid(self, time_s: float, points_m: ArrayLike) -> None:
+        """Log a path (n, 2) or (n, 3) that replaces the plan's."""
+        self._add("/path", time_s, {"time_s": time_s, "points_m": floats(points_m)})
+
+    def walk(
+        self,
+        time_s: float,
+        *,
+        state: int,
+        visited: int,
+        heading_error_rad: float,
+        ramp_rad: float,
+        candidates: int,
+        eta_q: float = float("nan"),
+    ) -> None:
+        """One decision of the walk."""
+        row = {
+            "time_s": time_s,
+            "state": int(state),
+            "visited": int(visited),
+            "heading_error_rad": number(heading_error_rad),
+            "ramp_rad": number(ramp_rad),
+            "candidates": int(candidates),
+            "eta_q": number(eta_q),
+        }
+        self._add("/walk", time_s, row)
+
+    def event(self, time_s: float, kind: str, text: str, level: Level = "info") -> None:
+        """Log something that happened; above ``info`` it is on the disk when this returns."""
+        self._add("/event", time_s, {"time_s": time_s, "level": level, "kind": kind, "text": text})
+        if level != "info":
+            self._writer.flush()
+
+    def qpos(self, time_s: float, qpos: ArrayLike) -> None:
+        """Generalised position (nq,) of the simulation, for film and replay."""
+        self._add("/qpos", time_s, {"time_s": time_s, "qpos": floats(qpos)})
+
+    def _slow_row(self, time_s: float, state: JointState) -> None:
+        now = (
+            state.temperature_c.tobytes()
+            + state.voltage_v.tobytes()
+            + state.hardware_error.tobytes()
+        )
+        if now == self._slow:
+            return
+        self._slow = now
+        row = {
+            "time_s": time_s,
+            "temperature_c": floats(state.temperature_c),
+            "voltage_v": floats(state.voltage_v),
+            "hardware_error": state.hardware_error.tolist(),
+        }
+        self._add("/slow", time_s, row)
+
+    def _add(self, topic: str, time_s: float, row: Mapping[str, Any]) -> None:
+        stamp_ns = round(time_s * 1e9)
+        self._writer.add_message(
+            self._channels[topic], stamp_ns, encode(row).encode(), publish_time=stamp_ns
+        )
+        if time_s - self._flushed_s >= _FLUSH_S:
+            self._flushed_s = time_s
+            self._writer.flush()
+
+
+def part_path(path: Path) -> Path:
+    """Where a log is while it is being written, and stays when the run is killed."""
+    return path.with_name(path.name + ".part")
