@@ -1,0 +1,83 @@
+"""What answers on the bus: simulated servos in the same process, or metal on a serial port.
+
+Everything above the byte port is the same object for both.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import RobotConfig
+from config.run import RunConfig
+from config.world import WorldConfig
+from drivers.bus import DynamixelBus
+from drivers.chain import ServoChain
+from drivers.clock import Clock
+from drivers.serial_port import SerialPort
+from drivers.types import BodyPose
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Backend:
+    """A chain of servos, its clock, and what else can be known about it."""
+
+    name: str
+    chain: ServoChain
+    clock: Clock
+    pose: Callable[[], BodyPose] | None
+    """Measures the head link; None where nothing does."""
+    qpos: Callable[[], Floats] | None
+    """The simulator's coordinates, for the film."""
+    wire_busy_s: Callable[[], float]
+    """Time that bytes have spent on the wire so far; NaN where nobody counts."""
+
+
+def simulated(
+    run: RunConfig,
+    robot: RobotConfig,
+    world: WorldConfig,
+    *,
+    heading_rad: float,
+    compiled: bool | None = None,
+) -> Backend:
+    """Servos on a simulated line that turn a MuJoCo body, straight, with its head at the start.
+
+    Args:
+        run: start and physics step.
+        robot: the body and its servos.
+        world: the ground.
+        heading_rad: of the straight body.
+        compiled: None takes numba where it is installed.
+
+    """
+    # The simulation is an extra: a robot's small computer has none.
+    from sim.bus.bank import ServoBank  # noqa: PLC0415
+    from sim.bus.line import SimLine  # noqa: PLC0415
+    from sim.physics.plant import MujocoPlant  # noqa: PLC0415
+
+    plant = MujocoPlant(robot, world, None, run.physics_step_s, compiled=compiled)
+    plant.reset(run.start_m, heading_rad, np.zeros(robot.joint_count))
+    servo = robot.servo
+    line = SimLine(ServoBank(robot.servo_ids, servo.model, servo.baud), plant, baud=servo.baud)
+    chain = ServoChain(DynamixelBus(line, servo.model), robot, watchdog_s=run.safety.watchdog_s)
+    return Backend(
+        "sim", chain, line.clock, plant.head_pose, lambda: plant.qpos, lambda: line.busy_s
+    )
+
+
+def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
+    """Real servos on ``port``; nothing measures the pose.
+
+    Raises:
+        PortError: the port is not there, is taken, or may not be opened.
+
+    """
+    serial = SerialPort(port, robot.servo.baud)
+    chain = ServoChain(
+        DynamixelBus(serial, robot.servo.model), robot, watchdog_s=run.safety.watchdog_s
+    )
+    return Backend(port, chain, serial.clock, None, None, lambda: float("nan"))

@@ -1,0 +1,270 @@
+"""The chain of servos as a joint link: radians to raw goals, raw blocks to a ``JointState``."""
+
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import RobotConfig
+from drivers.bus import DynamixelBus
+from drivers.clock import Clock
+from drivers.cycle import CycleCounters, GroupCycle
+from drivers.errors import BusError, ChainError
+from drivers.group_answer import GroupAnswer
+from drivers.protocol.packet import ALERT
+from drivers.start_up import Inspection, check_pose, configure, goal_limits_raw, inspect
+from drivers.types import JointCommand, JointState
+from drivers.units import VOLTAGE_UNIT_V, WATCHDOG_UNIT_S, ServoUnits
+
+Floats = NDArray[np.float64]
+S = TypeVar("S", bound=np.generic)
+_FIRST_READS = 5
+"""Tries to get one complete answer at the start."""
+
+
+class ServoChain:
+    """Joints of ``robot`` on ``bus``; implements ``JointLink``.
+
+    Hand out a ``SafeLink`` around it, never itself.
+    """
+
+    def __init__(
+        self,
+        bus: DynamixelBus,
+        robot: RobotConfig,
+        *,
+        watchdog_s: float = 0.2,
+        slow_every: int = 16,
+        fast: bool = True,
+    ) -> None:
+        """Prepare; nothing is sent before ``enable``.
+
+        Args:
+            bus: servos of the robot's model.
+            robot: ids, limits, gains.
+            watchdog_s: after so long without an instruction the servos stop by themselves.
+            slow_every: cycles from one reading of voltages and temperatures to the next.
+            fast: use fast sync reads where every firmware has them.
+
+        Raises:
+            ControlTableError: the model lacks a register or a unit that the cycle needs.
+
+        """
+        self.robot = robot
+        self.inspection: Inspection | None = None
+        """The servos as found by the last ``enable``."""
+        self._bus = bus
+        self._clock = bus.port.clock
+        self._units = ServoUnits.of(bus.table)
+        self._watchdog_s = watchdog_s
+        self._slow_every = slow_every
+        self._fast = fast
+        self._goal_limits = goal_limits_raw(robot, self._units)
+        self._columns = [
+            _column(bus, name)
+            for name in ("Present Current", "Present Velocity", "Present Position")
+        ]
+        self._cycle: GroupCycle = bus.cycle(robot.servo_ids, fast=fast)
+        self._slow: GroupCycle = bus.slow_cycle(robot.servo_ids, fast=fast)
+        joints = robot.joint_count
+        self._position = np.full(joints, np.nan)
+        self._velocity = np.full(joints, np.nan)
+        self._current = np.full(joints, np.nan)
+        self._temperature = np.full(joints, np.nan)
+        self._voltage = np.full(joints, np.nan)
+        self._hardware_error = np.zeros(joints, np.uint8)
+        self._error = np.zeros(joints, np.uint8)
+        self._read_at_s = np.full(joints, -np.inf)
+        self._valid = np.zeros(joints, np.bool_)
+        self._reads = 0
+        self._armed = False
+        self._spoke_at_s = -np.inf
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints J."""
+        return self.robot.joint_count
+
+    @property
+    def clock(self) -> Clock:
+        """The port's."""
+        return self._clock
+
+    @property
+    def counters(self) -> CycleCounters:
+        """What went wrong on the wire so far."""
+        return self._cycle.counters
+
+    @property
+    def fast(self) -> bool:
+        """Whether fast sync reads are in use."""
+        return self._cycle.fast
+
+    def enable(self) -> JointState:
+        """Check and set up all servos, goal = present, torque on, watchdog armed.
+
+        Raises:
+            ChainError: the servos are not the robot's, have an alarm, or stand beyond a limit.
+            BusError: a servo does not do as told; torque is off again then.
+            PortError: the port is gone.
+
+        """
+        bus, ids = self._bus, self.robot.servo_ids
+        self.inspection = inspect(bus, self.robot)
+        if self.inspection.faults:
+            raise ChainError(self.inspection.faults)
+        configure(bus, self.robot, self._units)
+        fast = self._fast and self.inspection.fast_reads
+        self._cycle = bus.cycle(ids, fast=fast)
+        self._slow = bus.slow_cycle(ids, fast=fast)
+        self._reads = 0
+        state = self._first_state()
+        check_pose(self.robot, state.position_rad)
+        try:
+            goals = self._send_goals(state.position_rad)
+            for servo_id, goal in zip(ids, goals.tolist(), strict=True):
+                self._expect(servo_id, "Goal Position", goal)
+            bus.sync_write(ids, "Torque Enable", 1)
+            for servo_id in ids:
+                self._expect(servo_id, "Torque Enable", 1)
+            ticks = min(127, max(1, round(self._watchdog_s / WATCHDOG_UNIT_S)))
+            bus.sync_write(ids, "Bus Watchdog", ticks)
+            for servo_id in ids:
+                self._expect(servo_id, "Bus Watchdog", ticks)
+            self._armed = True
+            return self.read()
+        except BaseException:
+            self.disable()
+            raise
+
+    def disable(self) -> None:
+        """Torque off, then the watchdog; every servo is asked, whatever the others do.
+
+        Raises:
+            BusError: servos that did not confirm; their watchdog stays armed and stops them.
+            PortError: the port is gone.
+
+        """
+        self._armed = False
+        bus, ids = self._bus, self.robot.servo_ids
+        bus.sync_write(ids, "Torque Enable", 0)
+        silent = []
+        for servo_id in ids:
+            try:
+                bus.write_verified(servo_id, "Torque Enable", 0)
+                bus.write(servo_id, "Bus Watchdog", 0)
+            except BusError:
+                silent.append(str(servo_id))
+        if silent:
+            raise BusError(f"servo {', '.join(silent)}: torque off is not confirmed")
+
+    def read(self) -> JointState:
+        """Read all joints once; in every ``slow_every``-th call voltages and temperatures too.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        self._take(self._cycle.read())
+        if self._reads % self._slow_every == 0:
+            self._take_slow(self._slow.read())
+        self._reads += 1
+        self._spoke_at_s = self._clock.now_s()
+        return self._state()
+
+    def write(self, command: JointCommand) -> None:
+        """Send goal positions, kept inside the joint limits.
+
+        Raises:
+            ValueError: a goal is not finite.
+            BusError: the pause since the last packet was long enough to stop the servos.
+            PortError: the port is gone.
+
+        """
+        pause_s = self._clock.now_s() - self._spoke_at_s
+        if self._armed and pause_s > self._watchdog_s:
+            raise BusError(
+                f"{pause_s:.2f} s without a packet: the bus watchdog ({self._watchdog_s:g} s) has "
+                "stopped the servos"
+            )
+        self._send_goals(command.goal_rad)
+        self._spoke_at_s = self._clock.now_s()
+
+    def _send_goals(self, goal_rad: Floats) -> NDArray[np.int32]:
+        raw = self._units.position_raw(goal_rad)
+        goals = np.clip(raw, self._goal_limits[:, 0], self._goal_limits[:, 1]).astype(np.int32)
+        self._cycle.write_goals(goals)
+        return goals
+
+    def _expect(self, servo_id: int, name: str, value: int) -> None:
+        got = self._bus.read(servo_id, name)
+        if got != value:
+            raise BusError(f"servo {servo_id}: {name} is {got} after {value} was written to all")
+
+    def _first_state(self) -> JointState:
+        for _ in range(_FIRST_READS):
+            state = self.read()
+            if state.valid.all() and np.isfinite(state.voltage_v).all():
+                return state
+            self._reads = 0  # so that the slow block is read again, too
+        silent = [str(i) for i, v in zip(self.robot.servo_ids, state.valid, strict=True) if not v]
+        raise BusError(f"servo {', '.join(silent) or 'group'}: group read fails, pings do not")
+
+    def _take(self, answer: GroupAnswer) -> None:
+        ok = answer.valid
+        current, velocity, position = (_values(answer.data, at, kind) for at, kind in self._columns)
+        self._current[ok] = self._units.current_a(current[ok])
+        self._velocity[ok] = self._units.velocity_rad_s(velocity[ok])
+        self._position[ok] = self._units.position_rad(position[ok])
+        self._error[answer.answered] = answer.error[answer.answered]
+        self._read_at_s[ok] = self._clock.now_s()
+        self._valid = ok
+        alert = (answer.error & ALERT) != 0
+        self._hardware_error[answer.answered & ~alert] = 0
+        for joint in np.flatnonzero(alert & (self._hardware_error == 0)):
+            self._read_alarm(int(joint))
+
+    def _read_alarm(self, joint: int) -> None:
+        servo_id = self.robot.servo_ids[joint]
+        try:
+            self._hardware_error[joint] = self._bus.read(servo_id, "Hardware Error Status")
+        except BusError:
+            return  # the error byte carries the alert already; asked again in the next cycle
+
+    def _take_slow(self, answer: GroupAnswer) -> None:
+        ok = answer.valid
+        self._voltage[ok] = _values(answer.data, 0, "<u2")[ok] * VOLTAGE_UNIT_V
+        self._temperature[ok] = answer.data[ok, 2]
+
+    def _state(self) -> JointState:
+        now_s = self._clock.now_s()
+        return JointState(
+            time_s=now_s,
+            position_rad=_frozen(self._position),
+            velocity_rad_s=_frozen(self._velocity),
+            current_a=_frozen(self._current),
+            temperature_c=_frozen(self._temperature),
+            voltage_v=_frozen(self._voltage),
+            hardware_error=_frozen(self._hardware_error),
+            error=_frozen(self._error),
+            age_s=_frozen(now_s - self._read_at_s),
+            valid=_frozen(self._valid),
+        )
+
+
+def _column(bus: DynamixelBus, name: str) -> tuple[int, str]:
+    """Place of a signed register in the state block, and its type."""
+    register = bus.table[name]
+    return register.address - bus.table["Present Current"].address, f"<i{register.size}"
+
+
+def _values(data: NDArray[np.uint8], at: int, kind: str) -> NDArray[np.signedinteger]:
+    size = int(kind[-1])
+    column: NDArray[np.signedinteger] = np.ascontiguousarray(data[:, at : at + size]).view(kind)
+    return column[:, 0]
+
+
+def _frozen(array: NDArray[S]) -> NDArray[S]:
+    copy = array.copy()
+    copy.setflags(write=False)
+    return copy

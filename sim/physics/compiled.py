@@ -1,0 +1,304 @@
+"""The steps of a plant without Python between them: drive, friction and ``mj_step``, compiled.
+
+Friction uses the contacts of the step before (place, normal and force) and the velocities of now.
+Drive and friction enter as generalised forces, friction by one pass down and one up the chain.
+"""
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import carray, njit, types
+from numba.core.cgutils import voidptr_t
+from numba.extending import intrinsic, register_jitable
+from numpy.typing import NDArray
+
+from sim.physics.drive import shaft_torque
+from sim.physics.friction import ellipse_force
+from sim.physics.layout import StepLayout
+from sim.physics.mechanics import LEAST_DEPTH_M, Mechanics
+from sim.plant import ServoDrive
+
+Floats = NDArray[np.float64]
+
+register_jitable(ellipse_force)
+register_jitable(shaft_torque)
+
+
+def _pointer(typing: Any, address: Any) -> Any:
+    """Turn an integer into a pointer."""
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], voidptr_t)
+
+    return types.voidptr(types.int64), build
+
+
+def _call(typing: Any, function: Any, model: Any, data: Any) -> Any:
+    """Call ``void function(void*, void*)`` by its address: the caller stays cacheable."""
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.FunctionType(ir.VoidType(), [voidptr_t, voidptr_t])
+        function = builder.inttoptr(args[0], kind.as_pointer())
+        builder.call(function, [builder.inttoptr(each, voidptr_t) for each in args[1:]])
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64, types.int64), build
+
+
+pointer = intrinsic(_pointer)
+call = intrinsic(_call)
+
+
+def _link_velocities(v: Floats, w: Floats, qvel: Floats, chain: tuple[Floats, ...]) -> None:
+    """Velocity of each link's centre and its spin in the world, head to tail."""
+    centre, rotation, anchor, axis = chain
+    for k in range(3):
+        v[0, k] = qvel[k]
+        w[0, k] = 0.0
+        for i in range(3):
+            w[0, k] += rotation[1, 3 * k + i] * qvel[3 + i]
+    for i in range(1, len(v)):
+        a0 = anchor[i, 0] - centre[i, 0]
+        a1 = anchor[i, 1] - centre[i, 1]
+        a2 = anchor[i, 2] - centre[i, 2]
+        b0 = centre[i + 1, 0] - anchor[i, 0]
+        b1 = centre[i + 1, 1] - anchor[i, 1]
+        b2 = centre[i + 1, 2] - anchor[i, 2]
+        for k in range(3):
+            w[i, k] = w[i - 1, k] + axis[i, k] * qvel[5 + i]
+        p, s = w[i - 1], w[i]
+        v[i, 0] = v[i - 1, 0] + p[1] * a2 - p[2] * a1 + s[1] * b2 - s[2] * b1
+        v[i, 1] = v[i - 1, 1] + p[2] * a0 - p[0] * a2 + s[2] * b0 - s[0] * b2
+        v[i, 2] = v[i - 1, 2] + p[0] * a1 - p[1] * a0 + s[0] * b1 - s[1] * b0
+
+
+def _collect(wrench: Floats, qfrc: Floats, chain: tuple[Floats, ...]) -> None:
+    """Add the links' wrenches (force, torque about the world's origin) to ``qfrc``, tail first."""
+    centre, rotation, anchor, axis = chain
+    for i in range(len(wrench) - 1, 0, -1):
+        f, t, a, e = wrench[i, :3], wrench[i, 3:], anchor[i], axis[i]
+        qfrc[5 + i] += (
+            e[0] * (t[0] - a[1] * f[2] + a[2] * f[1])
+            + e[1] * (t[1] - a[2] * f[0] + a[0] * f[2])
+            + e[2] * (t[2] - a[0] * f[1] + a[1] * f[0])
+        )
+        for k in range(6):
+            wrench[i - 1, k] += wrench[i, k]
+    f, t, a = wrench[0, :3], wrench[0, 3:], centre[1]
+    m0 = t[0] - a[1] * f[2] + a[2] * f[1]
+    m1 = t[1] - a[2] * f[0] + a[0] * f[2]
+    m2 = t[2] - a[0] * f[1] + a[1] * f[0]
+    for k in range(3):
+        qfrc[k] += f[k]
+        qfrc[3 + k] += rotation[1, k] * m0 + rotation[1, 3 + k] * m1 + rotation[1, 6 + k] * m2
+
+
+def _add_friction(
+    contacts: tuple[Any, ...],
+    qfrc: Floats,
+    qvel: Floats,
+    chain: tuple[Floats, ...],
+    work: tuple[Floats, ...],
+    geom_body: NDArray[np.int32],
+    law: tuple[float, ...],
+    load: Floats,
+    totals: Floats,
+) -> None:
+    """Ellipse at every contact of now under the load of the last step, collected into ``qfrc``."""
+    reals, integers, count, at = contacts
+    size, at_dist, at_place, at_up, at_geom, _ = at
+    v, w, wrench, depth = work
+    mu_along, mu_across, still, step_s = law
+    centre, rotation = chain[0], chain[1]
+    depth[:] = 0.0
+    for c in range(count):
+        i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
+        depth[i] += max(-reals[size * c + at_dist], LEAST_DEPTH_M)
+    _link_velocities(v, w, qvel, chain)
+    wrench[:] = 0.0
+    for c in range(count):
+        i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
+        share = max(-reals[size * c + at_dist], LEAST_DEPTH_M) / depth[i]
+        p = reals[size * c + at_place : size * c + at_place + 3]
+        n = reals[size * c + at_up : size * c + at_up + 3]
+        r0, r1, r2 = p[0] - centre[i + 1, 0], p[1] - centre[i + 1, 1], p[2] - centre[i + 1, 2]
+        s0 = v[i, 0] + w[i, 1] * r2 - w[i, 2] * r1
+        s1 = v[i, 1] + w[i, 2] * r0 - w[i, 0] * r2
+        s2 = v[i, 2] + w[i, 0] * r1 - w[i, 1] * r0
+        e0, e1, e2 = rotation[i + 1, 0], rotation[i + 1, 3], rotation[i + 1, 6]
+        lift = e0 * n[0] + e1 * n[1] + e2 * n[2]
+        e0, e1, e2 = e0 - lift * n[0], e1 - lift * n[1], e2 - lift * n[2]
+        norm = max(np.sqrt(e0 * e0 + e1 * e1 + e2 * e2), 1e-9)
+        e0, e1, e2 = e0 / norm, e1 / norm, e2 / norm
+        g0, g1, g2 = n[1] * e2 - n[2] * e1, n[2] * e0 - n[0] * e2, n[0] * e1 - n[1] * e0
+        v_along = s0 * e0 + s1 * e1 + s2 * e2
+        v_across = s0 * g0 + s1 * g1 + s2 * g2
+        f_along, f_across = ellipse_force(
+            share * load[i], v_along, v_across, mu_along, mu_across, still, load[i]
+        )
+        totals[0] -= (f_along * v_along + f_across * v_across) * step_s
+        totals[1] += abs(v_across) * share * step_s / len(v)
+        f0 = f_along * e0 + f_across * g0
+        f1 = f_along * e1 + f_across * g1
+        f2 = f_along * e2 + f_across * g2
+        wrench[i, 0] += f0
+        wrench[i, 1] += f1
+        wrench[i, 2] += f2
+        wrench[i, 3] += p[1] * f2 - p[2] * f1
+        wrench[i, 4] += p[2] * f0 - p[0] * f2
+        wrench[i, 5] += p[0] * f1 - p[1] * f0
+    _collect(wrench, qfrc, chain)
+
+
+def _weigh(
+    load: Floats, contacts: tuple[Any, ...], force_n: Floats, geom_body: NDArray[np.int32]
+) -> None:
+    """Sum the contact forces of each link."""
+    _, integers, count, at = contacts
+    for c in range(count):
+        row = integers[2 * at[0] * c + at[5]]
+        if row >= 0:
+            load[geom_body[integers[2 * at[0] * c + at[4] + 1]] - 1] += force_n[row]
+
+
+def _steps(
+    steps: int,
+    where: NDArray[np.int64],
+    state: tuple[Floats, Floats, Floats],
+    chain: tuple[Floats, ...],
+    work: tuple[Floats, ...],
+    geom_body: NDArray[np.int32],
+    law: tuple[float, ...],
+    gear_drag: float,
+    drive: tuple[Floats, ...],
+    load: Floats,
+    totals: Floats,
+) -> None:
+    """``steps`` times: drive, friction, ``mj_step``."""
+    qpos, qvel, qfrc = state
+    on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit, current, torque, pwm = drive
+    joints = len(goal)
+    step1, step2, model, data = where[0], where[1], where[2], where[3]
+    at = (
+        where[7] // 8,
+        where[8] // 8,
+        where[9] // 8,
+        where[10] // 8,
+        where[11] // 4,
+        where[12] // 4,
+    )
+    ncon = carray(pointer(where[4]), (1,), np.int32)
+    contact_list = carray(pointer(where[5]), (1,), np.int64)
+    force_list = carray(pointer(where[6]), (1,), np.int64)
+    for _ in range(steps):
+        call(step1, model, data)
+        qfrc[:] = 0.0
+        for j in range(joints):
+            pwm[j], current[j], torque[j] = shaft_torque(
+                qpos[7 + j],
+                qvel[6 + j],
+                on[j],
+                goal[j],
+                gain[j],
+                pwm_limit[j],
+                supply[j],
+                ohm[j],
+                k_t[j],
+                k_e[j],
+                current_limit[j],
+            )
+            qfrc[6 + j] = torque[j] - gear_drag * qvel[6 + j]
+        count = ncon[0]
+        if count > 0:
+            address = pointer(contact_list[0])
+            contacts = (
+                carray(address, (count * at[0],), np.float64),
+                carray(address, (count * at[0] * 2,), np.int32),
+                count,
+                at,
+            )
+            _add_friction(contacts, qfrc, qvel, chain, work, geom_body, law, load, totals)
+        call(step2, model, data)
+        load[:] = 0.0
+        if count > 0:
+            force_n = carray(pointer(force_list[0]), (1 << 30,), np.float64)
+            _weigh(load, contacts, force_n, geom_body)
+
+
+register_jitable(_link_velocities)
+register_jitable(_collect)
+register_jitable(_add_friction)
+register_jitable(_weigh)
+run_steps = njit(cache=True)(_steps)
+
+
+class CompiledSteps:
+    """Drive, friction and ``mj_step`` in one compiled loop."""
+
+    def __init__(self, mechanics: Mechanics, layout: StepLayout) -> None:
+        m = self._m = mechanics
+        d = m.data
+        base = d._address
+        self._where = np.array(
+            [
+                layout.step1_address,
+                layout.step2_address,
+                m.model._address,
+                base,
+                base + layout.ncon,
+                base + layout.contact,
+                base + layout.efc_force,
+                layout.contact_size,
+                layout.contact_dist,
+                layout.contact_pos,
+                layout.contact_normal,
+                layout.contact_geom,
+                layout.contact_row,
+            ],
+            dtype=np.int64,
+        )
+        links = m.joint_count + 1
+        self._state = (d.qpos, d.qvel, d.qfrc_applied)
+        self._chain = (d.xipos, d.xmat, d.xanchor, d.xaxis)
+        self._work = (
+            np.zeros((links, 3)),
+            np.zeros((links, 3)),
+            np.zeros((links, 6)),
+            np.zeros(links),
+        )
+        self._law = (m.mu_along, m.mu_across, m.still_n_s_m, m.step_s)
+
+    def run(self, steps: int, drive: ServoDrive) -> None:
+        """Advance ``steps`` steps."""
+        m = self._m
+        run_steps(
+            steps,
+            self._where,
+            self._state,
+            self._chain,
+            self._work,
+            m.model.geom_bodyid,
+            self._law,
+            m.gear_drag_n_m_s,
+            _arrays(drive),
+            m.load_n,
+            m.totals,
+        )
+
+
+def _arrays(drive: ServoDrive) -> tuple[Floats, ...]:
+    return (
+        drive.torque_on,
+        drive.goal_rad,
+        drive.p_gain_per_rad,
+        drive.pwm_limit,
+        drive.supply_v,
+        drive.resistance_ohm,
+        drive.torque_constant_n_m_a,
+        drive.back_emf_v_s,
+        drive.current_limit_a,
+        drive.current_a,
+        drive.torque_n_m,
+        drive.pwm,
+    )

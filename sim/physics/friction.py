@@ -1,0 +1,67 @@
+"""Coulomb's ellipse: little friction along a link, much across it.
+
+Maximum dissipation on the ellipse with half axes ``mu_along N`` and ``mu_across N``: for a sliding
+velocity (v_a, v_c) the force is ``-N (mu_a^2 v_a, mu_c^2 v_c) / s`` with the *gauge*
+``s = hypot(mu_a v_a, mu_c v_c)``. Near rest each component is held to a share of what would stop
+the link within the step, so a link comes to rest without chatter at any step.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+STOP_SHARE = 0.6
+"""Share of the link's momentum that friction may take in one step. A straight body can also roll,
+which makes a contact three times lighter than its link (solid cylinder: 1 + m r^2 / (m r^2 / 2));
+the explicit step is stable while 3 * share < 2."""
+
+
+def ellipse_force(
+    normal_n: float,
+    along_m_s: float,
+    across_m_s: float,
+    mu_along: float,
+    mu_across: float,
+    still_n_s_m: float,
+    link_normal_n: float,
+) -> tuple[float, float]:
+    """Force along and across a link at one contact, N.
+
+    ``still_n_s_m`` is ``STOP_SHARE * mass / step``, the drag that stops a link;
+    ``link_normal_n`` the sum of the normal forces of the link's contacts, which share it.
+    """
+    gauge = math.hypot(mu_along * along_m_s, mu_across * across_m_s)
+    floor = link_normal_n / still_n_s_m
+    slow_along = max(gauge, mu_along * mu_along * floor)
+    slow_across = max(gauge, mu_across * mu_across * floor)
+    if normal_n <= 0.0 or slow_along <= 0.0 or slow_across <= 0.0:
+        return 0.0, 0.0
+    return (
+        -normal_n * mu_along * mu_along * along_m_s / slow_along,
+        -normal_n * mu_across * mu_across * across_m_s / slow_across,
+    )
+
+
+def ellipse_forces(
+    normal_n: Floats,
+    along_m_s: Floats,
+    across_m_s: Floats,
+    mu_along: float,
+    mu_across: float,
+    still_n_s_m: float,
+    link_normal_n: Floats,
+) -> tuple[Floats, Floats]:
+    """``ellipse_force`` of C contacts at once; all arrays (C,)."""
+    gauge = np.hypot(mu_along * along_m_s, mu_across * across_m_s)
+    floor = link_normal_n / still_n_s_m
+    slow_along = np.maximum(gauge, mu_along**2 * floor)
+    slow_across = np.maximum(gauge, mu_across**2 * floor)
+    slow_along[slow_along <= 0.0] = np.inf
+    slow_across[slow_across <= 0.0] = np.inf
+    return (
+        -normal_n * mu_along**2 * along_m_s / slow_along,
+        -normal_n * mu_across**2 * across_m_s / slow_across,
+    )

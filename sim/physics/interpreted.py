@@ -1,0 +1,77 @@
+"""The steps of a plant in numpy: where numba is absent, and to check the compiled ones against."""
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.physics.drive import drive_shafts
+from sim.physics.friction import ellipse_forces
+from sim.physics.mechanics import LEAST_DEPTH_M, Mechanics
+from sim.plant import ServoDrive
+
+Floats = NDArray[np.float64]
+
+
+class InterpretedSteps:
+    """Drive, friction and MuJoCo's step, one Python pass a step."""
+
+    def __init__(self, mechanics: Mechanics) -> None:
+        self._m = mechanics
+
+    def run(self, steps: int, drive: ServoDrive) -> None:
+        """Advance ``steps`` steps."""
+        m = self._m
+        for _ in range(steps):
+            mujoco.mj_step1(m.model, m.data)
+            force = friction_forces(m)
+            rate = m.data.qvel[6:]
+            force[6:] += drive_shafts(drive, m.data.qpos[7:], rate) - m.gear_drag_n_m_s * rate
+            m.data.qfrc_applied[:] = force
+            mujoco.mj_step2(m.model, m.data)
+            m.weigh()
+
+
+def friction_forces(m: Mechanics) -> Floats:
+    """Generalised forces (6 + J,) of ground friction; adds to ``m.totals``."""
+    d = m.data
+    out = np.zeros(m.model.nv)
+    contacts = d.contact
+    link = m.model.geom_bodyid[contacts.geom[:, 1]] - 1
+    depth = np.maximum(-contacts.dist, LEAST_DEPTH_M)
+    load = m.load_n[link]
+    share = depth / np.bincount(link, depth, len(m.load_n))[link]
+    normal_n = load * share
+    place, up = contacts.pos, contacts.frame[:, :3]
+    velocity, spin = link_velocities(m)
+    centre = d.xipos[1:]
+    arm = place - centre[link]
+    sliding = velocity[link] + np.cross(spin[link], arm)
+    forward = d.xmat[1:].reshape(-1, 3, 3)[link, :, 0]
+    along = forward - up * (up * forward).sum(axis=1, keepdims=True)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    across = np.cross(up, along)
+    v_along, v_across = (sliding * along).sum(axis=1), (sliding * across).sum(axis=1)
+    f_along, f_across = ellipse_forces(
+        normal_n, v_along, v_across, m.mu_along, m.mu_across, m.still_n_s_m, load
+    )
+    m.totals[0] -= float(f_along @ v_along + f_across @ v_across) * m.step_s
+    m.totals[1] += float((np.abs(v_across) * share).sum()) * m.step_s / len(centre)
+    force = f_along[:, None] * along + f_across[:, None] * across
+    wrench = np.zeros((len(centre), 6))
+    np.add.at(wrench, link, np.hstack([force, np.cross(place, force)]))
+    behind = wrench[::-1].cumsum(axis=0)[::-1]
+    f, t = behind[1:, :3], behind[1:, 3:]
+    out[6:] = (d.xaxis[1:] * (t - np.cross(d.xanchor[1:], f))).sum(axis=1)
+    out[:3] = behind[0, :3]
+    out[3:6] = (behind[0, 3:] - np.cross(centre[0], behind[0, :3])) @ d.xmat[1].reshape(3, 3)
+    return out
+
+
+def link_velocities(m: Mechanics) -> tuple[Floats, Floats]:
+    """Velocity of the links' centres and their spins, world frame, (L, 3) each."""
+    d = m.data
+    centre, anchor = d.xipos[1:], d.xanchor[1:]
+    head_spin = d.xmat[1].reshape(3, 3) @ d.qvel[3:6]
+    spin = np.vstack([head_spin, d.xaxis[1:] * d.qvel[6:, None]]).cumsum(axis=0)
+    rise = np.cross(spin[:-1], anchor - centre[:-1]) + np.cross(spin[1:], centre[1:] - anchor)
+    return np.vstack([d.qvel[:3], rise]).cumsum(axis=0), spin

@@ -1,0 +1,67 @@
+"""What both steppers share: the model, live views of its state, and the constants of friction."""
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import RobotConfig
+from config.world import WorldConfig
+from sim.physics.friction import STOP_SHARE
+
+Floats = NDArray[np.float64]
+
+LEAST_DEPTH_M = 1e-9
+"""Contacts of one link share its load by depth; this is the depth of one that just touches."""
+
+
+@dataclass(slots=True)
+class Mechanics:
+    """One robot's model and data; link i is body ``1 + i``, joint j has position ``7 + j``."""
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    mu_along: float
+    mu_across: float
+    still_n_s_m: float
+    """Drag that takes ``STOP_SHARE`` of a link's momentum in one step."""
+    gear_drag_n_m_s: float
+    """Viscous loss of a gearbox, powered or not."""
+    load_n: Floats
+    """(L,) what the ground bore of each link in the last step, N."""
+    totals: Floats = field(default_factory=lambda: np.zeros(2))
+    """Energy lost to ground friction, J; way slipped across the links, mean of all links, m."""
+
+    @classmethod
+    def of(
+        cls,
+        model: mujoco.MjModel,
+        robot: RobotConfig,
+        world: WorldConfig,
+        gear_drag_n_m_s: float,
+    ) -> "Mechanics":
+        """Gather what the steps need."""
+        still = STOP_SHARE * robot.link_mass_kg / float(model.opt.timestep)
+        mu = world.friction
+        load = np.zeros(robot.joint_count + 1)
+        data = mujoco.MjData(model)
+        return cls(model, data, mu.along, mu.across, still, gear_drag_n_m_s, load)
+
+    @property
+    def joint_count(self) -> int:
+        """J."""
+        return int(self.model.nv) - 6
+
+    @property
+    def step_s(self) -> float:
+        """Length of a step."""
+        return float(self.model.opt.timestep)
+
+    def weigh(self) -> None:
+        """Read ``load_n`` off the contact forces in the data."""
+        d = self.data
+        row = np.asarray(d.contact.efc_address)
+        bears = row >= 0
+        link = self.model.geom_bodyid[d.contact.geom[bears, 1]] - 1
+        self.load_n[:] = np.bincount(link, d.efc_force[row[bears]], len(self.load_n))

@@ -1,0 +1,215 @@
+"""The plant of ``sim.plant`` in MuJoCo: stepped, placed, and looked at."""
+
+from importlib.util import find_spec
+from typing import Protocol
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from config.heightfield import HeightField
+from config.robot import RobotConfig
+from config.world import WorldConfig
+from drivers.types import BodyPose
+from sim.physics.interpreted import InterpretedSteps
+from sim.physics.layout import step_layout
+from sim.physics.mechanics import Mechanics
+from sim.physics.model import ARMATURE_KG_M2, build_model
+from sim.physics.placing import place
+from sim.plant import ServoDrive
+
+Floats = NDArray[np.float64]
+
+GEAR_DRAG_N_M_S = 0.03
+"""Assumed, for lack of a published figure: 4 % of what the back-EMF of an XM430-W350 brakes."""
+
+
+class Steps(Protocol):
+    """Drive, friction and ``mj_step``, a number of times."""
+
+    def run(self, steps: int, drive: ServoDrive) -> None:
+        """Advance ``steps`` steps."""
+        ...
+
+
+class PhysicsError(RuntimeError):
+    """The physics has lost its state (it diverged), and nothing after it would mean anything."""
+
+
+class MujocoPlant:
+    """A chain on its ground; starts straight at the origin, heading along x, at rest.
+
+    ``compiled`` None takes numba where it is installed; False insists on numpy.
+
+    Raises:
+        RuntimeError: ``compiled`` True, and numba is missing or does not know this MuJoCo.
+
+    """
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        world: WorldConfig,
+        ground: HeightField | None = None,
+        step_s: float = 0.002,
+        *,
+        compiled: bool | None = None,
+        armature_kg_m2: float = ARMATURE_KG_M2,
+        gear_drag_n_m_s: float = GEAR_DRAG_N_M_S,
+        gravity_m_s2: float = 9.81,
+    ) -> None:
+        self.robot = robot
+        self.ground = ground
+        self.step_s = step_s
+        model = build_model(
+            robot,
+            world,
+            ground,
+            step_s,
+            armature_kg_m2=armature_kg_m2,
+            gravity_m_s2=gravity_m_s2,
+        )
+        self.mechanics = Mechanics.of(model, robot, world, gear_drag_n_m_s)
+        self._data = self.mechanics.data
+        self._count = 0
+        self.reset((0.0, 0.0), 0.0, np.zeros(robot.joint_count))
+        self._steps = _steps(self.mechanics, compiled)
+
+    @property
+    def compiled(self) -> bool:
+        """Whether the steps run without Python between them."""
+        return not isinstance(self._steps, InterpretedSteps)
+
+    @property
+    def time_s(self) -> float:
+        """Whole steps since the last reset, in seconds."""
+        return self._count * self.step_s
+
+    @property
+    def position_rad(self) -> Floats:
+        """(J,) live view of the shaft angles."""
+        view: Floats = self._data.qpos[7:]
+        return view
+
+    @property
+    def velocity_rad_s(self) -> Floats:
+        """(J,) live view, rad/s."""
+        view: Floats = self._data.qvel[6:]
+        return view
+
+    def advance(self, until_s: float, drive: ServoDrive) -> None:
+        """Step to the last whole step at or before ``until_s``.
+
+        Raises:
+            PhysicsError: the state has diverged.
+
+        """
+        steps = int(np.floor(until_s / self.step_s + 1e-6)) - self._count
+        if steps <= 0:
+            return
+        self._steps.run(steps, drive)
+        self._count += steps
+        if abs(self._data.time - self.time_s) > 0.5 * self.step_s:  # MuJoCo resets what diverges
+            raise PhysicsError(
+                f"the physics diverged before {self.time_s:.3f} s; "
+                f"a step of {self.step_s * 1e3:g} ms may be too long for this robot"
+            )
+
+    def reset(self, start_m: tuple[float, float], heading_rad: float, joint_rad: ArrayLike) -> None:
+        """Put the body on the ground, at rest, at time 0.
+
+        Yaw joints take ``joint_rad`` (J,); pitch joints start from it and drape over the ground, as
+        those of a robot laid down without power do (on a plane they keep it).
+
+        Raises:
+            ValueError: ``joint_rad`` is not (J,).
+
+        """
+        place(self.mechanics, self.robot, self.ground, start_m, heading_rad, joint_rad)
+        self._count = 0
+        self._data.time = 0.0
+        self.mechanics.totals[:] = 0.0
+
+    def head_pose(self) -> BodyPose:
+        """Head link's centre and axes."""
+        matrix = np.empty(9)
+        mujoco.mju_quat2Mat(matrix, self._data.qpos[3:7])
+        return BodyPose(self.time_s, self._data.qpos[:3].copy(), matrix.reshape(3, 3))
+
+    @property
+    def link_positions_m(self) -> Floats:
+        """(L, 3) centres of the links."""
+        self._look()
+        copy: Floats = self._data.xipos[1:].copy()
+        return copy
+
+    @property
+    def link_rotations(self) -> Floats:
+        """(L, 3, 3) columns: each link's forward, left and up axes in the world."""
+        self._look()
+        copy: Floats = self._data.xmat[1:].reshape(-1, 3, 3).copy()
+        return copy
+
+    @property
+    def contact_count(self) -> int:
+        """Links that bear load, of L."""
+        d = self._data
+        row = np.asarray(d.contact.efc_address)
+        bears = row >= 0
+        bears[bears] = d.efc_force[row[bears]] > 0.0
+        bodies = self.mechanics.model.geom_bodyid[d.contact.geom[bears, 1]]
+        return len(np.unique(bodies))
+
+    @property
+    def energy_j(self) -> tuple[float, float]:
+        """Potential (zero at z = 0) and kinetic energy, rotors included."""
+        m, d = self.mechanics.model, self._data
+        self._look()
+        mujoco.mj_energyPos(m, d)
+        mujoco.mj_energyVel(m, d)
+        return float(d.energy[0]), float(d.energy[1])
+
+    @property
+    def momentum(self) -> tuple[Floats, Floats]:
+        """Linear, N s, and angular about the centre of mass, N m s; (3,) each."""
+        m, d = self.mechanics.model, self._data
+        self._look()
+        mujoco.mj_comVel(m, d)
+        mujoco.mj_subtreeVel(m, d)
+        return m.body_subtreemass[1] * d.subtree_linvel[1], d.subtree_angmom[1].copy()
+
+    @property
+    def friction_loss_j(self) -> float:
+        """Energy that ground friction has taken since the reset."""
+        return float(self.mechanics.totals[0])
+
+    @property
+    def slip_m(self) -> float:
+        """Way slipped across the links since the reset, mean over all links."""
+        return float(self.mechanics.totals[1])
+
+    @property
+    def qpos(self) -> Floats:
+        """(7 + J,) MuJoCo's coordinates now, a copy: what a film is made of."""
+        copy: Floats = self._data.qpos.copy()
+        return copy
+
+    def _look(self) -> None:
+        """Bring positions and axes up to the state: a step leaves those it started from."""
+        m, d = self.mechanics.model, self._data
+        mujoco.mj_kinematics(m, d)
+        mujoco.mj_comPos(m, d)
+        mujoco.mj_crb(m, d)
+
+
+def _steps(mechanics: Mechanics, compiled: bool | None) -> Steps:
+    if compiled is False:
+        return InterpretedSteps(mechanics)
+    layout = step_layout() if find_spec("numba") else None
+    if layout is not None:
+        from sim.physics.compiled import CompiledSteps  # noqa: PLC0415  numba is optional and slow
+
+        return CompiledSteps(mechanics, layout)
+    if compiled:
+        raise RuntimeError("compiled steps need numba, and a MuJoCo whose layout it can verify")
+    return InterpretedSteps(mechanics)
