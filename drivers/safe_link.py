@@ -1,0 +1,182 @@
+"""The only joint link that is handed out: every command vetted, torque off whatever happens."""
+
+import signal
+import threading
+from types import FrameType, TracebackType
+
+from drivers.clock import Clock
+from drivers.errors import DriverError, SafetyTrippedError
+from drivers.link import JointLink
+from drivers.safety import (
+    SafetyLimits,
+    SafetyMemory,
+    Verdict,
+    over_current_since_s,
+    state_fault,
+    vet,
+)
+from drivers.types import JointCommand, JointState
+
+_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+
+
+class SafeLink:
+    """A ``JointLink`` around another; use as a context manager, which switches torque off at exit.
+
+    On a veto, on an error of the link below, or on ``request_stop`` it latches: torque goes off,
+    ``tripped`` says why, ``write`` raises; ``read`` goes on, for the log. Only ``reset`` by an
+    operator and a new ``enable`` let it move again. Inside the context SIGTERM, SIGINT and SIGHUP
+    unwind the program through the exit; if it is killed, the servos' bus watchdog stops them.
+    """
+
+    def __init__(self, link: JointLink, limits: SafetyLimits, clock: Clock) -> None:
+        self.tripped: str | None = None
+        """Why it has latched; None while it lets commands pass."""
+        self.last_verdict: Verdict | None = None
+        """Of the last command."""
+        self._link = link
+        self._limits = limits
+        self._clock = clock
+        self._state: JointState | None = None
+        self._memory: SafetyMemory | None = None
+        self._stop_requested: str | None = None
+        self._touched = False
+        self._handlers: dict[signal.Signals, object] = {}
+
+    def __enter__(self) -> "SafeLink":
+        if threading.current_thread() is threading.main_thread():
+            for number in _SIGNALS:
+                self._handlers[number] = signal.signal(number, _unwind)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for number in self._handlers:
+            signal.signal(number, signal.SIG_IGN)  # nothing may interrupt switching torque off
+        try:
+            if self._touched:
+                self.disable()
+        except DriverError as fault:
+            if error is None:
+                raise
+            error.add_note(f"torque off failed: {fault}")
+        finally:
+            for number, handler in self._handlers.items():
+                signal.signal(number, handler)  # type: ignore[arg-type]
+            self._handlers.clear()
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints J."""
+        return self._link.joint_count
+
+    def enable(self) -> JointState:
+        """Check and set up the servos, torque on.
+
+        Raises:
+            SafetyTrippedError: latched, or the state found is a reason to latch.
+            DriverError: what the link below raises.
+
+        """
+        self._refuse_if_tripped()
+        self._touched = True
+        state = self._link.enable()
+        self._state, self._memory = state, SafetyMemory.at_rest(state)
+        self._judge(state, self._memory)
+        self._refuse_if_tripped()
+        return state
+
+    def disable(self) -> None:
+        """Torque off; safe to call at any time, more than once."""
+        self._memory = None
+        self._link.disable()
+
+    def read(self) -> JointState:
+        """Read all joints; latches if the state is a reason to, and returns it all the same.
+
+        Raises:
+            SafetyTrippedError: the link below failed just now.
+
+        """
+        try:
+            state = self._link.read()
+        except DriverError as fault:
+            self._trip(str(fault))
+            raise SafetyTrippedError(str(self.tripped)) from fault
+        self._state = state
+        if self._memory is not None:
+            self._judge(state, self._memory)
+        return state
+
+    def write(self, command: JointCommand) -> None:
+        """Vet a command against the last state read and send what may pass.
+
+        Raises:
+            SafetyTrippedError: latched, before or by this command.
+
+        """
+        self._refuse_if_tripped()
+        if self._memory is None or self._state is None:
+            raise SafetyTrippedError("torque is off: enable first")
+        if self._stop_requested is not None:
+            self._trip(self._stop_requested)
+            self._refuse_if_tripped()
+        verdict = vet(command, self._state, self._memory, self._limits, self._clock.now_s())
+        self.last_verdict, self._memory = verdict, verdict.memory
+        if verdict.veto is not None:
+            self._trip(verdict.veto)
+            self._refuse_if_tripped()
+        try:
+            self._link.write(JointCommand(command.time_s, verdict.goal_rad))
+        except DriverError as fault:
+            self._trip(str(fault))
+            raise SafetyTrippedError(str(self.tripped)) from fault
+
+    def request_stop(self, reason: str) -> None:
+        """Latch at the next read or write; may be called from another thread (a stop button)."""
+        self._stop_requested = reason
+
+    def reset(self, operator: str) -> None:
+        """Unlatch, by a person who has looked at the robot; torque stays off until ``enable``.
+
+        Raises:
+            ValueError: nobody put a name to it.
+
+        """
+        if not operator.strip():
+            raise ValueError("a reset needs the name of the operator")
+        self.tripped = None
+        self._stop_requested = None
+
+    def _judge(self, state: JointState, memory: SafetyMemory) -> None:
+        since_s = over_current_since_s(state, memory, self._limits)
+        self._memory = SafetyMemory(memory.time_s, memory.goal_rad, since_s)
+        fault = self._stop_requested or state_fault(
+            state, since_s, self._limits, self._clock.now_s()
+        )
+        if fault is not None:
+            self._trip(fault)
+
+    def _trip(self, reason: str) -> None:
+        """Latch; the first reason stays."""
+        if self.tripped is None:
+            self.tripped = reason
+        try:
+            self.disable()
+        except DriverError as fault:
+            self.tripped += f" (torque off failed: {fault})"
+
+    def _refuse_if_tripped(self) -> None:
+        if self.tripped is not None:
+            raise SafetyTrippedError(self.tripped)
+
+
+def _unwind(number: int, frame: FrameType | None) -> None:
+    """Turn a signal into an exception, so that every ``with`` on the way is left properly."""
+    if number == signal.SIGINT:
+        raise KeyboardInterrupt
+    raise SystemExit(128 + number)

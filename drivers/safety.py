@@ -1,0 +1,175 @@
+"""What may pass to the servos: a pure function, below every source of motion.
+
+Small excesses are clamped: joint limits, rate, and lead (goal minus measured, which is what makes
+torque). What no healthy run shows is vetoed: numbers that are none, a joint forced beyond its
+limit, an alarm, lasting over-current, heat, supply voltage, a state that is too old.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import RobotConfig
+from config.run import SafetyConfig
+from drivers.protocol.packet import ALERT
+from drivers.start_up import alarm_names
+from drivers.types import Bools, Floats, JointCommand, JointState
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyLimits:
+    """Limits of one robot; a value at its limit is inside."""
+
+    limit_rad: Floats
+    """(J,) half range of the goals."""
+    limit_slack_rad: float
+    """How far beyond it a joint may be *measured*: bent by force, or by overshoot."""
+    goal_rate_rad_s: float
+    goal_lead_rad: float
+    """Goal minus measured."""
+    current_limit_a: float
+    current_time_s: float
+    """How long the current may be exceeded."""
+    temperature_limit_c: float
+    voltage_min_v: float
+    voltage_max_v: float
+    stale_limit_s: float
+
+    @staticmethod
+    def from_config(robot: RobotConfig, safety: SafetyConfig) -> "SafetyLimits":
+        """Limits as the run's files say."""
+        return SafetyLimits(
+            limit_rad=np.array(robot.limit_rad),
+            limit_slack_rad=0.2,
+            goal_rate_rad_s=safety.goal_rate_rad_s,
+            goal_lead_rad=safety.goal_lead_rad,
+            current_limit_a=safety.current_limit_a,
+            current_time_s=safety.current_time_s,
+            temperature_limit_c=safety.temperature_limit_c,
+            voltage_min_v=safety.voltage_min_v,
+            voltage_max_v=safety.voltage_max_v,
+            stale_limit_s=safety.stale_limit_s,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyMemory:
+    """What the next judgement needs of the last one."""
+
+    time_s: float
+    """When ``goal_rad`` was sent."""
+    goal_rad: Floats
+    """(J,) last goals that passed; at the start the measured angles."""
+    over_current_since_s: Floats
+    """(J,) time of the first reading above the limit; NaN below it."""
+
+    @staticmethod
+    def at_rest(state: JointState) -> "SafetyMemory":
+        """Memory of joints that hold the pose in ``state``."""
+        held = np.array(state.position_rad, float)
+        return SafetyMemory(state.time_s, held, np.full(len(held), np.nan))
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What becomes of one command."""
+
+    goal_rad: Floats
+    """(J,) goals that may be sent; the last ones again where there is a veto."""
+    veto: str | None
+    """Why nothing may pass any more, one line; None: pass."""
+    clamped: Bools
+    """(J,) goals that were changed."""
+    memory: SafetyMemory
+    """``last`` of the next call."""
+
+
+def vet(
+    command: JointCommand,
+    state: JointState,
+    last: SafetyMemory,
+    limits: SafetyLimits,
+    now_s: float,
+) -> Verdict:
+    """Judge a command against the newest state.
+
+    Where clamps disagree the joint limit wins over the lead, and the lead over the rate: a smaller
+    lead is a smaller torque.
+    """
+    over_since_s = over_current_since_s(state, last, limits)
+    veto = state_fault(state, over_since_s, limits, now_s) or _command_fault(command, limits)
+    if veto is not None:
+        unchanged = np.zeros(len(last.goal_rad), np.bool_)
+        memory = SafetyMemory(last.time_s, last.goal_rad, over_since_s)
+        return Verdict(last.goal_rad, veto, unchanged, memory)
+    # After a pause the allowance does not pile up: never more than that of one stale limit
+    dt_s = min(max(now_s - last.time_s, 0.0), limits.stale_limit_s)
+    step = limits.goal_rate_rad_s * dt_s
+    goal = np.clip(command.goal_rad, -limits.limit_rad, limits.limit_rad)
+    goal = np.clip(goal, last.goal_rad - step, last.goal_rad + step)
+    lead = limits.goal_lead_rad
+    goal = np.clip(goal, state.position_rad - lead, state.position_rad + lead)
+    goal = np.clip(goal, -limits.limit_rad, limits.limit_rad)
+    goal.setflags(write=False)
+    memory = SafetyMemory(now_s, goal, over_since_s)
+    return Verdict(goal, None, goal != command.goal_rad, memory)
+
+
+def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> Floats:
+    """(J,) since when each current is above the limit; a joint not read keeps its time."""
+    since = last.over_current_since_s
+    over = np.abs(state.current_a) > limits.current_limit_a
+    started = np.where(np.isnan(since), state.time_s, since)
+    return np.where(state.valid, np.where(over, started, np.nan), since)
+
+
+def state_fault(
+    state: JointState, over_since_s: Floats, limits: SafetyLimits, now_s: float
+) -> str | None:
+    """First reason to stop that the state gives; None if all is well.
+
+    Temperature and voltage that were not read yet (NaN) are no reason.
+    """
+    age_s = state.age_s + (now_s - state.time_s)
+    over_s = state.time_s - over_since_s
+    alarm = (state.hardware_error != 0) | ((state.error & ALERT) != 0)
+    numbers = np.stack([state.position_rad, state.velocity_rad_s, state.current_a])
+    # not (a <= b) also stops at a NaN, where a > b would let it pass
+    checks: tuple[tuple[Any, NDArray[Any], str], ...] = (
+        (~(age_s <= limits.stale_limit_s), age_s, "not read for {:.3f} s"),
+        (~np.isfinite(numbers).all(axis=0), state.position_rad, "measured {}: not a number"),
+        (alarm, state.hardware_error, "alarm"),
+        (
+            ~(np.abs(state.position_rad) <= limits.limit_rad + limits.limit_slack_rad),
+            state.position_rad,
+            "measured {:.3f} rad: forced beyond its limit",
+        ),
+        (over_s >= limits.current_time_s, state.current_a, "{:.2f} A for too long"),
+        (
+            state.temperature_c > limits.temperature_limit_c,
+            state.temperature_c,
+            "{:.0f} C: too hot",
+        ),
+        (state.voltage_v < limits.voltage_min_v, state.voltage_v, "{:.1f} V: supply too low"),
+        (state.voltage_v > limits.voltage_max_v, state.voltage_v, "{:.1f} V: supply too high"),
+    )
+    for bad, values, what in checks:
+        if bad.any():
+            joint = int(np.argmax(bad))
+            said = f"joint {joint}: " + what.format(values[joint])
+            names = alarm_names(int(values[joint])) if what == "alarm" else ""
+            return f"{said}: {names}" if names else said
+    return None
+
+
+def _command_fault(command: JointCommand, limits: SafetyLimits) -> str | None:
+    goal = np.asarray(command.goal_rad)
+    if goal.shape != limits.limit_rad.shape:
+        return f"command of shape {goal.shape} for {len(limits.limit_rad)} joints"
+    bad = ~np.isfinite(goal)
+    if bad.any():
+        joint = int(np.argmax(bad))
+        return f"joint {joint}: commanded {goal[joint]}: not a number"
+    return None

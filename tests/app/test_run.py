@@ -1,0 +1,69 @@
+"""The main job over real packet bytes: simulated servos, MuJoCo body, log and summary."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.errors import InputError
+from config.world import FrictionConfig
+from controller.app.execute import execute
+from controller.app.prepare import Prepared, prepare
+from drivers.telemetry.reader import read_log
+
+
+def short(**changes: object) -> Prepared:
+    return prepare("flat-slalom", waypoints_m=((1.2, 0.3),), time_limit_s=30.0, **changes)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory):
+    return execute(short(seed=4), tmp_path_factory.mktemp("run"))
+
+
+def test_the_waypoint_is_reached_without_a_trip_or_a_missed_deadline(finished) -> None:
+    assert finished.outcome.complete(1)
+    numbers = finished.summary
+    assert numbers["missed_deadlines"] == 0
+    assert numbers["failed_reads"] == 0
+    assert numbers["vetoes"] == 0
+    assert numbers["wire_use_max"] < 1.0
+
+
+def test_joints_follow_within_the_honest_lag_of_the_servos(finished) -> None:
+    record = read_log(finished.log)
+    lead = np.abs(record.cycle.asked_rad - record.cycle.measured_rad)
+    assert lead.max() < 0.25
+    assert np.abs(record.cycle.current_a).max() < 2.3 * 0.5  # half of the stall current
+
+
+def test_same_seed_and_configuration_give_byte_identical_commands(finished, tmp_path: Path) -> None:
+    again = execute(short(seed=4), tmp_path / "again")
+    assert again.log.read_bytes() == finished.log.read_bytes()
+    other = execute(short(seed=5), tmp_path / "other")
+    sent = [read_log(f.log).cycle.sent_rad[200:500] for f in (finished, other)]
+    assert not np.array_equal(*sent)
+
+
+def test_isotropic_ground_sounds_the_alarm_for_missing_advance(tmp_path: Path) -> None:
+    prepared = short(motion="serpenoid")
+    same = FrictionConfig(along=0.4, across=0.4)
+
+    class Slippery(Prepared):
+        """Believes in the configured friction; the ground has another."""
+
+        def __init__(self, like: Prepared) -> None:
+            super().__init__(like.run, like.robot, like.world.model_copy(update={"friction": same}))
+            self.__dict__["gain"] = like.gain
+
+    finished = execute(Slippery(prepared), tmp_path)
+    assert finished.outcome.reached == 0
+    assert finished.outcome.alarms > 0
+    kinds = [event.kind for event in read_log(finished.log).events]
+    assert "alarm" in kinds
+
+
+def test_a_port_that_is_not_there_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="/dev/nosuch"):
+        execute(short(motion="serpenoid"), tmp_path / "run", port="/dev/nosuch")
+    assert not (tmp_path / "run").exists()
