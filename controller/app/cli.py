@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.progress import track
 from rich.table import Table
 
 from config.errors import InputError
@@ -118,6 +119,48 @@ def run(
     )
     if not outcome.complete(len(prepared.run.waypoints_m)):
         raise SystemExit(1)
+
+
+@app.command(
+    epilog="Example: [bold]snakewalk trials flat-slalom --seeds 10 --motion walk "
+    "--motion serpenoid --json[/bold]"
+)
+def trials(
+    run: RunName = "flat-square",
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a motion")] = 10,
+    motion: Annotated[
+        list[str] | None, typer.Option(help="may be given again; default: all")
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    as_json: Json = False,
+) -> None:
+    """Simulate a job over many seeds and motions, and tabulate what was reached."""
+    from dataclasses import asdict  # noqa: PLC0415
+
+    from controller.app.prepare import prepare  # noqa: PLC0415  heavy; --help stays quick
+    from controller.app.trials import table  # noqa: PLC0415
+    from controller.app.trials import trials as run_trials  # noqa: PLC0415
+
+    motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
+    for name in motions:
+        prepare(run, motion=name)  # refuse bad input before any process starts
+    total = len(motions) * seeds
+    found = []
+    for done in track(
+        run_trials(run, motions, seeds, workers),
+        total=total,
+        description=run,
+        console=Console(stderr=True),
+    ):
+        found.append(done)
+    rows = table(found)
+    if as_json:
+        print(json.dumps({"run": run, "table": rows, "trials": [asdict(t) for t in found]}))
+        return
+    shown = Table(*[key.replace("_", " ") for key in rows[0]], title=run)
+    for row in rows:
+        shown.add_row(*[str(value) for value in row.values()])
+    console.print(shown)
 
 
 def _show(found: dict[str, object], as_json: bool) -> None:

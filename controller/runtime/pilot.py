@@ -19,6 +19,9 @@ from controller.runtime.body import BodyView
 Floats = NDArray[np.float64]
 
 
+# Body lengths of track before another path may be laid: turning back takes about as much.
+_PATIENCE_BODIES = 2.0
+
 Planner = Callable[[Floats], Path]
 """Lays a path through (n, 2) points in order."""
 
@@ -66,6 +69,7 @@ class Pilot:
         self._start: tuple[Floats, float] | None = None
         self.head = float(source.track.points)
         self.reached = 0
+        self._patience = 0.0
         self.missed = 0
         """How often a waypoint was passed outside its radius, and a new path laid to it."""
         self.decision: Decision | None = None
@@ -109,8 +113,13 @@ class Pilot:
             return
         if np.hypot(*(self._waypoints_m[self.reached] - centre_m)) <= self._radius_m:
             self.reached += 1
-        elif self._feedback and self._along_m > self._passed_m[self.reached] + self._radius_m:
+        elif (
+            self._feedback
+            and self._along_m > self._passed_m[self.reached] + self._radius_m
+            and self.head >= self._patience
+        ):
             self.missed += 1
+            self._patience = self.head + _PATIENCE_BODIES * self._source.track.points
             self._lay_path(head_m, self.reached)
 
     def _lay_path(self, from_m: Floats, first: int) -> None:
