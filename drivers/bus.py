@@ -1,11 +1,11 @@
-"""The bus: service work through the DYNAMIXEL SDK, its known defects fenced off.
+"""The bus: service work, with the DYNAMIXEL SDK where it is right and around it where it is not.
 
 What is guarded, with dynamixel-sdk 4.1.0:
 
-- It never stuffs what it sends, and what it unstuffs is not always what was stuffed: packets that
-  hold ``FF FF`` are sent, or asked for again, by this package's own codec.
-- A status packet with an error and without data counts as success: the error byte is looked at
-  first, and the data's length after it.
+- It never stuffs what it sends, and what it unstuffs is not always what was stuffed. A status
+  packet with an error and without data counts as success, and of one that is too short the CRC
+  counts as data. So registers are read and written by this package's own strict codec; the SDK
+  finds servos and reboots them.
 - An exception in the port leaves it busy for ever: it is freed again.
 - A broadcast ping waits 0.8 s for 252 servos: ``find`` pings the expected ones.
 
@@ -18,20 +18,18 @@ from typing import TypeVar
 
 import dynamixel_sdk as sdk
 
-from drivers.control_table import ControlTable, Register, load_control_table
+from drivers.control_table import ControlTable, load_control_table
 from drivers.cycle import GroupCycle
-from drivers.errors import BusError, NoAnswerError, ServoError
+from drivers.errors import BusError, NoAnswerError
+from drivers.exchange import check_accepted, read_register, write_register
 from drivers.port import BytePort
 from drivers.protocol.packet import (
     ALERT,
     BROADCAST_ID,
     Instruction,
     InstructionPacket,
-    ResultError,
-    StatusPacket,
     encode_instruction,
 )
-from drivers.protocol.parser import PacketReader
 
 T = TypeVar("T")
 
@@ -63,7 +61,7 @@ class DynamixelBus:
         self.table: ControlTable = load_control_table(model)
         self.latency_s = latency_s
         """How long adapter and driver may hold bytes back (FTDI: its latency timer)."""
-        self._tries = tries
+        self._tries = max(1, tries)
         self._sdk = sdk.PacketHandler(2.0)
 
     def ping(self, servo_id: int) -> Found:
@@ -109,7 +107,8 @@ class DynamixelBus:
 
         """
         register = self.table.register(name)
-        return register.decode(self._retry(lambda: self._read(servo_id, register)))
+        data = self._retry(lambda: read_register(self.port, servo_id, register, self.latency_s))
+        return register.decode(data)
 
     def write(self, servo_id: int, name: str, value: int) -> None:
         """Write a register by its name.
@@ -122,7 +121,7 @@ class DynamixelBus:
         """
         register = self.table.register(name)
         data = register.encode(value)
-        self._retry(lambda: self._write(servo_id, register, data))
+        self._retry(lambda: write_register(self.port, servo_id, register, data, self.latency_s))
 
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
         """Write one value to all at once; nobody confirms it.
@@ -158,7 +157,7 @@ class DynamixelBus:
         def once() -> None:
             result, error = self._sdk.reboot(self.port, servo_id)
             self._came(result, servo_id, "reboot")
-            self._accepted(servo_id, "reboot", error)
+            check_accepted(servo_id, "reboot", error)
 
         self._retry(once)
 
@@ -192,58 +191,16 @@ class DynamixelBus:
             latency_s=self.latency_s,
         )
 
-    def _read(self, servo_id: int, register: Register) -> bytes:
-        data, result, error = self._sdk.readTxRx(
-            self.port, servo_id, register.address, register.size
-        )
-        if result == sdk.COMM_SUCCESS and error & ~ALERT == 0:
-            plain = bytes(data)
-            if len(plain) == register.size and b"\xff\xff" not in plain:
-                return plain
-        span = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
-        status = self._exchange(InstructionPacket(servo_id, Instruction.READ, span))
-        self._accepted(servo_id, f"read {register.name}", status.error)
-        if len(status.params) != register.size:
-            raise BusError(
-                f"servo {servo_id}: read {register.name}: {len(status.params)} bytes came, "
-                f"not {register.size}"
-            )
-        return status.params
-
-    def _write(self, servo_id: int, register: Register, data: bytes) -> None:
-        what = f"write {register.name}"
-        if b"\xff\xff" in data:
-            params = register.address.to_bytes(2, "little") + data
-            status = self._exchange(InstructionPacket(servo_id, Instruction.WRITE, params))
-            self._accepted(servo_id, what, status.error)
-            return
-        result, error = self._sdk.writeTxRx(
-            self.port, servo_id, register.address, len(data), list(data)
-        )
-        self._came(result, servo_id, what)
-        self._accepted(servo_id, what, error)
-
-    def _exchange(self, packet: InstructionPacket) -> StatusPacket:
-        """Send and wait for the servo's status packet, by our own strict codec."""
-        port, reader = self.port, PacketReader()
-        port.clearPort()
-        raw = encode_instruction(packet)
-        port.setPacketTimeout(len(raw) + 32)
-        port.write(raw)
-        while not port.isPacketTimeout():
-            for answer in reader.feed(port.readPort(256)):
-                if isinstance(answer, StatusPacket) and answer.servo_id == packet.servo_id:
-                    return answer
-        raise NoAnswerError(f"servo {packet.servo_id}: no answer at {port.getBaudRate()} baud")
-
     def _retry(self, once: Callable[[], T]) -> T:
         """Run an exchange, again after silence or damage; what the servo refuses is final."""
-        for _ in range(self._tries - 1):
+        for left in range(self._tries - 1, -1, -1):
             try:
                 return self._guarded(once)
             except NoAnswerError:
-                self.port.drain_until_quiet(self.latency_s)
-        return self._guarded(once)
+                self.port.drain_until_quiet(self.latency_s)  # it may come late
+                if not left:
+                    raise
+        raise AssertionError("tries is at least 1")
 
     def _guarded(self, call: Callable[[], T]) -> T:
         try:
@@ -257,11 +214,3 @@ class DynamixelBus:
             raise NoAnswerError(
                 f"servo {servo_id}: {what}: {said} at {self.port.getBaudRate()} baud"
             )
-
-    @staticmethod
-    def _accepted(servo_id: int, what: str, error: int) -> None:
-        code = error & ~ALERT
-        if code:
-            known = code in ResultError._value2member_map_
-            name = ResultError(code).name.lower().replace("_", " ") if known else f"error {code}"
-            raise ServoError(f"servo {servo_id}: {what}: refused: {name}", error)

@@ -1,7 +1,5 @@
 """The chain of servos as a joint link: radians to raw goals, raw blocks to a ``JointState``."""
 
-from typing import TypeVar
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,14 +8,12 @@ from drivers.bus import DynamixelBus
 from drivers.clock import Clock
 from drivers.cycle import CycleCounters, GroupCycle
 from drivers.errors import BusError, ChainError
-from drivers.group_answer import GroupAnswer
-from drivers.protocol.packet import ALERT
+from drivers.readings import Readings
 from drivers.start_up import Inspection, check_pose, configure, goal_limits_raw, inspect
 from drivers.types import JointCommand, JointState
-from drivers.units import VOLTAGE_UNIT_V, WATCHDOG_UNIT_S, ServoUnits
+from drivers.units import WATCHDOG_UNIT_S, ServoUnits
 
 Floats = NDArray[np.float64]
-S = TypeVar("S", bound=np.generic)
 _FIRST_READS = 5
 """Tries to get one complete answer at the start."""
 
@@ -60,22 +56,9 @@ class ServoChain:
         self._slow_every = slow_every
         self._fast = fast
         self._goal_limits = goal_limits_raw(robot, self._units)
-        self._columns = [
-            _column(bus, name)
-            for name in ("Present Current", "Present Velocity", "Present Position")
-        ]
+        self._readings = Readings(robot.joint_count, bus.table, self._units)
         self._cycle: GroupCycle = bus.cycle(robot.servo_ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(robot.servo_ids, fast=fast)
-        joints = robot.joint_count
-        self._position = np.full(joints, np.nan)
-        self._velocity = np.full(joints, np.nan)
-        self._current = np.full(joints, np.nan)
-        self._temperature = np.full(joints, np.nan)
-        self._voltage = np.full(joints, np.nan)
-        self._hardware_error = np.zeros(joints, np.uint8)
-        self._error = np.zeros(joints, np.uint8)
-        self._read_at_s = np.full(joints, -np.inf)
-        self._valid = np.zeros(joints, np.bool_)
         self._reads = 0
         self._armed = False
         self._spoke_at_s = -np.inf
@@ -165,12 +148,14 @@ class ServoChain:
             PortError: the port is gone.
 
         """
-        self._take(self._cycle.read())
+        answer = self._cycle.read()
+        for joint in self._readings.take(answer, self._clock.now_s()):
+            self._read_alarm(int(joint))
         if self._reads % self._slow_every == 0:
-            self._take_slow(self._slow.read())
+            self._readings.take_slow(self._slow.read())
         self._reads += 1
         self._spoke_at_s = self._clock.now_s()
-        return self._state()
+        return self._readings.state(self._spoke_at_s)
 
     def write(self, command: JointCommand) -> None:
         """Send goal positions, kept inside the joint limits.
@@ -210,61 +195,9 @@ class ServoChain:
         silent = [str(i) for i, v in zip(self.robot.servo_ids, state.valid, strict=True) if not v]
         raise BusError(f"servo {', '.join(silent) or 'group'}: group read fails, pings do not")
 
-    def _take(self, answer: GroupAnswer) -> None:
-        ok = answer.valid
-        current, velocity, position = (_values(answer.data, at, kind) for at, kind in self._columns)
-        self._current[ok] = self._units.current_a(current[ok])
-        self._velocity[ok] = self._units.velocity_rad_s(velocity[ok])
-        self._position[ok] = self._units.position_rad(position[ok])
-        self._error[answer.answered] = answer.error[answer.answered]
-        self._read_at_s[ok] = self._clock.now_s()
-        self._valid = ok
-        alert = (answer.error & ALERT) != 0
-        self._hardware_error[answer.answered & ~alert] = 0
-        for joint in np.flatnonzero(alert & (self._hardware_error == 0)):
-            self._read_alarm(int(joint))
-
     def _read_alarm(self, joint: int) -> None:
         servo_id = self.robot.servo_ids[joint]
         try:
-            self._hardware_error[joint] = self._bus.read(servo_id, "Hardware Error Status")
+            self._readings.take_alarm(joint, self._bus.read(servo_id, "Hardware Error Status"))
         except BusError:
             return  # the error byte carries the alert already; asked again in the next cycle
-
-    def _take_slow(self, answer: GroupAnswer) -> None:
-        ok = answer.valid
-        self._voltage[ok] = _values(answer.data, 0, "<u2")[ok] * VOLTAGE_UNIT_V
-        self._temperature[ok] = answer.data[ok, 2]
-
-    def _state(self) -> JointState:
-        now_s = self._clock.now_s()
-        return JointState(
-            time_s=now_s,
-            position_rad=_frozen(self._position),
-            velocity_rad_s=_frozen(self._velocity),
-            current_a=_frozen(self._current),
-            temperature_c=_frozen(self._temperature),
-            voltage_v=_frozen(self._voltage),
-            hardware_error=_frozen(self._hardware_error),
-            error=_frozen(self._error),
-            age_s=_frozen(now_s - self._read_at_s),
-            valid=_frozen(self._valid),
-        )
-
-
-def _column(bus: DynamixelBus, name: str) -> tuple[int, str]:
-    """Place of a signed register in the state block, and its type."""
-    register = bus.table[name]
-    return register.address - bus.table["Present Current"].address, f"<i{register.size}"
-
-
-def _values(data: NDArray[np.uint8], at: int, kind: str) -> NDArray[np.signedinteger]:
-    size = int(kind[-1])
-    column: NDArray[np.signedinteger] = np.ascontiguousarray(data[:, at : at + size]).view(kind)
-    return column[:, 0]
-
-
-def _frozen(array: NDArray[S]) -> NDArray[S]:
-    copy = array.copy()
-    copy.setflags(write=False)
-    return copy

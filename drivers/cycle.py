@@ -2,12 +2,13 @@
 
 Rules, each against something that happens on real buses:
 
-- A servo that does not answer costs its own value only, never the group's.
+- Servos answer a group read in turn, each after the one before, so those behind a silent one stay
+  silent as well: it is asked last from then on, and costs its own value only.
 - After anything but a complete clean answer the line is drained until quiet.
 - An answer older than its question is never taken for new. Draining alone cannot promise that (an
   adapter may stall for longer), so after every failure the block asked for changes its length: what
   comes late has the wrong one and is thrown away.
-- Fast reads that keep failing are given up for plain ones, where one servo cannot spoil the rest.
+- Fast reads that keep failing are given up for plain ones, where damage ends with its packet.
 """
 
 from collections.abc import Sequence
@@ -22,6 +23,7 @@ from drivers.port import BytePort
 
 _PADS = 3
 """Block lengths in turn: length, + 1, + 2."""
+_KEPT_QUESTIONS = 64
 
 
 @dataclass(slots=True)
@@ -66,17 +68,17 @@ class GroupCycle:
             latency_s: how long adapter and driver may hold bytes back, at most.
             return_delay_s: of each servo.
             fast_failures: fast reads failing in a row until plain ones are used.
-            clean_reads: clean reads in a row until the block has its own length again.
+            clean_reads: clean reads in a row until order and length are the usual ones again.
 
         """
         self._port = port
         self._count = len(ids)
         self._goals = GroupWrite(ids, goal_address)
-        self._questions = {
-            (is_fast, pad): GroupQuestion(ids, read_address, read_bytes + pad, fast=is_fast)
-            for is_fast in (False, True)
-            for pad in range(_PADS)
-        }
+        self._ids = tuple(ids)
+        self._natural = tuple(range(len(ids)))
+        self._order = self._natural
+        self._questions: dict[tuple[bool, int, tuple[int, ...]], GroupQuestion] = {}
+        self._read_address = read_address
         self._length = read_bytes
         self._latency_s = latency_s
         self._return_delay_s = return_delay_s
@@ -101,24 +103,37 @@ class GroupCycle:
             PortError: the port is gone.
 
         """
-        port, question = self._port, self._questions[self.fast, self._pad]
+        question, order = self._question(), self._order
         self.counters.reads += 1
-        port.clearPort()
+        self._port.clearPort()
         self._send(question.request)
         raw, answer = self._collect(question)
         if answer.clean and answer.answered.all():
             self._succeeded()
         else:
-            self._failed(timed_out=len(raw) < question.answer_bytes)
-        if self._length == answer.data.shape[1]:
+            self._failed(answer, timed_out=len(raw) < question.answer_bytes)
+        if order == self._natural and self._length == answer.data.shape[1]:
             return answer
+        back = np.argsort(order)
         return GroupAnswer(
-            answer.data[:, : self._length],
-            answer.valid,
-            answer.error,
-            answer.answered,
+            answer.data[back, : self._length],
+            answer.valid[back],
+            answer.error[back],
+            answer.answered[back],
             answer.clean,
         )
+
+    def _question(self) -> GroupQuestion:
+        key = (self.fast, self._pad, self._order)
+        question = self._questions.get(key)
+        if question is None:
+            if len(self._questions) >= _KEPT_QUESTIONS:
+                self._questions.clear()
+            ids = [self._ids[k] for k in self._order]
+            length = self._length + self._pad
+            question = GroupQuestion(ids, self._read_address, length, fast=self.fast)
+            self._questions[key] = question
+        return question
 
     def _send(self, packet: bytes) -> None:
         """Write, and note when it will have left the host (a write does not wait for that)."""
@@ -150,9 +165,9 @@ class GroupCycle:
         self._failed_in_a_row = 0
         self._clean_in_a_row += 1
         if self._clean_in_a_row >= self._clean_reads:
-            self._pad = 0
+            self._pad, self._order = 0, self._natural
 
-    def _failed(self, *, timed_out: bool) -> None:
+    def _failed(self, answer: GroupAnswer, *, timed_out: bool) -> None:
         self.counters.timeouts += timed_out
         self.counters.unclean += not timed_out
         self._clean_in_a_row = 0
@@ -161,4 +176,8 @@ class GroupCycle:
             self.fast = False
             self.counters.fast_given_up += 1
         self._pad = (self._pad + 1) % _PADS
+        if not answer.answered.all():
+            first = int(np.argmin(answer.answered))  # those behind it had no chance
+            order = self._order
+            self._order = (*order[:first], *order[first + 1 :], order[first])
         self.counters.drained_bytes += self._port.drain_until_quiet(self._latency_s)

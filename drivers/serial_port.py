@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import errno
 import os
+from contextlib import suppress
 from types import TracebackType
 
 import serial
@@ -66,6 +67,12 @@ class SerialPort:
                 return int(file.read())
         except (OSError, ValueError):
             return None  # not a USB adapter, or one without the setting: nothing to report
+
+    @property
+    def latency_s(self) -> float:
+        """How long bytes may be held back on this side, for ``DynamixelBus(latency_s=...)``."""
+        timer_ms = self.latency_timer_ms
+        return 0.003 + (timer_ms if timer_ms is not None else 1) * 1e-3
 
     def write(self, data: bytes) -> None:
         """Send all of ``data``."""
@@ -174,6 +181,9 @@ class SerialPort:
             self._serial.reset_input_buffer()
         except (serial.SerialException, OSError, ValueError) as error:
             raise PortError(self._why(error)) from error
+        # asks an FTDI driver for a latency timer of 1 ms instead of 16; others have none to set
+        with suppress(ValueError, NotImplementedError):
+            self._serial.set_low_latency_mode(True)
 
     def _gone(self, error: Exception) -> PortError:
         self.is_using = False

@@ -14,7 +14,7 @@ from config.robot import RobotConfig
 from drivers.bus import DynamixelBus
 from drivers.control_table import model_numbers
 from drivers.errors import ChainError
-from drivers.units import RETURN_DELAY_UNIT_S, ServoUnits
+from drivers.units import RETURN_DELAY_UNIT_S, VOLTAGE_UNIT_V, ServoUnits
 
 POSITION_MODE = 3
 CURRENT_BASED_POSITION_MODE = 5
@@ -103,7 +103,7 @@ def _report(bus: DynamixelBus, servo_id: int, name: str) -> ServoReport:
         operating_mode=bus.read(servo_id, "Operating Mode"),
         torque_on=bool(bus.read(servo_id, "Torque Enable")),
         temperature_c=float(bus.read(servo_id, "Present Temperature")),
-        voltage_v=bus.read(servo_id, "Present Input Voltage") * 0.1,
+        voltage_v=bus.read(servo_id, "Present Input Voltage") * VOLTAGE_UNIT_V,
     )
 
 
