@@ -11,28 +11,29 @@ from numpy.typing import NDArray
 
 from drivers.control_table import ControlTable, load_control_table
 from drivers.protocol.packet import ALERT, ResultError
-from sim.bus.registers import EEPROM_END, WATCHDOG_TRIPPED, Rule, rules
+from sim.bus.registers import (
+    BAUDS,
+    EEPROM_END,
+    GOALS,
+    MODE_RESETS,
+    MODES,
+    POSITION_MODE,
+    WATCHDOG_TRIPPED,
+    Rule,
+    rules,
+)
 
 Rows = NDArray[np.intp]
 Ints = NDArray[np.signedinteger]
 
 TABLE_BYTES = 1024
-GOALS = ("Goal PWM", "Goal Current", "Goal Velocity", "Goal Position")
-
-
-POSITION_MODE, EXTENDED_MODE, CURRENT_POSITION_MODE = 3, 4, 5
-MODES = (0, 1, 3, 4, 5, 16)
-"""Operating Mode(11): current, velocity, position, extended, current-based position, PWM."""
-
-BAUDS = (9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
-"""Baud Rate(8), by value."""
 
 
 class ServoBank:
     """S servos of one model with distinct IDs, factory new but for ID and baud rate.
 
     Raises:
-        KeyError: the model cannot be simulated.
+        ControlTableError: the model is unknown, or cannot be simulated.
         ValueError: an ID is used twice, or the baud rate is not one of the servos'.
 
     """
@@ -44,10 +45,12 @@ class ServoBank:
             raise ValueError(f"two servos share an ID: {sorted(ids)}")
         if baud not in BAUDS:
             raise ValueError(f"{baud} baud: the servos have {', '.join(map(str, BAUDS))}")
-        self.model = model
         self.ids = tuple(ids)
         self.layout = load_control_table(model)
-        self._rules = {name: rule for name, rule in rules(model).items() if name in self.layout}
+        self.model = self.layout.model
+        self._rules = {
+            name: rule for name, rule in rules(self.model).items() if name in self.layout
+        }
         self.table = np.zeros((len(self.ids), TABLE_BYTES), np.uint8)
         self._views = {name: self._view(name) for name in self._rules}
         self._spans = _spans(self.layout, self._rules)
@@ -135,6 +138,13 @@ class ServoBank:
             self[goal][rows] = self[limit][rows]
         for row in rows:
             self._registered.pop(int(row), None)
+
+    def switch_mode(self, rows: Rows) -> None:
+        """Set back what a new Operating Mode(11) does: gains, profile, and limits of the output."""
+        for name in MODE_RESETS:
+            self[name][rows] = self._rules[name].initial
+        self["Goal PWM"][rows] = self["PWM Limit"][rows]
+        self["Goal Current"][rows] = self["Current Limit"][rows]
 
     def _check_value(self, row: int, name: str, value: int) -> ResultError:
         rule = self._rules[name]

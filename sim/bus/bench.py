@@ -63,7 +63,7 @@ class BenchPlant:
         h, q, w = self._step_s, self._position, self._velocity
         on = drive.torque_on
         pwm = drive.p_gain_per_rad * (drive.goal_rad - q)
-        drive.pwm[:] = np.clip(pwm, -drive.pwm_limit, drive.pwm_limit) * on
+        drive.pwm[:] = _within(pwm, drive.pwm_limit) * on
         stiff = on * drive.torque_constant_n_m_a / drive.resistance_ohm
         limit = drive.current_limit_a
         amps = (drive.pwm * drive.supply_v - drive.back_emf_v_s * w) / drive.resistance_ohm * on
@@ -71,7 +71,7 @@ class BenchPlant:
         load = self._load(q) if self._load is not None else 0.0
         push = np.where(
             limited,
-            np.clip(amps, -limit, limit) * drive.torque_constant_n_m_a,
+            _within(amps, limit) * drive.torque_constant_n_m_a,
             stiff * drive.pwm * drive.supply_v,
         )
         damping = self._viscous + np.where(limited, 0.0, stiff * drive.back_emf_v_s)
@@ -80,5 +80,9 @@ class BenchPlant:
         w[:] = np.sign(free) * np.maximum(np.abs(free) - brake, 0.0)
         q += h * w
         amps = (drive.pwm * drive.supply_v - drive.back_emf_v_s * w) / drive.resistance_ohm * on
-        drive.current_a[:] = np.clip(amps, -limit, limit)
+        drive.current_a[:] = _within(amps, limit)
         drive.torque_n_m[:] = drive.current_a * drive.torque_constant_n_m_a
+
+
+def _within(value: Floats, limit: Floats) -> Floats:
+    return np.minimum(np.maximum(value, -limit), limit)

@@ -4,14 +4,21 @@ Order of one look: physics is stepped to the time of the look (cut where a watch
 protection is due), and only then registers are read or written.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.bus.bank import CURRENT_POSITION_MODE, EXTENDED_MODE, POSITION_MODE, ServoBank
+from sim.bus.bank import ServoBank
 from sim.bus.motor import MOTORS, PWM_FULL, TICKS_PER_RAD, TICKS_PER_REV, make_drive, p_gain_per_rad
-from sim.bus.registers import EXTENDED_RANGE_TICKS, WATCHDOG_TRIPPED
+from sim.bus.protection import SLICE_S, Protection, Surroundings
+from sim.bus.registers import (
+    CURRENT_MODE,
+    CURRENT_POSITION_MODE,
+    EXTENDED_RANGE_TICKS,
+    POSITION_MODE,
+    PWM_MODE,
+    VELOCITY_MODE,
+    WATCHDOG_TRIPPED,
+)
 from sim.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -22,24 +29,10 @@ CENTRE_TICKS = 2048
 VELOCITY_UNIT_RAD_S = 0.229 * 2.0 * np.pi / 60.0
 """Present Velocity(128): 0.229 rev/min a unit, e-manual."""
 WATCHDOG_UNIT_S = 0.02
-SLICE_S = 0.05
-"""How often heat, supply and overload are looked at; the shafts are seen far more often."""
-OVERLOAD_S = 1.0
-"""How long a blocked motor at full output is borne (ours: "persistent load", e-manual)."""
+FAR_RAD = 1e9
+"""Where a motor is sent that only has to push: the output saturates at its limit."""
 REVERSE = 0x01
 """Drive Mode(10), bit 0."""
-VOLTAGE_ERROR, OVERHEATING_ERROR, OVERLOAD_ERROR = 0x01, 0x04, 0x20
-"""Bits of Hardware Error Status(70) and Shutdown(63)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Surroundings:
-    """Supply and air."""
-
-    supply_v: float = 12.0
-    supply_ohm: float = 0.02
-    """Of battery and cable together: the voltage sags with the current of all servos."""
-    ambient_c: float = 25.0
 
 
 class Firmware:
@@ -51,16 +44,14 @@ class Firmware:
         joints = len(bank)
         self.bank = bank
         self.plant = plant
-        self.around = surroundings if surroundings is not None else Surroundings()
         self.motor = MOTORS[bank.model]
-        self.drive = make_drive([self.motor] * joints, self.around.supply_v)
-        self.temperature_c = np.full(joints, self.around.ambient_c)
+        around = surroundings or Surroundings(supply_v=self.motor.nominal_v)
+        self.drive = make_drive([self.motor] * joints, around.supply_v)
+        self.protection = Protection(bank, self.drive, self.motor, around)
         self._start_s = self._time_s = plant.time_s
         self._slice_s = self._time_s + SLICE_S
         self._heard_s = self._time_s
-        self._watchdog_s = np.inf
-        self._heat_j = np.zeros(joints)
-        self._blocked_s = np.zeros(joints)
+        self._patience_s = self._watchdog_s = np.inf
         self._turns = np.zeros(joints)
         self._was_on = np.zeros(joints, bool)
         self._was_mode = bank["Operating Mode"].copy()
@@ -75,19 +66,19 @@ class Firmware:
         while self._time_s < until_s:
             stop_s = min(until_s, self._slice_s, self._watchdog_s)
             self.plant.advance(stop_s, self.drive)
-            amps = self.drive.current_a
-            self._heat_j += amps * amps * ((stop_s - self._time_s) * self.motor.resistance_ohm)
+            self.protection.pass_time(stop_s - self._time_s)
             self._time_s = stop_s
             if stop_s >= self._watchdog_s:
                 self._trip_watchdog()
             if stop_s >= self._slice_s:
-                self._protect()
+                if self.protection.look(self.plant):
+                    self.changed()
                 self._slice_s += SLICE_S
 
     def heard(self, time_s: float) -> None:
         """Feed the watchdogs: any instruction packet does, whoever it is for (e-manual)."""
         self._heard_s = time_s
-        self._arm_watchdog()
+        self._watchdog_s = time_s + self._patience_s
 
     # registers to motors
 
@@ -96,6 +87,9 @@ class Firmware:
         bank, drive = self.bank, self.drive
         mode = bank["Operating Mode"]
         on = bank["Torque Enable"] == 1
+        switched = np.flatnonzero(mode != self._was_mode)
+        if len(switched):
+            bank.switch_mode(switched)
         again = (mode == POSITION_MODE) & ((on & ~self._was_on) | (mode != self._was_mode))
         self._sign = np.where(bank["Drive Mode"] & REVERSE, -1.0, 1.0)
         if again.any():
@@ -104,12 +98,16 @@ class Firmware:
         self._was_on, self._was_mode = on, mode.copy()
         tripped = bank["Bus Watchdog"] == WATCHDOG_TRIPPED
         self._held &= tripped
-        driven = np.isin(mode, (POSITION_MODE, EXTENDED_MODE, CURRENT_POSITION_MODE))
-        drive.torque_on[:] = on & driven
+        drive.torque_on[:] = on & (mode != VELOCITY_MODE)
         drive.p_gain_per_rad[:] = p_gain_per_rad(bank["Position P Gain"], self.motor)
-        drive.pwm_limit[:] = np.abs(bank["Goal PWM"]) / PWM_FULL
-        limited = mode == CURRENT_POSITION_MODE
-        goal_a = np.abs(bank["Goal Current"]) * self.motor.current_unit_a
+        drive.pwm_limit[:] = np.abs(bank["Goal PWM"].astype(float)) / PWM_FULL
+        self._push = np.zeros(len(bank))
+        for pushing, goal in ((PWM_MODE, "Goal PWM"), (CURRENT_MODE, "Goal Current")):
+            self._push += (mode == pushing) * self._sign * np.sign(bank[goal]) * FAR_RAD
+        self._push[tripped] = 0.0
+        self._pushed = bool(np.isin(mode, (PWM_MODE, CURRENT_MODE)).any())
+        limited = (mode == CURRENT_POSITION_MODE) | (mode == CURRENT_MODE)
+        goal_a = np.abs(bank["Goal Current"].astype(float)) * self.motor.current_unit_a
         drive.current_limit_a[:] = np.where(limited, goal_a, np.inf)
         single = mode == POSITION_MODE
         low = np.where(single, bank["Min Position Limit"].astype(int), -EXTENDED_RANGE_TICKS)
@@ -138,7 +136,7 @@ class Firmware:
     def power_up(self, rows: NDArray[np.intp]) -> None:
         """After power-on or reboot: one turn of position, goal = present, protections cleared."""
         self._forget_turns(np.isin(np.arange(len(self.bank)), rows))
-        self._blocked_s[rows] = 0.0
+        self.protection.restart(rows)
         self._was_on[rows] = False
         self.changed()
         self.refresh()
@@ -174,7 +172,7 @@ class Firmware:
         bank["Present PWM"][:] = np.rint(self.drive.pwm * self._sign * PWM_FULL)
         bank["Position Trajectory"][:] = bank["Goal Position"]
         bank["Present Input Voltage"][:] = np.rint(self.drive.supply_v * 10.0)
-        bank["Present Temperature"][:] = np.clip(np.rint(self.temperature_c), 0, 255)
+        bank["Present Temperature"][:] = np.clip(np.rint(self.protection.temperature_c), 0, 255)
         bank["Moving"][:] = np.abs(self.plant.velocity_rad_s) > self._moving_rad_s()
         bank["Realtime Tick"][:] = int((self._time_s - self._start_s) * 1e3) % 32_768
 
@@ -187,7 +185,9 @@ class Firmware:
         goal = (self.bank["Goal Position"] - self._zero) * (self._sign / TICKS_PER_RAD)
         if self._held.any():
             goal = np.where(self._held, self.drive.goal_rad, goal)
-        self.drive.goal_rad[:] = goal
+        self.drive.goal_rad[:] = (
+            np.where(self._push != 0.0, self._push, goal) if self._pushed else goal
+        )
 
     def _forget_turns(self, which: NDArray[np.bool_]) -> None:
         ticks = np.rint(self.plant.position_rad * self._sign * TICKS_PER_RAD) + CENTRE_TICKS
@@ -196,9 +196,8 @@ class Firmware:
     def _arm_watchdog(self) -> None:
         dog = self.bank["Bus Watchdog"]
         armed = (dog > 0) & (dog < WATCHDOG_TRIPPED) & self._was_on
-        self._watchdog_s = (
-            self._heard_s + WATCHDOG_UNIT_S * float(dog[armed].min()) if armed.any() else np.inf
-        )
+        self._patience_s = WATCHDOG_UNIT_S * float(dog[armed].min()) if armed.any() else np.inf
+        self._watchdog_s = self._heard_s + self._patience_s
 
     def _trip_watchdog(self) -> None:
         dog = self.bank["Bus Watchdog"]
@@ -208,30 +207,3 @@ class Firmware:
         self._held |= late
         self.drive.goal_rad[late] = self.plant.position_rad[late]
         self.changed()
-
-    def _protect(self) -> None:
-        bank, drive, motor = self.bank, self.drive, self.motor
-        decay = np.exp(-SLICE_S / motor.thermal_time_s)
-        target = self.around.ambient_c + motor.winding_k_per_w * self._heat_j / SLICE_S
-        self.temperature_c += (target - self.temperature_c) * (1.0 - decay)
-        self._heat_j[:] = 0.0
-        drawn_a = float(np.abs(drive.pwm * drive.current_a).sum()) + motor.standby_a * len(bank)
-        volts = self.around.supply_v - self.around.supply_ohm * drawn_a
-        drive.supply_v[:] = volts
-        full = np.abs(drive.pwm) >= 0.98 * drive.pwm_limit
-        yielding_rad_s = np.sign(drive.pwm) * self.plant.velocity_rad_s
-        blocked = full & (yielding_rad_s < 0.05 * motor.no_load_rad_s)
-        self._blocked_s = np.where(blocked & (drive.torque_on > 0), self._blocked_s + SLICE_S, 0.0)
-        tenths = round(volts * 10.0)
-        outside = (tenths < bank["Min Voltage Limit"]) | (tenths > bank["Max Voltage Limit"])
-        errors = (
-            VOLTAGE_ERROR * outside
-            | OVERHEATING_ERROR * (np.rint(self.temperature_c) > bank["Temperature Limit"])
-            | OVERLOAD_ERROR * (self._blocked_s >= OVERLOAD_S)
-        )
-        if errors.any():
-            status = bank["Hardware Error Status"]
-            status |= errors.astype(np.uint8)
-            shut = (status & bank["Shutdown"]) != 0
-            bank["Torque Enable"][shut] = 0
-            self.changed()

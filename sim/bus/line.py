@@ -6,19 +6,22 @@ the host reads, waits, or writes again, and only reads and time-outs move the cl
 needed. So a run needs no thread and no sleep, and repeats bit for bit.
 
 The names of the public methods are those of the SDK's ``PortHandler``, on which the SDK is
-duck-typed; ``drivers.port.BytePort`` is the same surface.
+duck-typed, widened to ``drivers.port.BytePort``.
 """
 # ruff: noqa: N802, D102 - the SDK chose the names; `drivers.port` describes them
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 
+from drivers.errors import PortError
 from drivers.protocol.packet import HEADER, InstructionPacket
 from drivers.protocol.parser import PacketReader
+from sim.bus.arrivals import Arrivals
 from sim.bus.bank import ServoBank
 from sim.bus.clock import SimClock
-from sim.bus.firmware import Firmware, Surroundings
+from sim.bus.firmware import Firmware
 from sim.bus.group import GroupPath
+from sim.bus.protection import Surroundings
 from sim.bus.service import Answer, Service
 from sim.plant import Plant
 
@@ -27,6 +30,8 @@ BITS_PER_BYTE = 10
 LATENCY_S = 0.016
 """The SDK's allowance for the adapter's latency timer; a packet may take two of them and 2 ms."""
 
+GAP_S = 5e-3
+"""After such a silence the servos take what follows for a new packet (ours)."""
 INSTANT_S = 1e-9
 """Times closer than this are the same."""
 
@@ -35,7 +40,10 @@ Tamper = Callable[[bytes], Sequence[bytes]]
 
 
 class SimLine:
-    """Servos of ``bank`` on the shafts of ``plant`` behind a serial line of ``baud``."""
+    """Servos of ``bank`` on the shafts of ``plant`` behind a serial line of ``baud``.
+
+    Reading and writing a closed port raise ``PortError``.
+    """
 
     def __init__(
         self,
@@ -61,9 +69,9 @@ class SimLine:
         self._group = GroupPath(self._service)
         self._reader = PacketReader()
         self._sent: deque[tuple[float, bytes]] = deque()
-        self._arriving: deque[tuple[float, bytes]] = deque()
+        self._arriving = Arrivals()
         self._sent_until_s = self._quiet_s = self.clock.now_s()
-        self._deadline_s = self.clock.now_s()
+        self._deadline_s = self._heard_until_s = self.clock.now_s()
         self.setBaudRate(baud)
 
     # the byte port
@@ -78,7 +86,7 @@ class SimLine:
     def setBaudRate(self, baudrate: int) -> bool:
         """Retune the host's side; servos at another rate no longer hear it."""
         self._baud = baudrate
-        self._byte_s = BITS_PER_BYTE / baudrate
+        self._byte_s = self._arriving.byte_s = BITS_PER_BYTE / baudrate
         self.tx_time_per_byte = self._byte_s * 1e3
         self._service.baud = baudrate
         self._service.retune()
@@ -90,12 +98,12 @@ class SimLine:
     def clearPort(self) -> None:
         """Drop what has arrived by now; bytes still under way will arrive all the same."""
         self._carry_out(self.clock.now_s())
-        self._take(1 << 30)
+        self._arriving.take(1 << 30, self.clock.now_s())
 
     def getBytesAvailable(self) -> int:
         """Bytes that have arrived by now."""
         self._carry_out(self.clock.now_s())
-        return sum(self._arrived(start_s, data) for start_s, data in self._arriving)
+        return self._arriving.count(self.clock.now_s())
 
     def writePort(self, packet: bytes | list[int]) -> int:
         """As ``write``; the number of bytes taken."""
@@ -129,6 +137,7 @@ class SimLine:
 
     def write(self, data: bytes) -> None:
         """Put bytes on the wire behind those already there; returns at once."""
+        self._must_be_open()
         start_s = max(self.clock.now_s(), self._sent_until_s)
         self._carry_out(start_s)
         clear = self._quiet_s <= start_s + INSTANT_S
@@ -144,10 +153,11 @@ class SimLine:
 
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Up to ``count`` bytes; the clock moves to the last of them, or to ``deadline_s``."""
+        self._must_be_open()
         clock = self.clock
         limit_s = max(deadline_s, clock.now_s())
         while count > 0:
-            due_s = self._due_s(count)
+            due_s = self._arriving.due_s(count)
             if due_s is not None:
                 clock.sleep_until_s(min(due_s, limit_s))
                 break
@@ -155,7 +165,7 @@ class SimLine:
                 clock.sleep_until_s(limit_s)
                 break
             self._carry_out(self._sent[0][0])
-        return self._take(count)
+        return self._arriving.take(count, clock.now_s())
 
     def drain_until_quiet(self, quiet_s: float) -> int:
         """Throw bytes away until none has come for ``quiet_s``; the number thrown away."""
@@ -165,9 +175,13 @@ class SimLine:
             if not byte:
                 return thrown
             seen_s = self.clock.now_s()
-            thrown += 1 + len(self._take(1 << 30))
+            thrown += 1 + len(self._arriving.take(1 << 30, self.clock.now_s()))
 
     # the wire
+
+    def _must_be_open(self) -> None:
+        if not self.is_open:
+            raise PortError(f"{self.name}: the port is closed")
 
     def settle(self) -> None:
         """Bring servos and physics to the clock's present time."""
@@ -175,11 +189,19 @@ class SimLine:
         self._carry_out(now_s)
         self.firmware.advance(now_s)
 
+    def next_event_s(self) -> float | None:
+        """When the next packet ends or the next byte arrives; None while nothing is under way."""
+        times = [self._arriving.due_s(1), self._sent[0][0] if self._sent else None]
+        return min((time_s for time_s in times if time_s is not None), default=None)
+
     def _carry_out(self, until_s: float) -> None:
         """Deliver the packets whose last byte has arrived by ``until_s``."""
         while self._sent and self._sent[0][0] <= until_s + INSTANT_S:
             end_s, data = self._sent.popleft()
             self.firmware.advance(end_s)
+            if end_s - len(data) * self._byte_s > self._heard_until_s + GAP_S:
+                self._reader.reset()
+            self._heard_until_s = end_s
             answers = self._group.execute(data, end_s, whole=self.tamper is None)
             if answers is None:
                 answers = [
@@ -199,45 +221,15 @@ class SimLine:
             time_s += answer.delay_s
             packets = (answer.data,) if self.tamper is None else self.tamper(answer.data)
             for data in packets:
-                self._arriving.append((time_s, data))
-                time_s += len(data) * self._byte_s
+                time_s = self._arriving.add(time_s, data)
                 self.busy_s += len(data) * self._byte_s
             self._quiet_s = time_s
 
     def _collide(self, start_s: float) -> None:
         """Two talk at once: what the servos had not said by then is lost, and so is the packet."""
         self.collisions += 1
-        kept = [
-            (at_s, data[: max(0, int((start_s - at_s) / self._byte_s + 1e-6))])
-            for at_s, data in self._arriving
-        ]
-        self._arriving = deque((at_s, data) for at_s, data in kept if data)
+        self._arriving.cut(start_s)
         self._quiet_s = start_s
-
-    def _arrived(self, start_s: float, data: bytes) -> int:
-        since = (self.clock.now_s() - start_s) / self._byte_s
-        return min(len(data), max(0, int(since + 1e-6)))
-
-    def _due_s(self, length: int) -> float | None:
-        for start_s, data in self._arriving:
-            if len(data) >= length:
-                return start_s + length * self._byte_s
-            length -= len(data)
-        return None
-
-    def _take(self, length: int) -> bytes:
-        taken = bytearray()
-        while self._arriving and len(taken) < length:
-            start_s, data = self._arriving[0]
-            count = min(self._arrived(start_s, data), length - len(taken))
-            taken += data[:count]
-            if count == len(data):
-                self._arriving.popleft()
-                continue
-            if count:
-                self._arriving[0] = (start_s + count * self._byte_s, data[count:])
-            break
-        return bytes(taken)
 
 
 def _frames(data: bytes) -> list[bytes]:

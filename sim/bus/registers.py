@@ -8,6 +8,8 @@ stand here.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from drivers.errors import ControlTableError
+
 
 @dataclass(frozen=True, slots=True)
 class Rule:
@@ -31,6 +33,22 @@ EXTENDED_RANGE_TICKS = 1_048_575
 
 WATCHDOG_TRIPPED = 0xFF
 """Bus Watchdog(98) reads -1 in its error state."""
+
+GOALS = ("Goal PWM", "Goal Current", "Goal Velocity", "Goal Position")
+
+CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, EXTENDED_MODE = 0, 1, 3, 4
+CURRENT_POSITION_MODE, PWM_MODE = 5, 16
+MODES = (0, 1, 3, 4, 5, 16)
+"""Operating Mode(11)."""
+
+BAUDS = (9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
+"""Baud Rate(8), by value."""
+
+MODE_RESETS = (
+    *("Velocity I Gain", "Velocity P Gain", "Position D Gain", "Position I Gain"),
+    *("Position P Gain", "Feedforward 2nd Gain", "Feedforward 1st Gain"),
+    *("Profile Acceleration", "Profile Velocity"),
+)
 
 _GAIN = (0, 16_383)
 
@@ -118,7 +136,9 @@ def rules(model: str) -> dict[str, Rule]:
     """Register rules of a model by the SDK's register names.
 
     Raises:
-        KeyError: the model cannot be simulated (see ``MODELS``).
+        ControlTableError: the model cannot be simulated.
 
     """
+    if model not in _OWN:
+        raise ControlTableError(f"{model}: not simulated; those that are: {', '.join(MODELS)}")
     return {**_X_SERIES, **_OWN[model]}

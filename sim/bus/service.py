@@ -3,7 +3,6 @@
 The two packets of a control cycle have a vectorised way in ``sim.bus.group`` with the same result.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,13 +17,10 @@ from drivers.protocol.packet import (
 )
 from sim.bus.fast_answer import encode_fast
 from sim.bus.firmware import Firmware
+from sim.bus.orders import Orders, word
 
 RETURN_DELAY_UNIT_S = 2e-6
 """Return Delay Time(9), e-manual."""
-CLEAR_TURNS = bytes((0x01, 0x44, 0x58, 0x4C, 0x22))
-"""Parameters of the Clear instruction, e-manual."""
-RESET_KEEPS = {0xFF: (), 0x01: ("ID",), 0x02: ("ID", "Baud Rate")}
-"""Factory Reset option -> registers that stay, e-manual."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +41,7 @@ class Service:
         self.version = 0
         """Grows whenever registers were written, so that others know what to look up again."""
         self.retune()
-        self._work: dict[int, Callable[[int, bytes], int]] = {
-            Instruction.WRITE: self._write,
-            Instruction.REG_WRITE: self._register_write,
-            Instruction.ACTION: self._action,
-            Instruction.REBOOT: self._reboot,
-            Instruction.FACTORY_RESET: self._factory_reset,
-            Instruction.CLEAR: self._clear,
-        }
+        self._orders = Orders(firmware)
 
     def retune(self) -> None:
         """Look up again who listens at the line's baud rate, under which ID."""
@@ -117,16 +106,16 @@ class Service:
         self.firmware.refresh()
         error, data = ResultError.DATA_LENGTH.value, b""
         if len(params) == 4:
-            error, data = self._block(row, _word(params, 0), _word(params, 2))
+            error, data = self._block(row, word(params, 0), word(params, 2))
         return [Answer(self.delay_s(row), self._status(row, servo_id, error, data))]
 
     def _sync_read(self, params: bytes, *, fast: bool) -> list[Answer]:
-        asked = [(each, _word(params, 0), _word(params, 2)) for each in params[4:]]
+        asked = [(each, word(params, 0), word(params, 2)) for each in params[4:]]
         return self._group_read(asked, fast)
 
     def _bulk_read(self, params: bytes, *, fast: bool) -> list[Answer]:
         asked = [
-            (params[at], _word(params, at + 1), _word(params, at + 3))
+            (params[at], word(params, at + 1), word(params, at + 3))
             for at in range(0, len(params) - 4, 5)
         ]
         return self._group_read(asked, fast)
@@ -157,7 +146,7 @@ class Service:
         return answers
 
     def _sync_write(self, params: bytes) -> list[Answer]:
-        address, length = _word(params, 0), _word(params, 2)
+        address, length = word(params, 0), word(params, 2)
         for at in range(4, len(params) - length, length + 1):
             row = int(self.rows[params[at]])
             if row >= 0:
@@ -170,8 +159,8 @@ class Service:
         while at + 5 <= len(params):
             row, address, length = (
                 int(self.rows[params[at]]),
-                _word(params, at + 1),
-                _word(params, at + 3),
+                word(params, at + 1),
+                word(params, at + 3),
             )
             data = params[at + 5 : at + 5 + length]
             if row >= 0 and len(data) == length:
@@ -181,44 +170,10 @@ class Service:
         return []
 
     def _one(self, row: int, code: int, params: bytes) -> int:
-        work = self._work.get(code)
-        error = work(row, params) if work is not None else ResultError.INSTRUCTION
+        error = self._orders.carry_out(row, code, params)
         self._written()
         return int(error)
-
-    def _write(self, row: int, params: bytes) -> int:
-        if len(params) < 3:
-            return ResultError.DATA_LENGTH
-        return self.bank.write(row, _word(params, 0), params[2:])
-
-    def _register_write(self, row: int, params: bytes) -> int:
-        if len(params) < 3:
-            return ResultError.DATA_LENGTH
-        return self.bank.register_write(row, _word(params, 0), params[2:])
-
-    def _action(self, row: int, params: bytes) -> int:
-        return self.bank.action(row) if not params else ResultError.DATA_LENGTH
-
-    def _reboot(self, row: int, params: bytes) -> int:
-        self.firmware.reboot(row)
-        return ResultError.NONE if not params else ResultError.DATA_LENGTH
-
-    def _factory_reset(self, row: int, params: bytes) -> int:
-        keep = RESET_KEEPS.get(params[0]) if len(params) == 1 else None
-        if keep is None:
-            return ResultError.DATA_RANGE
-        self.firmware.reboot(row, factory_keeping=keep)
-        return ResultError.NONE
-
-    def _clear(self, row: int, params: bytes) -> int:
-        if params != CLEAR_TURNS:
-            return ResultError.DATA_RANGE
-        return ResultError.NONE if self.firmware.clear_turns(row) else ResultError.RESULT_FAIL
 
     def _written(self) -> None:
         self.firmware.changed()
         self.retune()
-
-
-def _word(params: bytes, at: int) -> int:
-    return int.from_bytes(params[at : at + 2], "little")

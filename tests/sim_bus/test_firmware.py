@@ -8,9 +8,9 @@ import pytest
 from drivers.protocol.packet import ALERT, Instruction, ResultError
 from sim.bus.bank import ServoBank
 from sim.bus.bench import BenchPlant
-from sim.bus.firmware import Surroundings
 from sim.bus.line import SimLine
 from sim.bus.motor import MOTORS, TICKS_PER_RAD, make_drive, p_gain_per_rad
+from sim.bus.protection import Surroundings
 
 from .bus_helpers import a_line, ask, rad, read, write
 
@@ -25,7 +25,7 @@ def pause(line: SimLine, seconds: float) -> None:
 def held_line(load_n_m: float, **around: float) -> SimLine:
     """One servo, torque on, against a constant load."""
     plant = BenchPlant(1, dry_n_m=0.0, load_n_m=lambda q: np.full_like(q, load_n_m))
-    line = SimLine(ServoBank([1]), plant, surroundings=Surroundings(**around))
+    line = SimLine(ServoBank([1]), plant, surroundings=Surroundings(**{"supply_v": 12.0} | around))
     write(line, 1, 9, 0, 1)
     write(line, 1, 64, 1, 1)
     return line
@@ -95,6 +95,25 @@ def test_current_based_mode_gives_way_at_its_goal_current() -> None:
     assert held_line(-1.5).firmware.drive.current_limit_a[0] == np.inf
 
 
+def test_pwm_and_current_modes_push_as_told() -> None:
+    stuck = BenchPlant(2, inertia_kg_m2=1e6)
+    line = SimLine(ServoBank([1, 2]), stuck)
+    write(line, 1, 11, 16, 1)
+    write(line, 1, 100, -177, 2)
+    write(line, 2, 11, 0, 1)
+    write(line, 2, 102, 100, 2)
+    for servo in (1, 2):
+        write(line, servo, 64, 1, 1)
+    pause(line, 0.1)
+    amps = line.firmware.drive.current_a
+    supply_v = line.firmware.drive.supply_v[0]
+    assert amps[0] == pytest.approx(-0.2 * supply_v / XM430.resistance_ohm, rel=0.01)
+    assert amps[1] == pytest.approx(0.269)
+    write(line, 2, 102, 0, 2)
+    pause(line, 0.01)
+    assert amps[1] == 0.0
+
+
 def test_goal_pwm_limits_the_output() -> None:
     line = held_line(0.0)
     write(line, 1, 100, 177, 2)
@@ -113,6 +132,18 @@ def test_reverse_mode_and_homing_offset() -> None:
     assert read(line, 1, 132, 4) == 1998
     write(line, 1, 116, 1998, 4)
     assert line.firmware.drive.goal_rad[0] == pytest.approx(rad(2148))
+
+
+def test_a_new_mode_sets_gains_and_profile_back() -> None:
+    """E-manual, Operating Mode(11), note."""
+    line = a_line(1)
+    for address, value, size in ((84, 300, 2), (112, 40, 4), (100, 200, 2), (102, 100, 2)):
+        write(line, 1, address, value, size)
+    write(line, 1, 11, 5, 1)
+    seen = [
+        read(line, 1, address, size) for address, size in ((84, 2), (112, 4), (100, 2), (102, 2))
+    ]
+    assert seen == [800, 0, 885, 1193]
 
 
 def test_turns_count_in_extended_mode_until_reboot() -> None:
@@ -155,6 +186,16 @@ def test_watchdog_stops_the_servo_and_locks_its_goals() -> None:
     assert write(line, 1, 116, 2100, 4) == 0
     pause(line, 1.0)
     assert read(line, 1, 132, 4) == pytest.approx(2100, abs=1)
+
+
+def test_watchdog_stops_a_pushing_motor_too() -> None:
+    line = SimLine(ServoBank([1]), BenchPlant(1))
+    for address, value, size in ((11, 16, 1), (100, 300, 2), (98, 5, 1), (64, 1, 1)):
+        write(line, 1, address, value, size)
+    line.settle()
+    assert line.firmware.plant.velocity_rad_s[0] > 0.5
+    pause(line, 2.0)
+    assert line.firmware.plant.velocity_rad_s[0] == pytest.approx(0.0, abs=1e-3)
 
 
 def test_any_instruction_feeds_the_watchdog_of_all() -> None:
@@ -205,7 +246,7 @@ def test_heat_follows_i_squared_r_and_shuts_down_over_the_limit() -> None:
     rise = XM430.winding_k_per_w * amps**2 * XM430.resistance_ohm
     pause(line, 20.0)
     expected = 25.0 + rise * (1.0 - math.exp(-20.0 / XM430.thermal_time_s))
-    assert line.firmware.temperature_c[0] == pytest.approx(expected, abs=0.3)
+    assert line.firmware.protection.temperature_c[0] == pytest.approx(expected, abs=0.3)
     write(line, 1, 64, 0, 1)
     write(line, 1, 31, 26, 1)
     write(line, 1, 64, 1, 1)
@@ -221,6 +262,14 @@ def test_supply_sags_under_load() -> None:
     drawn_a = drive.pwm[0] * drive.current_a[0] + XM430.standby_a
     assert read(line, 1, 144, 2) == round(10 * (12.0 - 0.5 * drawn_a))
     assert read(line, 1, 144, 2) < 120
+
+
+def test_a_small_servo_has_its_own_nominal_supply() -> None:
+    line = a_line(1, model="XL330-M288")
+    write(line, 1, 64, 1, 1)
+    pause(line, 0.2)
+    assert read(line, 1, 144, 2) == 50
+    assert (read(line, 1, 0, 2), read(line, 1, 70, 1), read(line, 1, 64, 1)) == (1200, 0, 1)
 
 
 def test_low_supply_is_an_input_voltage_error_that_keeps_the_torque() -> None:

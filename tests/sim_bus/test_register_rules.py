@@ -2,6 +2,7 @@
 
 import pytest
 
+from drivers.errors import ControlTableError
 from drivers.protocol.packet import Instruction, ResultError
 from sim.bus.bank import ServoBank
 from sim.bus.line import SimLine
@@ -125,5 +126,7 @@ def test_factory_reset_keeps_what_was_asked() -> None:
 def test_a_bank_refuses_shared_ids_and_unknown_rates() -> None:
     with pytest.raises(ValueError, match="share an ID"):
         ServoBank([1, 1])
+    with pytest.raises(ControlTableError, match="XH540-V270: not simulated"):
+        ServoBank([1], "XH540-V270")
     with pytest.raises(ValueError, match="123 baud"):
         ServoBank([1], baud=123)

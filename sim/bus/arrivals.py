@@ -1,0 +1,54 @@
+"""Bytes on their way to the host, each with the time at which it will have arrived."""
+
+from collections import deque
+
+EARLY = 1e-6
+"""Share of a byte time by which rounding may make a byte late."""
+
+
+class Arrivals:
+    """Packets in the order in which the servos send them, taken out byte by byte."""
+
+    def __init__(self) -> None:
+        self.byte_s = 1e-5
+        """Time of one byte on the wire."""
+        self._packets: deque[tuple[float, bytes]] = deque()
+
+    def add(self, start_s: float, data: bytes) -> float:
+        """Put a packet on the wire at ``start_s``; when its last byte will have arrived."""
+        self._packets.append((start_s, data))
+        return start_s + len(data) * self.byte_s
+
+    def count(self, now_s: float) -> int:
+        """Bytes that have arrived and were not taken."""
+        return sum(self._arrived(packet, now_s) for packet in self._packets)
+
+    def due_s(self, count: int) -> float | None:
+        """When ``count`` bytes will have arrived; None if so many are not under way."""
+        for start_s, data in self._packets:
+            if len(data) >= count:
+                return start_s + count * self.byte_s
+            count -= len(data)
+        return None
+
+    def take(self, count: int, now_s: float) -> bytes:
+        """Up to ``count`` bytes of those that have arrived."""
+        packets, taken = self._packets, bytearray()
+        while packets and len(taken) < count:
+            start_s, data = packets[0]
+            ready = min(self._arrived(packets[0], now_s), count - len(taken))
+            taken += data[:ready]
+            if ready < len(data):
+                packets[0] = (start_s + ready * self.byte_s, data[ready:])
+                break
+            packets.popleft()
+        return bytes(taken)
+
+    def cut(self, at_s: float) -> None:
+        """Lose what has not arrived by ``at_s``."""
+        kept = [(packet[0], packet[1][: self._arrived(packet, at_s)]) for packet in self._packets]
+        self._packets = deque(packet for packet in kept if packet[1])
+
+    def _arrived(self, packet: tuple[float, bytes], now_s: float) -> int:
+        start_s, data = packet
+        return min(len(data), max(0, int((now_s - start_s) / self.byte_s + EARLY)))

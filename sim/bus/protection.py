@@ -1,0 +1,93 @@
+"""What a servo guards itself against: heat, a blocked shaft, a supply out of range.
+
+Detected faults go to Hardware Error Status(70); those in the mask of Shutdown(63) switch the torque
+off until a reboot (e-manual, Shutdown).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.bus.bank import ServoBank
+from sim.bus.motor import MotorModel
+from sim.plant import Plant, ServoDrive
+
+Floats = NDArray[np.float64]
+
+SLICE_S = 0.05
+"""How often this is looked at; the shafts are seen far more often."""
+OVERLOAD_S = 1.0
+"""How long a motor at full output may be held ("persistent load", e-manual; the time is ours)."""
+VOLTAGE_ERROR, OVERHEATING_ERROR, OVERLOAD_ERROR = 0x01, 0x04, 0x20
+"""Bits of Hardware Error Status(70) and Shutdown(63)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """Supply and air."""
+
+    supply_v: float
+    supply_ohm: float = 0.02
+    """Of battery and cable together: the voltage sags with the current of all servos."""
+    ambient_c: float = 25.0
+
+
+class Protection:
+    """Temperatures, supply and load of all servos of a bank."""
+
+    def __init__(
+        self, bank: ServoBank, drive: ServoDrive, motor: MotorModel, around: Surroundings
+    ) -> None:
+        self._bank, self._drive, self._motor, self._around = bank, drive, motor, around
+        self.temperature_c = np.full(len(bank), around.ambient_c)
+        """(S,) at the sensor: first order in the winding's loss."""
+        self._heat_j = np.zeros(len(bank))
+        self._blocked_s = np.zeros(len(bank))
+
+    def restart(self, rows: NDArray[np.intp]) -> None:
+        """Forget what led up to an overload; heat stays."""
+        self._blocked_s[rows] = 0.0
+
+    def pass_time(self, seconds: float) -> None:
+        """Add up the windings' loss at the present currents."""
+        amps = self._drive.current_a
+        self._heat_j += amps * amps * (seconds * self._motor.resistance_ohm)
+
+    def look(self, plant: Plant) -> bool:
+        """Judge one slice of ``SLICE_S``; whether registers have changed."""
+        self._warm_up()
+        volts = self._sag()
+        bank, drive = self._bank, self._drive
+        full = np.abs(drive.pwm) >= 0.98 * drive.pwm_limit
+        along_rad_s = np.sign(drive.pwm) * plant.velocity_rad_s
+        held = full & (along_rad_s < 0.05 * self._motor.no_load_rad_s) & (drive.torque_on > 0)
+        self._blocked_s = np.where(held, self._blocked_s + SLICE_S, 0.0)
+        tenths = round(volts * 10.0)
+        outside = (tenths < bank["Min Voltage Limit"]) | (tenths > bank["Max Voltage Limit"])
+        errors = (
+            VOLTAGE_ERROR * outside
+            | OVERHEATING_ERROR * (np.rint(self.temperature_c) > bank["Temperature Limit"])
+            | OVERLOAD_ERROR * (self._blocked_s >= OVERLOAD_S)
+        )
+        if not errors.any():
+            return False
+        bank["Hardware Error Status"][:] |= errors.astype(np.uint8)
+        bank["Torque Enable"][(bank["Hardware Error Status"] & bank["Shutdown"]) != 0] = 0
+        return True
+
+    def _warm_up(self) -> None:
+        motor = self._motor
+        watts = self._heat_j / SLICE_S
+        target_c = self._around.ambient_c + motor.winding_k_per_w * watts
+        share = 1.0 - np.exp(-SLICE_S / motor.thermal_time_s)
+        self.temperature_c += (target_c - self.temperature_c) * share
+        self._heat_j[:] = 0.0
+
+    def _sag(self) -> float:
+        drive = self._drive
+        servos_a = float(np.abs(drive.pwm * drive.current_a).sum())
+        drawn_a = servos_a + self._motor.standby_a * len(self._bank)
+        volts = self._around.supply_v - self._around.supply_ohm * drawn_a
+        drive.supply_v[:] = volts
+        return volts

@@ -1,0 +1,249 @@
+"""One contract for every joint link: whatever answers on the bus, this is what a link promises.
+
+In process on a bench and on MuJoCo by default; on metal with ``pytest -m metal --port DEVICE``
+(``--robot`` says which), where the robot must stand free: joints move by up to 0.1 rad.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from config.loader import load_robot
+from config.robot import RobotConfig
+from config.run import SafetyConfig
+from config.world import WorldConfig
+from drivers.bus import DynamixelBus
+from drivers.chain import ServoChain
+from drivers.errors import ChainError, DriverError
+from drivers.link import JointLink
+from drivers.port import BytePort
+from drivers.safe_link import SafeLink
+from drivers.safety import SafetyLimits
+from drivers.types import JointCommand, JointState
+from sim.bus.bank import ServoBank
+from sim.bus.bench import BenchPlant
+from sim.bus.line import SimLine
+from sim.plant import Plant
+
+PERIOD_S = 0.02
+TRIO = RobotConfig(name="trio", joint_axes="ypy")
+START_RAD = [0.3, 0.0, -0.2]
+
+
+@dataclass
+class Backend:
+    """A link, and what stands behind it."""
+
+    link: JointLink
+    port: BytePort
+    robot: RobotConfig
+    line: SimLine | None
+    """The simulated line; None on metal."""
+
+    def cycles(self, count: int, goal: Callable[[float], np.ndarray] | None = None) -> JointState:
+        """Write and read at 50 Hz, hold the pose if no goal is given; the last state."""
+        clock = self.port.clock
+        state, start_s = self.link.read(), clock.now_s()
+        hold = state.position_rad
+        for k in range(count):
+            wanted = hold if goal is None else goal(clock.now_s() - start_s)
+            self.link.write(JointCommand(clock.now_s(), wanted))
+            state = self.link.read()
+            clock.sleep_until_s(start_s + (k + 1) * PERIOD_S)
+        return state
+
+
+def bench() -> Plant:
+    return BenchPlant(TRIO.joint_count, start_rad=START_RAD)
+
+
+def mujoco() -> Plant:
+    from sim.physics.plant import MujocoPlant
+
+    plant = MujocoPlant(TRIO, WorldConfig(name="flat"), compiled=False)
+    plant.reset((0.0, 0.0), 0.0, START_RAD)
+    return plant
+
+
+def bare(port: BytePort, robot: RobotConfig) -> JointLink:
+    return ServoChain(DynamixelBus(port, robot.servo.model), robot)
+
+
+def safe(port: BytePort, robot: RobotConfig) -> JointLink:
+    limits = SafetyLimits.from_config(robot, SafetyConfig())
+    return SafeLink(bare(port, robot), limits, port.clock)
+
+
+needs_mujoco = pytest.mark.skipif(find_spec("mujoco") is None, reason="MuJoCo is not installed")
+BACKENDS = [
+    pytest.param(bench, id="bench"),
+    pytest.param(mujoco, id="mujoco", marks=needs_mujoco),
+    pytest.param(None, id="metal", marks=pytest.mark.metal),
+]
+
+
+@pytest.fixture(params=BACKENDS)
+def make_port(request: pytest.FixtureRequest) -> Iterator[tuple[BytePort, RobotConfig]]:
+    if request.param is not None:
+        bank = ServoBank(TRIO.servo_ids, TRIO.servo.model, TRIO.servo.baud)
+        yield SimLine(bank, request.param(), baud=TRIO.servo.baud), TRIO
+        return
+    device = request.config.getoption("--port")
+    if device is None:
+        pytest.skip("give the bus with --port")
+    from drivers.serial_port import SerialPort
+
+    robot = load_robot(request.config.getoption("--robot"))
+    with SerialPort(device, robot.servo.baud) as port:
+        yield port, robot
+
+
+@pytest.fixture(params=[bare, safe])
+def backend(
+    request: pytest.FixtureRequest, make_port: tuple[BytePort, RobotConfig]
+) -> Iterator[Backend]:
+    port, robot = make_port
+    line = port if isinstance(port, SimLine) else None
+    made = Backend(request.param(port, robot), port, robot, line)
+    yield made
+    if line is not None:
+        line.openPort()
+        line.tamper = None
+    made.link.disable()
+
+
+def simulated(backend: Backend) -> SimLine:
+    if backend.line is None:
+        pytest.skip("needs a line that fails on demand")
+    return backend.line
+
+
+def test_enable_moves_nothing(backend: Backend) -> None:
+    found = backend.link.enable()
+    later = backend.cycles(25)
+    assert np.abs(later.position_rad - found.position_rad).max() < 0.02
+    if backend.line is not None:
+        assert np.abs(found.position_rad - START_RAD).max() < 0.05
+        assert backend.line.firmware.drive.torque_on.all()
+
+
+def test_goals_are_followed(backend: Backend) -> None:
+    start = backend.link.enable().position_rad
+
+    def goal(time_s: float) -> np.ndarray:
+        return np.asarray(start - np.sign(start) * 0.1 * min(1.0, time_s / 0.5))
+
+    state = backend.cycles(60, goal)
+    assert np.abs(state.position_rad - goal(1.0)).max() < 0.05
+    assert np.abs(state.velocity_rad_s).max() < 0.3
+
+
+def test_state_is_whole_and_read_only(backend: Backend) -> None:
+    state = backend.link.enable()
+    joints = backend.link.joint_count
+    assert joints == backend.robot.joint_count
+    for name in JointState.__slots__[1:]:
+        array = getattr(state, name)
+        assert array.shape == (joints,), name
+        assert not array.flags.writeable, name
+        assert np.isfinite(array).all(), name
+    assert state.valid.all()
+    assert not state.hardware_error.any()
+    assert ((state.temperature_c > 0) & (state.temperature_c < 80)).all()
+    assert (state.voltage_v > 3.0).all()
+
+
+def test_time_runs_on_and_fresh_values_have_no_age(backend: Backend) -> None:
+    first = backend.link.enable()
+    second = backend.cycles(5)
+    assert second.time_s > first.time_s
+    assert second.time_s <= backend.port.clock.now_s()
+    assert second.valid.all()
+    assert (second.age_s >= 0).all()
+    assert second.age_s.max() < PERIOD_S
+
+
+def test_a_goal_that_is_no_number_never_leaves(backend: Backend) -> None:
+    goal = backend.link.enable().position_rad.copy()
+    goal[0] = np.nan
+    sent = None if backend.line is None else backend.line.bank["Goal Position"].tolist()
+    with pytest.raises((ValueError, DriverError)):
+        backend.link.write(JointCommand(backend.port.clock.now_s(), goal))
+    if backend.line is not None:
+        backend.line.settle()
+        assert backend.line.bank["Goal Position"].tolist() == sent
+
+
+def test_disable_may_come_at_any_time(backend: Backend) -> None:
+    backend.link.disable()
+    backend.link.enable()
+    backend.link.disable()
+    backend.link.disable()
+    assert backend.link.read().valid.all()
+    if backend.line is not None:
+        assert not backend.line.firmware.drive.torque_on.any()
+
+
+def test_enable_again_after_disable(backend: Backend) -> None:
+    backend.link.enable()
+    backend.cycles(5)
+    backend.link.disable()
+    found = backend.link.enable()
+    later = backend.cycles(10)
+    assert np.abs(later.position_rad - found.position_rad).max() < 0.02
+
+
+def test_failed_reads_hold_values_and_age(backend: Backend) -> None:
+    line = simulated(backend)
+    backend.link.enable()
+    good = backend.link.read()
+    line.tamper = lambda _: []
+    ages = []
+    for _ in range(3):
+        state = backend.link.read()
+        assert not state.valid.any()
+        assert state.position_rad.tolist() == good.position_rad.tolist()
+        assert state.current_a.tolist() == good.current_a.tolist()
+        ages.append(float(state.age_s.min()))
+    assert ages == sorted(set(ages))
+    assert ages[0] > 0.0
+    line.tamper = None
+    assert backend.link.read().valid.all()
+
+
+def test_a_bent_answer_is_never_taken_for_a_value(backend: Backend) -> None:
+    line = simulated(backend)
+    backend.link.enable()
+    good = backend.link.read()
+    line.tamper = lambda answer: [answer[:-6] + bytes((answer[-6] ^ 0x40,)) + answer[-5:]]
+    for _ in range(6):
+        state = backend.link.read()
+        assert np.abs(state.position_rad - good.position_rad).max() < 0.02
+
+
+def test_a_servo_with_an_alarm_is_not_enabled(backend: Backend) -> None:
+    line = simulated(backend)
+    line.bank["Hardware Error Status"][1] = 0x20
+    with pytest.raises(ChainError, match="overload"):
+        backend.link.enable()
+    assert not line.firmware.drive.torque_on.any()
+
+
+def test_the_servos_stop_by_themselves_when_the_host_is_gone(backend: Backend) -> None:
+    line = simulated(backend)
+    backend.link.enable()
+    backend.cycles(5)
+    line.clock.advance(1.0)
+    line.settle()
+    assert (line.bank["Bus Watchdog"] == 0xFF).all()
+
+
+def test_a_lost_port_is_an_error_that_says_so(backend: Backend) -> None:
+    line = simulated(backend)
+    backend.link.enable()
+    line.closePort()
+    with pytest.raises(DriverError, match="closed"):
+        backend.link.read()
