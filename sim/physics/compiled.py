@@ -1,7 +1,7 @@
-"""The steps of a plant without Python between them: drive, friction and ``mj_step``, compiled.
+"""The steps of a plant without Python between them: drive, friction and MuJoCo's step, compiled.
 
-Friction uses the contacts of the step before (place, normal and force) and the velocities of now.
-Drive and friction enter as generalised forces, friction by one pass down and one up the chain.
+``mj_step1`` and ``mj_step2`` are called by address; drive and friction enter between the two as
+generalised forces. ``sim.physics.interpreted`` does the same in numpy and says why so.
 """
 
 from typing import Any
@@ -50,27 +50,26 @@ pointer = intrinsic(_pointer)
 call = intrinsic(_call)
 
 
-def _link_velocities(v: Floats, w: Floats, qvel: Floats, chain: tuple[Floats, ...]) -> None:
-    """Velocity of each link's centre and its spin in the world, head to tail."""
-    centre, rotation, anchor, axis = chain
+def _move(
+    v: Floats,
+    w: Floats,
+    before: Floats,
+    qvel: Floats,
+    chain: tuple[Floats, ...],
+    step_s: float,
+) -> None:
+    """Rate at which each link's centre moved in the last step, and its spin, head to tail."""
+    centre, rotation, _, axis = chain
     for k in range(3):
-        v[0, k] = qvel[k]
         w[0, k] = 0.0
         for i in range(3):
             w[0, k] += rotation[1, 3 * k + i] * qvel[3 + i]
-    for i in range(1, len(v)):
-        a0 = anchor[i, 0] - centre[i, 0]
-        a1 = anchor[i, 1] - centre[i, 1]
-        a2 = anchor[i, 2] - centre[i, 2]
-        b0 = centre[i + 1, 0] - anchor[i, 0]
-        b1 = centre[i + 1, 1] - anchor[i, 1]
-        b2 = centre[i + 1, 2] - anchor[i, 2]
+    for i in range(len(v)):
         for k in range(3):
-            w[i, k] = w[i - 1, k] + axis[i, k] * qvel[5 + i]
-        p, s = w[i - 1], w[i]
-        v[i, 0] = v[i - 1, 0] + p[1] * a2 - p[2] * a1 + s[1] * b2 - s[2] * b1
-        v[i, 1] = v[i - 1, 1] + p[2] * a0 - p[0] * a2 + s[2] * b0 - s[0] * b2
-        v[i, 2] = v[i - 1, 2] + p[0] * a1 - p[1] * a0 + s[0] * b1 - s[1] * b0
+            v[i, k] = (centre[i + 1, k] - before[i, k]) / step_s
+            before[i, k] = centre[i + 1, k]
+            if i > 0:
+                w[i, k] = w[i - 1, k] + axis[i, k] * qvel[5 + i]
 
 
 def _collect(wrench: Floats, qfrc: Floats, chain: tuple[Floats, ...]) -> None:
@@ -108,14 +107,14 @@ def _add_friction(
     """Ellipse at every contact of now under the load of the last step, collected into ``qfrc``."""
     reals, integers, count, at = contacts
     size, at_dist, at_place, at_up, at_geom, _ = at
-    v, w, wrench, depth = work
+    v, w, wrench, depth, before = work
     mu_along, mu_across, still, step_s = law
     centre, rotation = chain[0], chain[1]
     depth[:] = 0.0
     for c in range(count):
         i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
         depth[i] += max(-reals[size * c + at_dist], LEAST_DEPTH_M)
-    _link_velocities(v, w, qvel, chain)
+    _move(v, w, before, qvel, chain, step_s)
     wrench[:] = 0.0
     for c in range(count):
         i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
@@ -175,7 +174,7 @@ def _steps(
     load: Floats,
     totals: Floats,
 ) -> None:
-    """``steps`` times: drive, friction, ``mj_step``."""
+    """Advance: ``mj_step1``, drive, friction, ``mj_step2``, so often."""
     qpos, qvel, qfrc = state
     on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit, current, torque, pwm = drive
     joints = len(goal)
@@ -210,23 +209,21 @@ def _steps(
             )
             qfrc[6 + j] = torque[j] - gear_drag * qvel[6 + j]
         count = ncon[0]
-        if count > 0:
-            address = pointer(contact_list[0])
-            contacts = (
-                carray(address, (count * at[0],), np.float64),
-                carray(address, (count * at[0] * 2,), np.int32),
-                count,
-                at,
-            )
-            _add_friction(contacts, qfrc, qvel, chain, work, geom_body, law, load, totals)
+        address = pointer(contact_list[0])
+        contacts = (
+            carray(address, (count * at[0],), np.float64),
+            carray(address, (count * at[0] * 2,), np.int32),
+            count,
+            at,
+        )
+        _add_friction(contacts, qfrc, qvel, chain, work, geom_body, law, load, totals)
         call(step2, model, data)
         load[:] = 0.0
-        if count > 0:
-            force_n = carray(pointer(force_list[0]), (1 << 30,), np.float64)
-            _weigh(load, contacts, force_n, geom_body)
+        force_n = carray(pointer(force_list[0]), (1 << 30,), np.float64)
+        _weigh(load, contacts, force_n, geom_body)
 
 
-register_jitable(_link_velocities)
+register_jitable(_move)
 register_jitable(_collect)
 register_jitable(_add_friction)
 register_jitable(_weigh)
@@ -234,7 +231,7 @@ run_steps = njit(cache=True)(_steps)
 
 
 class CompiledSteps:
-    """Drive, friction and ``mj_step`` in one compiled loop."""
+    """Drive, friction and MuJoCo's step in one compiled loop."""
 
     def __init__(self, mechanics: Mechanics, layout: StepLayout) -> None:
         m = self._m = mechanics
@@ -266,6 +263,7 @@ class CompiledSteps:
             np.zeros((links, 3)),
             np.zeros((links, 6)),
             np.zeros(links),
+            m.before_m,
         )
         self._law = (m.mu_along, m.mu_across, m.still_n_s_m, m.step_s)
 

@@ -1,4 +1,11 @@
-"""The steps of a plant in numpy: where numba is absent, and to check the compiled ones against."""
+"""The steps of a plant in numpy: where numba is absent, and to check the compiled ones against.
+
+Friction acts at the contacts of now under the load of the last step, which the contacts of a link
+share by depth. A link slides at the rate at which it *moved* in the last step. Its generalised
+velocity is not that rate: Euler's step moves the head along its velocity and leaves out the turning
+of the links within the step, which reads as 1 mm/s of phantom motion per millisecond of step, and
+as a loss of 6 % of speed under isotropic friction at 2 ms.
+"""
 
 import mujoco
 import numpy as np
@@ -6,7 +13,7 @@ from numpy.typing import NDArray
 
 from sim.physics.drive import drive_shafts
 from sim.physics.friction import ellipse_forces
-from sim.physics.mechanics import LEAST_DEPTH_M, Mechanics
+from sim.physics.mechanics import LEAST_DEPTH_M, Mechanics, velocities
 from sim.plant import ServoDrive
 
 Floats = NDArray[np.float64]
@@ -42,8 +49,9 @@ def friction_forces(m: Mechanics) -> Floats:
     share = depth / np.bincount(link, depth, len(m.load_n))[link]
     normal_n = load * share
     place, up = contacts.pos, contacts.frame[:, :3]
-    velocity, spin = link_velocities(m)
     centre = d.xipos[1:]
+    velocity, (_, spin) = (centre - m.before_m) / m.step_s, velocities(d)
+    m.before_m[:] = centre
     arm = place - centre[link]
     sliding = velocity[link] + np.cross(spin[link], arm)
     forward = d.xmat[1:].reshape(-1, 3, 3)[link, :, 0]
@@ -65,13 +73,3 @@ def friction_forces(m: Mechanics) -> Floats:
     out[:3] = behind[0, :3]
     out[3:6] = (behind[0, 3:] - np.cross(centre[0], behind[0, :3])) @ d.xmat[1].reshape(3, 3)
     return out
-
-
-def link_velocities(m: Mechanics) -> tuple[Floats, Floats]:
-    """Velocity of the links' centres and their spins, world frame, (L, 3) each."""
-    d = m.data
-    centre, anchor = d.xipos[1:], d.xanchor[1:]
-    head_spin = d.xmat[1].reshape(3, 3) @ d.qvel[3:6]
-    spin = np.vstack([head_spin, d.xaxis[1:] * d.qvel[6:, None]]).cumsum(axis=0)
-    rise = np.cross(spin[:-1], anchor - centre[:-1]) + np.cross(spin[1:], centre[1:] - anchor)
-    return np.vstack([d.qvel[:3], rise]).cumsum(axis=0), spin

@@ -30,6 +30,8 @@ class Mechanics:
     """Viscous loss of a gearbox, powered or not."""
     load_n: Floats
     """(L,) what the ground bore of each link in the last step, N."""
+    before_m: Floats
+    """(L, 3) centres of the links at the start of the last step."""
     totals: Floats = field(default_factory=lambda: np.zeros(2))
     """Energy lost to ground friction, J; way slipped across the links, mean of all links, m."""
 
@@ -44,9 +46,9 @@ class Mechanics:
         """Gather what the steps need."""
         still = STOP_SHARE * robot.link_mass_kg / float(model.opt.timestep)
         mu = world.friction
-        load = np.zeros(robot.joint_count + 1)
+        load, before = np.zeros(robot.joint_count + 1), np.zeros((robot.joint_count + 1, 3))
         data = mujoco.MjData(model)
-        return cls(model, data, mu.along, mu.across, still, gear_drag_n_m_s, load)
+        return cls(model, data, mu.along, mu.across, still, gear_drag_n_m_s, load, before)
 
     @property
     def joint_count(self) -> int:
@@ -58,6 +60,11 @@ class Mechanics:
         """Length of a step."""
         return float(self.model.opt.timestep)
 
+    def rest(self) -> None:
+        """Take note of a state that was set, not stepped to; ``mj_forward`` was just called."""
+        self.before_m[:] = self.data.xipos[1:] - self.step_s * velocities(self.data)[0]
+        self.weigh()
+
     def weigh(self) -> None:
         """Read ``load_n`` off the contact forces in the data."""
         d = self.data
@@ -65,3 +72,12 @@ class Mechanics:
         bears = row >= 0
         link = self.model.geom_bodyid[d.contact.geom[bears, 1]] - 1
         self.load_n[:] = np.bincount(link, d.efc_force[row[bears]], len(self.load_n))
+
+
+def velocities(data: mujoco.MjData) -> tuple[Floats, Floats]:
+    """Velocity of the links' centres and their spins, world frame, (L, 3) each."""
+    centre, anchor = data.xipos[1:], data.xanchor[1:]
+    head_spin = data.xmat[1].reshape(3, 3) @ data.qvel[3:6]
+    spin = np.vstack([head_spin, data.xaxis[1:] * data.qvel[6:, None]]).cumsum(axis=0)
+    rise = np.cross(spin[:-1], anchor - centre[:-1]) + np.cross(spin[1:], centre[1:] - anchor)
+    return np.vstack([data.qvel[:3], rise]).cumsum(axis=0), spin

@@ -51,7 +51,7 @@ def place(
     _settle(m, np.array(limp, dtype=int))
     data.qvel[:] = 0.0
     mujoco.mj_forward(model, data)
-    m.weigh()
+    m.rest()
 
 
 def _settle(m: Mechanics, limp: NDArray[np.int_]) -> None:
