@@ -13,7 +13,7 @@ from config.run import RunConfig
 from config.world import WorldConfig
 
 M = TypeVar("M", bound=BaseModel)
-Kind = Literal["robots", "worlds", "runs"]
+Kind = Literal["robots", "worlds", "runs", "recordings"]
 
 
 def shipped(kind: Kind) -> tuple[str, ...]:

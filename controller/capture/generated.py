@@ -1,66 +1,57 @@
-"""Embedded recordings: tracks made by formula from figures of real animals, each with its source.
+"""Shipped recordings: tracks made by formula from figures of real animals (``config/recordings``).
 
-``worm-like``: crawling *C. elegans*. Figures measured from the recording of Broekmans et al. 2016
-(eLife 5:e17227, CC BY; joint angles as published with elegansbot, MIT): bends of the body of up to
-1 rad a joint of 24, forward waves between 1 and 2 a body, and turns whose head bends by more
-than a half circle. ``lamprey-like``: steadily swimming sea lamprey, wave of 0.57 body lengths at
-3.85 Hz (measured from the recording of fishmechr, E. D. Tytell, CC BY 4.0), lateral movement
-growing towards the tail.
+What the head does at a moment runs down the body at pulse speed, scaled by the envelope measured on
+the animal: ``theta(s, t) = a(s) g(tau) sin(phase(tau)) + heading(tau)``, ``tau = t - s / pulse``.
+Same figures, same numbers: nothing is random.
 """
 
-from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
+from config.loader import load, locate, shipped
+from config.recording import RecordingConfig
+from controller.capture.formats import load_track
+from controller.capture.resample import SEGMENTS, body_points
+from controller.capture.track import Track
 
 Floats = NDArray[np.float64]
+EMBEDDED = shipped("recordings")
+"""Names of the shipped recordings."""
+_FINE = 64  # samples a cycle of the head's script
 
 
-@dataclass(frozen=True, slots=True)
-class AngleRecording:
-    """Tangent angles over time."""
-
-    name: str
-    angles_rad: Floats
-    """(T, 100), head first, unwrapped."""
-    rate_hz: float
-
-
-def _wave(
-    waves: float, rate_hz: float, cycle_s: float, seconds: float, head: float, tail: float
-) -> Floats:
-    """Travelling wave of tangent angle, amplitude growing linearly from head to tail."""
-    s = (np.arange(100) + 0.5) / 100
-    t = np.arange(round(seconds * rate_hz)) / rate_hz
-    amplitude = head + (tail - head) * s
-    return np.asarray(amplitude * np.sin(2 * np.pi * (t[:, None] / cycle_s - waves * s)))
-
-
-def worm_like() -> AngleRecording:
-    """Crawl with bends and turns, 32 Hz."""
-    s = (np.arange(100) + 0.5) / 100
-    angles = _wave(1.25, 32.0, 2.0, 12.0, 0.85, 0.65)
-    time = np.arange(len(angles)) / 32.0
-    # turns: a bend that is made at the head, travels down the body and leaves at the tail
-    for at_s, size_rad in ((3.0, 1.2), (6.0, -1.2), (9.0, 0.8)):
-        front = (time - at_s)[:, None] / 2.0 - s
-        angles = angles + size_rad / (1.0 + np.exp(-front / 0.15)) - size_rad
-    return AngleRecording("worm-like", angles, 32.0)
+def generate(figures: RecordingConfig) -> Track:
+    """Make the track: 100 segments a frame, the head travelling along its own tangent."""
+    s = (np.arange(SEGMENTS) + 0.5) / SEGMENTS
+    pulse = figures.frequency_hz / figures.waves  # body lengths a second
+    seconds = sum(e.cycles for e in figures.episodes) / figures.frequency_hz
+    time = np.arange(round(seconds * figures.rate_hz) + 1) / figures.rate_hz
+    tau = time[:, None] - s / pulse
+    at, gain, phase, heading = _script(figures, -1.0 / pulse, seconds)
+    stations = np.linspace(0.0, 1.0, len(figures.envelope_rad))
+    swing = np.interp(s, stations, figures.envelope_rad) * np.interp(tau, at, gain)
+    angles = swing * np.sin(np.interp(tau, at, phase)) + np.interp(tau, at, heading)
+    front = angles[:, 0]
+    step = np.stack([np.cos(front), np.sin(front)], axis=-1)
+    way = np.cumsum(step, axis=0) * (figures.travel * pulse / figures.rate_hz)
+    return Track(
+        name=figures.name,
+        angles_rad=np.asarray(angles),
+        points=(body_points(angles) + way[:, None, :]) * figures.length_m,
+        time_s=time,
+        rate_hz=figures.rate_hz,
+        length_m=figures.length_m,
+        dropped=0,
+        source=figures.source,
+        licence=figures.licence,
+    )
 
 
-def lamprey_like() -> AngleRecording:
-    """Steady swimming at 50 Hz, slow and fast bends, wave of 0.57 body lengths."""
-    angles = _wave(1.0 / 0.57, 50.0, 1.0 / 3.85, 1.6, 0.25, 0.6)
-    return AngleRecording("lamprey-like", angles, 50.0)
-
-
-EMBEDDED = {"worm-like": worm_like, "lamprey-like": lamprey_like}
-
-
-def embedded(name: str) -> AngleRecording:
-    """Make an embedded recording by name.
+def embedded(name: str) -> Track:
+    """Make a shipped recording by name.
 
     Raises:
         InputError: there is none of that name.
@@ -68,4 +59,47 @@ def embedded(name: str) -> AngleRecording:
     """
     if name not in EMBEDDED:
         raise InputError(f"track {name!r}: no such recording; embedded are {', '.join(EMBEDDED)}")
-    return EMBEDDED[name]()
+    return generate(load(locate("recordings", name), RecordingConfig))
+
+
+def load_named_track(name_or_path: str, rate_hz: float | None = None) -> Track:
+    """Load a shipped recording by name, or a file (``formats.load_track``) by path.
+
+    ``rate_hz`` is for files only. A path has an ending or a folder in it; a name has neither.
+
+    Raises:
+        InputError: neither exists, or the file is at fault.
+
+    """
+    if name_or_path in EMBEDDED:
+        return embedded(name_or_path)
+    path = Path(name_or_path)
+    if path.suffix == ".toml" and path.is_file():
+        return generate(load(path, RecordingConfig))
+    if path.suffix or path.is_file() or len(path.parts) > 1:
+        return load_track(path, rate_hz)
+    return embedded(name_or_path)
+
+
+def _script(
+    figures: RecordingConfig, start_s: float, stop_s: float
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Time, gain, phase and heading of the head, from before the start to the end."""
+    count = int((stop_s - start_s) * figures.frequency_hz * _FINE) + 2
+    at = np.linspace(start_s, stop_s, count)
+    gain = np.full(count, figures.episodes[0].gain)
+    waves = np.full(count, figures.episodes[0].waves or figures.waves)
+    heading = np.zeros(count)
+    begin_s, last_gain, last_waves = 0.0, float(gain[0]), float(waves[0])
+    for episode in figures.episodes:
+        span_s = episode.cycles / figures.frequency_hz
+        u = np.clip((at - begin_s) / span_s, 0.0, 1.0)
+        ease = u * u * (3.0 - 2.0 * u)
+        next_waves = episode.waves or figures.waves
+        gain += (episode.gain - last_gain) * ease
+        waves += (next_waves - last_waves) * ease
+        heading += episode.turn_rad * ease
+        begin_s, last_gain, last_waves = begin_s + span_s, episode.gain, next_waves
+    rate = 2.0 * np.pi * figures.frequency_hz * waves / figures.waves
+    phase = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(at))])
+    return at, gain, phase, heading

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
-from controller.shape.states import random_states, to_angles, to_states
+from controller.shape.states import energy_kept, random_states, to_angles, to_states
 
 Floats = NDArray[np.float64]
 Refuse = Callable[[Floats], NDArray[np.bool_]]
@@ -26,6 +26,8 @@ class StateLibrary:
     """The first so many come from the recording, the rest are random."""
     rejected: dict[str, int]
     """Random and recorded states refused, by the first reason."""
+    energy_kept: float
+    """Share of the recorded shapes' energy that the coefficients hold, mean over the frames."""
 
     @property
     def counts(self) -> dict[str, int]:
@@ -68,7 +70,8 @@ def build_library(
             f"(refused for {reasons}); lower behaviour.curvature or states.gain_limit, raise the "
             "robot's joint limits, or take another track"
         )
-    return StateLibrary(np.concatenate([recorded, fresh]), len(recorded), rejected)
+    kept = float(energy_kept(track_rad, coefficients).mean())
+    return StateLibrary(np.concatenate([recorded, fresh]), len(recorded), rejected, kept)
 
 
 def _passing(shapes: Floats, tests: dict[str, Refuse], rejected: dict[str, int]) -> Floats:

@@ -1,7 +1,8 @@
 """Shape states: a body's tangent angles as a few Fourier coefficients ([PT] 2.5).
 
 Corrections to the printed text: angles are unwrapped first, or rotation invariance fails across
-+-pi; coefficient 0 belongs to the padded signal and is not the body's mean heading.
++-pi; coefficient 0 belongs to the padded signal and is not the body's mean heading; and 99 % of the
+energy in seven coefficients holds up to four or five waves on the body, not beyond.
 """
 
 import numpy as np
@@ -9,26 +10,40 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+PADDING = 0.28
+"""Samples appended per sample of the body: 100 become 128.
+
+The text leaves it open. On five recordings 0.28 keeps the most energy in seven coefficients; 1
+would spend half of them on the padding (99 % only up to three waves), 0.1 leaves a steep flank.
+"""
 
 
 def pad(angles_rad: Floats) -> Floats:
-    """Append N samples from last back to first, so that the periodic extension has no jump.
+    """Append samples from last back to first, so that the periodic extension has no jump.
 
     Args:
         angles_rad: (..., N) unwrapped.
 
     Returns:
-        (..., 2 N).
+        (..., N + round(0.28 N)).
 
     """
-    points = angles_rad.shape[-1]
-    blend = np.arange(1, points + 1) / (points + 1)
+    extra = padded_length(angles_rad.shape[-1]) - angles_rad.shape[-1]
+    blend = np.arange(1, extra + 1) / (extra + 1)
     first, last = angles_rad[..., :1], angles_rad[..., -1:]
     return np.concatenate([angles_rad, last + blend * (first - last)], axis=-1)
 
 
+def padded_length(points: int) -> int:
+    """Samples of the padded signal of a body of ``points`` samples."""
+    return points + round(PADDING * points)
+
+
 def to_states(angles_rad: Floats, coefficients: int = 7) -> Complexes:
-    """Coefficients 1..n of the padded tangent angles: (..., n), free of place, heading and size."""
+    """Coefficients 1..n of the padded tangent angles: (..., n), free of place, heading and size.
+
+    Not normalised: a wave of amplitude a that fills the padded signal has modulus 64 a.
+    """
     spectrum = np.fft.fft(pad(np.unwrap(angles_rad, axis=-1)), axis=-1)
     return np.asarray(spectrum[..., 1 : coefficients + 1])
 
@@ -38,17 +53,23 @@ def to_angles(states: Complexes, points: int = 100) -> Floats:
 
     The upper half is the conjugate mirror; ``R^H`` of the text is already conjugated and reversed.
     """
-    spectrum = np.zeros((*states.shape[:-1], points + 1), dtype=complex)
+    length = padded_length(points)
+    spectrum = np.zeros((*states.shape[:-1], length // 2 + 1), dtype=complex)
     spectrum[..., 1 : states.shape[-1] + 1] = states
-    angles = np.fft.irfft(spectrum, n=2 * points, axis=-1)[..., :points]
+    angles = np.fft.irfft(spectrum, n=length, axis=-1)[..., :points]
     return np.asarray(angles - angles.mean(axis=-1, keepdims=True))
 
 
 def energy_kept(angles_rad: Floats, coefficients: int = 7) -> Floats:
-    """Share (...) of the shape's energy (heading left out) that the coefficients hold."""
+    """Share (...) of the shape's energy (heading left out) that the coefficients hold.
+
+    A straight body has none to lose: 1.
+    """
     spectrum = np.fft.rfft(pad(np.unwrap(angles_rad, axis=-1)), axis=-1)
     power = np.abs(spectrum[..., 1:]) ** 2
-    return np.asarray(power[..., :coefficients].sum(axis=-1) / power.sum(axis=-1))
+    total = power.sum(axis=-1)
+    kept = power[..., :coefficients].sum(axis=-1)
+    return np.asarray(np.where(total > 0.0, kept / np.where(total > 0.0, total, 1.0), 1.0))
 
 
 def random_states(states: Complexes, count: int, rng: np.random.Generator) -> Complexes:

@@ -1,0 +1,103 @@
+"""Recordings as tables: midlines point by point, and SLEAP keypoints frame by frame."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.errors import InputError
+from controller.capture.track import Track, track_from_points
+
+Floats = NDArray[np.float64]
+SLEAP_RATE_HZ = 30.0
+"""Taken when nobody says otherwise: SLEAP's tables hold no frame rate."""
+_MIDLINE = {("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0}
+
+
+def load_csv(file: Path, rate_hz: float | None) -> Track:
+    """Load either table; see ``formats.load_track``."""
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as stream:
+            rows = [row for row in csv.reader(stream) if row]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{file}: is no text table: {error}") from None
+    if len(rows) < 2:
+        raise InputError(f"{file}: expected a line of column names, then rows of numbers")
+    column = {name.strip(): index for index, name in enumerate(rows[0])}
+    for pair, scale_m in _MIDLINE.items():
+        if {"t", "frame", "point", *pair} <= column.keys():
+            wanted = [column[name] for name in ("t", "frame", "point", *pair)]
+            return _midline(file, _numbers(file, rows, wanted), scale_m, rate_hz)
+    keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
+    if keypoints and "frame_idx" in column:
+        return _sleap(file, rows, column, keypoints, rate_hz)
+    raise InputError(
+        f"{file}: expected the columns t, frame, point, mxmm, mymm (midline) or frame_idx and "
+        f"<keypoint>.x, <keypoint>.y (SLEAP), found {', '.join(rows[0][:6])}"
+    )
+
+
+def _numbers(file: Path, rows: list[list[str]], wanted: list[int]) -> Floats:
+    """Cells as numbers (rows, columns); empty ones and NA are NaN."""
+    table = np.full((len(rows) - 1, len(wanted)), np.nan)
+    for line, row in enumerate(rows[1:], start=2):
+        for k, index in enumerate(wanted):
+            cell = row[index].strip() if index < len(row) else ""
+            if cell.lower() in {"", "na", "nan"}:
+                continue
+            try:
+                table[line - 2, k] = float(cell)
+            except ValueError:
+                name = rows[0][index]
+                raise InputError(
+                    f"{file}: line {line}: {name}: expected a number or nothing, found {cell!r}"
+                ) from None
+    return table
+
+
+def _midline(file: Path, table: Floats, scale_m: float, rate_hz: float | None) -> Track:
+    """Rows of t (s), frame, point, x, y; point 1 is the head."""
+    if not np.isfinite(table[:, :3]).all():
+        raise InputError(f"{file}: t, frame and point must be given in every row")
+    table = table[np.lexsort((table[:, 2], table[:, 1]))]
+    frames, first, count = np.unique(table[:, 1], return_index=True, return_counts=True)
+    if len(set(count.tolist())) != 1:
+        odd = int(frames[np.flatnonzero(count != count[0])[0]])
+        raise InputError(
+            f"{file}: every frame must list the same points; frame {odd} differs from the first"
+        )
+    points = table[:, 3:].reshape(len(frames), int(count[0]), 2)
+    if rate_hz is None:
+        step = np.diff(table[first, 0]) / np.diff(frames)
+        if len(step) == 0 or not np.median(step) > 0.0:
+            raise InputError(f"{file}: t must increase from frame to frame, in seconds")
+        rate_hz = float(1.0 / np.median(step))
+    return track_from_points(
+        file.stem, points, rate_hz, scale_m=scale_m, frame=frames.astype(np.int64)
+    )
+
+
+def _sleap(
+    file: Path,
+    rows: list[list[str]],
+    column: dict[str, int],
+    keypoints: list[str],
+    rate_hz: float | None,
+) -> Track:
+    """One row a frame, keypoints in the table's order, head first, in pixels."""
+    wanted = [column["frame_idx"], *(column[f"{k}.{axis}"] for k in keypoints for axis in "xy")]
+    table = _numbers(file, rows, wanted)
+    if not np.isfinite(table[:, 0]).all():
+        raise InputError(f"{file}: frame_idx must be given in every row")
+    if len(np.unique(table[:, 0])) < len(table):
+        raise InputError(f"{file}: more than one animal in a frame; export one track")
+    table = table[np.argsort(table[:, 0], kind="stable")]
+    points = table[:, 1:].reshape(len(table), len(keypoints), 2) * [1.0, -1.0]  # rows count down
+    return track_from_points(
+        file.stem,
+        points,
+        SLEAP_RATE_HZ if rate_hz is None else rate_hz,
+        frame=table[:, 0].astype(np.int64),
+        rate_assumed=rate_hz is None,
+    )
