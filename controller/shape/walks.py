@@ -1,0 +1,174 @@
+"""Walks that cover a graph of states: the snake walk and its rivals ([PT] 2.6.2, [KP] 4.2.1).
+
+``W(q) = deg / (1 - sign M + deg (sign M + sign F) + M 2^F)``, the neighbour with the largest W is
+next. Correction: F(q) counts the times that q was left for an already *visited* state; with the
+printed "unvisited" Eq. 3 and the properties of W fail (``snake-printed`` keeps it for comparison).
+2^F overflows floats, so W is compared by class and by integers. Ties go to the least recently
+visited neighbour, then to the first in the list.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.errors import InputError
+from controller.shape.graphs import Graph
+
+RULES = ("snake", "snake-printed", "stack", "random", "degree")
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """One walk, from its start until all states are seen or the steps run out."""
+
+    path: NDArray[np.int64]
+    """(steps + 1,) states in order, the start first."""
+    selected: NDArray[np.int64]
+    """(V,) M: how often each was selected, the start counted."""
+    failures: NDArray[np.int64]
+    """(V,) F of the rule; zeros for rules without it."""
+    covered: bool
+    """Whether every state was seen."""
+
+    @property
+    def steps(self) -> int:
+        """Edges walked."""
+        return len(self.path) - 1
+
+
+def walk(
+    graph: Graph,
+    rule: str,
+    start: int,
+    rng: np.random.Generator,
+    max_steps: int | None = None,
+    go_on: bool = False,
+) -> Walk:
+    """Walk from ``start``; O(neighbours) a step.
+
+    Args:
+        graph: connected.
+        rule: one of ``RULES``.
+        start: first state.
+        rng: used by ``random`` only.
+        max_steps: default V^2, what a random walk may need.
+        go_on: do not stop when every state has been seen.
+
+    Raises:
+        InputError: unknown rule.
+
+    """
+    if rule not in RULES:
+        raise InputError(f"rule {rule!r}: expected one of {', '.join(RULES)}")
+    book = _Book(graph, start)
+    choose: Callable[[list[int]], int] = {
+        "snake": book.snake,
+        "snake-printed": book.snake,
+        "stack": book.stack_top,
+        "random": lambda near: book.free(near, rng),
+        "degree": book.degree_over_visits,
+    }[rule]
+    counts_fresh = {"snake": False, "snake-printed": True}.get(rule)
+    limit = graph.states**2 if max_steps is None else max_steps
+    while book.step < limit and (go_on or book.seen < graph.states):
+        book.move(choose(book.near[book.path[-1]]), counts_fresh)
+    return Walk(
+        path=np.array(book.path, dtype=np.int64),
+        selected=np.array(book.selected, dtype=np.int64),
+        failures=np.array(book.failures, dtype=np.int64),
+        covered=book.seen == graph.states,
+    )
+
+
+def w_exceeds(a: tuple[int, int, int], b: tuple[int, int, int]) -> int:
+    """Sign of W(a) - W(b), exact, for (deg, M, F) each ([PT] Eq. 4-7)."""
+    class_a, class_b = _class(a), _class(b)
+    if class_a != class_b:
+        return 1 if class_a < class_b else -1
+    if class_a == 0:
+        left, right = a[0], b[0]
+    else:  # deg(a) M(b) 2^F(b) against deg(b) M(a) 2^F(a)
+        shift = b[2] - a[2]
+        left, right = a[0] * b[1] << max(shift, 0), b[0] * a[1] << max(-shift, 0)
+    return (left > right) - (left < right)
+
+
+def _class(q: tuple[int, int, int]) -> int:
+    if q[1] == 0:
+        return 0
+    return 1 if q[2] == 0 else 2
+
+
+class _Book:
+    """What a walk remembers, in plain lists: the inner loop is about ten neighbours long."""
+
+    def __init__(self, graph: Graph, start: int) -> None:
+        ends = graph.indptr.tolist()
+        flat = graph.indices.tolist()
+        self.near = [flat[a:b] for a, b in pairwise(ends)]
+        self.degree = graph.degree.tolist()
+        self.selected = [0] * graph.states
+        self.failures = [0] * graph.states
+        self.last = [-1] * graph.states
+        self.path = [start]
+        self.stack = [start]
+        self.selected[start] = 1
+        self.last[start] = 0
+        self.seen = 1
+
+    @property
+    def step(self) -> int:
+        return len(self.path) - 1
+
+    def move(self, to: int, counts_fresh: bool | None) -> None:
+        """Go to ``to``; F of the state left grows if ``to`` is fresh, or if it is not."""
+        fresh = self.selected[to] == 0
+        if counts_fresh is not None and fresh is counts_fresh:
+            self.failures[self.path[-1]] += 1
+        self.seen += fresh
+        self.selected[to] += 1
+        self.path.append(to)
+        self.last[to] = self.step
+
+    def snake(self, near: list[int]) -> int:
+        best = near[0]
+        score = (self.degree[best], self.selected[best], self.failures[best])
+        for q in near[1:]:
+            other = (self.degree[q], self.selected[q], self.failures[q])
+            sign = w_exceeds(other, score)
+            if sign > 0 or (sign == 0 and self.last[q] < self.last[best]):
+                best, score = q, other
+        return best
+
+    def stack_top(self, near: list[int]) -> int:
+        """Depth first: the unvisited neighbour of highest degree, else back the way it came."""
+        fresh = [q for q in near if self.selected[q] == 0]
+        if fresh:
+            best = max(fresh, key=self.degree.__getitem__)
+            self.stack.append(best)
+            return best
+        if len(self.stack) > 1:
+            self.stack.pop()
+            return self.stack[-1]
+        self.stack.append(near[0])  # all is seen: begin again, one step out
+        return near[0]
+
+    def free(self, near: list[int], rng: np.random.Generator) -> int:
+        """Any unvisited neighbour, else any."""
+        fresh = [q for q in near if self.selected[q] == 0]
+        pool = fresh or near
+        return pool[int(rng.random() * len(pool))]
+
+    def degree_over_visits(self, near: list[int]) -> int:
+        """[KP]: the largest deg / 2^v."""
+        best = near[0]
+        for q in near[1:]:
+            shift = self.selected[best] - self.selected[q]
+            left = self.degree[q] << max(shift, 0)
+            right = self.degree[best] << max(-shift, 0)
+            if left > right or (left == right and self.last[q] < self.last[best]):
+                best = q
+        return best
