@@ -43,7 +43,7 @@ def path_error_m(record: RunRecord) -> Floats:
 def distance_m(points_m: Floats, path_m: Floats, along_m: Floats) -> Floats:
     """Distance (n,) of points (n, 2) from a polyline (m, 2) near arc lengths ``along_m`` (n,).
 
-    The path goes on straight past its ends: a body that starts behind it is not off the path.
+    The path is taken to come straight to its start: a body that lies behind it is not off it.
     Where ``along_m`` is NaN the whole path is searched.
     """
     step = np.diff(path_m, axis=0)
@@ -54,9 +54,9 @@ def distance_m(points_m: Floats, path_m: Floats, along_m: Floats) -> Floats:
     a, step, length = path_m[:-1][keep], step[keep], length[keep]
     end = np.cumsum(length)
     t = np.einsum("nmi,mi->nm", points_m[:, None] - a, step) / length**2
-    low, high = np.zeros(len(a)), np.ones(len(a))
-    low[0], high[-1] = -np.inf, np.inf
-    foot = a + np.clip(t, low, high)[..., None] * step
+    low = np.zeros(len(a))
+    low[0] = -np.inf
+    foot = a + np.clip(t, low, 1.0)[..., None] * step
     gap = np.hypot(*np.moveaxis(points_m[:, None] - foot, -1, 0))
     at = np.clip(along_m, 0.0, end[-1])[:, None]
     far = (end < at - _WINDOW_M) | (end - length > at + _WINDOW_M)  # False where NaN

@@ -1,0 +1,52 @@
+"""Log to page: reads the log, writes ``summary.json`` and ``report.html`` beside each other."""
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+
+from config.errors import InputError
+from controller.app.report.film import film_html
+from controller.app.report.html import Section, page
+from controller.app.report.summary import Summary, summary
+from drivers.telemetry.reader import read_log
+from drivers.telemetry.record import RunRecord
+
+
+def build_report(log_path: Path, out_dir: Path, film: Path | None = None) -> Path:
+    """Make ``out_dir/report.html`` (returned) and ``out_dir/summary.json`` from a log alone.
+
+    Raises:
+        drivers.telemetry.reader.LogError: the log cannot be read.
+        InputError: the film cannot be used, or matplotlib is not installed.
+
+    """
+    record = read_log(log_path)
+    numbers = write_summary(record, out_dir)
+    shown = "" if film is None else film_html(film, out_dir)
+    header = record.header
+    config = {
+        "run": header.run.model_dump(mode="json"),
+        "robot": header.robot.model_dump(mode="json"),
+        "world": header.world.model_dump(mode="json"),
+    }
+    html = page(numbers, _sections(record), film=shown, events=record.events, config=config)
+    path = out_dir / "report.html"
+    path.write_text(html, encoding="utf-8")
+    return path
+
+
+def write_summary(record: RunRecord, out_dir: Path) -> Summary:
+    """Write ``out_dir/summary.json`` and return the numbers; needs no matplotlib."""
+    numbers = summary(record)
+    out_dir.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(numbers, indent=2, ensure_ascii=False, allow_nan=False)
+    (out_dir / "summary.json").write_text(text + "\n", encoding="utf-8")
+    return numbers
+
+
+def _sections(record: RunRecord) -> list[Section]:
+    if find_spec("matplotlib") is None:
+        raise InputError("the report draws with matplotlib: pip install 'snakewalk[view]'")
+    from controller.app.report.figures.all import sections  # noqa: PLC0415  (an extra)
+
+    return sections(record)

@@ -1,0 +1,5 @@
+"""One module a figure; each takes a ``RunRecord`` and returns a matplotlib ``Figure``, or None.
+
+None means that the log holds nothing to draw. Only the object interface of matplotlib is used: no
+window, no global state.
+"""

@@ -1,0 +1,54 @@
+"""How fast it went against what was predicted, and how far from the path."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from controller.app.report.figures.style import (
+    AMBER,
+    BLUE,
+    GREY,
+    canvas,
+    legend_above,
+    mark_waypoints,
+    trace,
+)
+from controller.app.report.way import path_error_m, waypoint_times_s
+from drivers.telemetry.record import RunRecord
+
+
+def advance_figure(record: RunRecord) -> Figure | None:
+    """Speed and path error over time; None without a pose."""
+    pose = record.pose
+    if len(pose.time_s) == 0:
+        return None
+    figure, (speed, error) = canvas(2, 5.2)
+    measured = "simulated" if record.header.backend == "sim" else "measured"
+    for values, colour, label in (
+        (pose.pulse_m_s, GREY, "pulse speed u"),
+        (pose.predicted_speed_m_s, AMBER, "predicted"),
+        (pose.speed_m_s, BLUE, measured),
+    ):
+        if np.isfinite(values).any():
+            trace(speed, pose.time_s, values, colour, label)
+    speed.set_ylabel("speed (m/s)")
+    shown = np.concatenate([[0.0], pose.pulse_m_s, pose.predicted_speed_m_s, pose.speed_m_s])
+    low, high = float(np.nanmin(shown)), max(float(np.nanmax(shown)), 0.01)
+    speed.set_ylim(1.1 * low, 1.18 * high)
+    speed.set_title("Forward speed")
+    if speed.get_legend_handles_labels()[0]:
+        legend_above(speed)
+    distance = path_error_m(record)
+    if np.isfinite(distance).any():
+        trace(error, pose.time_s, distance, BLUE, "distance")
+        mean = float(np.nanmean(distance))
+        error.axhline(
+            mean, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)), label=f"mean {mean:.3f} m"
+        )
+        legend_above(error)
+    error.set_ylabel("distance (m)")
+    error.set_ylim(bottom=0.0)
+    error.set_title("Centre of mass from the path")
+    error.set_xlabel("time (s)")
+    error.set_xlim(0.0, max(record.end_s, 1e-3))
+    mark_waypoints([speed, error], waypoint_times_s(pose, record.header.plan))
+    return figure

@@ -1,0 +1,71 @@
+"""The figures of the page, in order, each with what to see in it."""
+
+from collections.abc import Callable
+from typing import Final
+
+from matplotlib.figure import Figure
+
+from controller.app.report.figures.advance import advance_figure
+from controller.app.report.figures.effort import effort_figure
+from controller.app.report.figures.joints import joints_figure
+from controller.app.report.figures.safety import safety_figure
+from controller.app.report.figures.style import data_uri, style
+from controller.app.report.figures.timing import timing_figure
+from controller.app.report.figures.walk import walk_figure
+from controller.app.report.figures.way import way_figure
+from controller.app.report.html import Section
+from drivers.telemetry.record import RunRecord
+
+_ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] = (
+    (
+        "The way",
+        "Seen from above. A waypoint's disc is its radius: green when the centre of mass has come "
+        "inside it in its turn, orange when not. The body grows darker with time.",
+        way_figure,
+    ),
+    (
+        "Speed and path",
+        "Forward speed of the links along themselves, against what the friction model predicts "
+        "for the pulse speed asked. Green lines: a waypoint reached.",
+        advance_figure,
+    ),
+    (
+        "Joint angles",
+        "The shape travels from the head (top) to the tail (bottom). What remains between asked "
+        "and measured is servo lag, a clamp, or ground that does not give way.",
+        joints_figure,
+    ),
+    (
+        "The walk",
+        "Each decision appends a part of the next state to the angles along the way.",
+        walk_figure,
+    ),
+    (
+        "Effort",
+        "In a long run a curve is a mean, its pale band reaches from least to largest. Torque, "
+        "where its constant is known, is current times constant, gear losses included.",
+        effort_figure,
+    ),
+    (
+        "Time on the bus",
+        "A cycle has to fit into its period; a deadline that was missed is skipped, never made up.",
+        timing_figure,
+    ),
+    (
+        "Safety",
+        "Every command goes through the limits below the controller: a clamp changes it, a veto "
+        "stops the run.",
+        safety_figure,
+    ),
+)
+
+
+def sections(record: RunRecord) -> list[Section]:
+    """Draw what the log has something for."""
+    with style():
+        drawn = [(title, caption, draw(record)) for title, caption, draw in _ALL]
+        return [
+            Section(title, caption, data_uri(figure))
+            for title, caption, figure in drawn
+            if figure is not None
+        ]

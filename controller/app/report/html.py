@@ -1,0 +1,143 @@
+"""The page: headline numbers first, then film, figures, events and what ran; one file, no scripts.
+
+Everything that comes from the log is escaped.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+from controller.app.report.page_style import CSS
+from controller.app.report.summary import Summary
+from drivers.telemetry.record import Event
+
+_EVENTS_SHOWN = 300
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """One figure on the page."""
+
+    title: str
+    caption: str
+    image: str
+    """Data URI."""
+
+
+def page(
+    numbers: Summary,
+    sections: Sequence[Section],
+    *,
+    film: str,
+    events: Sequence[Event],
+    config: Mapping[str, Any],
+) -> str:
+    """Whole page; ``film`` is HTML made by ``film.film_html``, or empty."""
+    title = f"{numbers['run']} on {numbers['backend']}"
+    note = f'<p class="note">{escape(numbers["log_note"])}</p>' if numbers["log_note"] else ""
+    body = [
+        f"<header><p class='kind'>snakewalk run</p><h1>{escape(str(numbers['run']))}</h1>",
+        f"<p class='{_mood(numbers)} outcome'>{escape(str(numbers['outcome']))}</p>{note}",
+        f"<p class='facts'>{_facts(numbers)}</p></header>",
+        f"<section class='tiles'>{''.join(_tiles(numbers))}</section>",
+        film,
+        *(_figure(s) for s in sections),
+        _events(events),
+        _details("All numbers", numbers),
+        _details("Configuration", config),
+    ]
+    return (
+        "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'>"
+        "<meta name='viewport' content='width=device-width, initial-scale=1'>"
+        f"<title>{escape(title)}</title><style>{CSS}</style></head>\n<body><main>"
+        + "\n".join(part for part in body if part)
+        + "</main></body></html>\n"
+    )
+
+
+def _mood(n: Summary) -> str:
+    if n["trip"] is not None:
+        return "bad"
+    return "good" if n["waypoints_reached"] == n["waypoints"] else "fair"
+
+
+def _facts(n: Summary) -> str:
+    backend = "simulation" if n["backend"] == "sim" else n["backend"]
+    facts = (
+        ("robot", n["robot"]), ("ground", n["world"]), ("motion", n["motion"]),
+        ("bus", backend), ("seed", n["seed"]), ("configuration", n["config_hash"]),
+        ("snakewalk", n["software"]),
+    )  # fmt: skip
+    return " ".join(f"<span><b>{k}</b> {escape(str(v))}</span>" for k, v in facts)
+
+
+def _tiles(n: Summary) -> list[str]:
+    wire = f"{_pct(n['wire_use_mean'])} of the wire" if n["wire_use_mean"] is not None else ""
+    torque = "" if n["peak_torque_n_m"] is None else f"{_fmt(n['peak_torque_n_m'], 2)} N m"
+    vetoes = _count(n["vetoes"], "veto", "vetoes")
+    missed = f"{n['missed_deadlines']} of {n['cycles']}"
+    return [
+        _tile("Waypoints", f"{n['waypoints_reached']} of {n['waypoints']}",
+              f"in {_fmt(n['duration_s'], 1)} s"),
+        _tile("Path error", f"{_fmt(n['path_error_mean_m'], 3)} m",
+              f"at most {_fmt(n['path_error_max_m'], 3)} m"),
+        _tile("Speed", f"{_fmt(n['speed_m_s'], 3)} m/s",
+              f"predicted {_fmt(n['predicted_speed_m_s'], 3)}"),
+        _tile("Gain η", _fmt(n["eta"], 2), "speed over pulse speed"),
+        _tile("Travelled", f"{_fmt(n['travelled_m'], 2)} m",
+              f"path of {_fmt(n['path_length_m'], 2)} m"),
+        _tile("Tracking", f"{_fmt(n['tracking_rms_rad'], 3)} rad",
+              f"RMS; lag {_fmt(n['lag_s'], 3)} s"),
+        _tile("Peak current", f"{_fmt(n['peak_current_a'], 2)} A", torque),
+        _tile("Hottest servo", f"{_fmt(n['peak_temperature_c'], 0)} °C",
+              f"supply down to {_fmt(n['lowest_voltage_v'], 1)} V"),
+        _tile("Missed deadlines", missed, wire),
+        _tile("Safety", _count(n["clamps"], "clamp"), f"{vetoes}, {_count(n['alarms'], 'alarm')}"),
+    ]  # fmt: skip
+
+
+def _tile(name: str, value: str, below: str) -> str:
+    return (
+        f"<div><span>{escape(name)}</span><strong>{escape(value)}</strong>"
+        f"<small>{escape(below)}</small></div>"
+    )
+
+
+def _figure(section: Section) -> str:
+    return (
+        f"<section><h2>{escape(section.title)}</h2><figure>"
+        f"<img src='{section.image}' alt='{escape(section.title)}'>"
+        f"<figcaption>{escape(section.caption)}</figcaption></figure></section>"
+    )
+
+
+def _events(events: Sequence[Event]) -> str:
+    if not events:
+        return ""
+    rows = "".join(
+        f"<tr class='{escape(e.level)}'><td>{e.time_s:.2f} s</td><td>{escape(e.kind)}</td>"
+        f"<td>{escape(e.text)}</td></tr>"
+        for e in events[:_EVENTS_SHOWN]
+    )
+    rest = len(events) - _EVENTS_SHOWN
+    more = f"<p class='facts'>and {rest} more in the log</p>" if rest > 0 else ""
+    return f"<section><h2>What happened</h2><table>{rows}</table>{more}</section>"
+
+
+def _details(title: str, values: Mapping[str, Any]) -> str:
+    text = escape(json.dumps(values, indent=2, ensure_ascii=False))
+    return f"<details><summary>{escape(title)}</summary><pre>{text}</pre></details>"
+
+
+def _fmt(value: float | None, decimals: int) -> str:
+    return "–" if value is None else f"{value:.{decimals}f}"
+
+
+def _count(number: int, one: str, more: str = "") -> str:
+    return f"{number} {one if number == 1 else more or one + 's'}"
+
+
+def _pct(value: float) -> str:
+    return f"{100.0 * value:.0f} %"
