@@ -1,0 +1,45 @@
+"""``snakewalk run``: the main job, on servos or in the simulator."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from controller.app.commands.common import DEFAULT_RUN, Json, Motion, Robot, RunName, Seed, show
+
+
+def run(
+    run: RunName = DEFAULT_RUN,
+    port: Annotated[str | None, typer.Option(help="serial port; without it, the simulator")] = None,
+    robot: Robot = None,
+    seed: Seed = None,
+    motion: Motion = None,
+    out: Annotated[Path | None, typer.Option(help="folder for log and summary")] = None,
+    as_json: Json = False,
+) -> None:
+    """Run a job on servos or in the simulator; leaves a log and a summary."""
+    from controller.app.execute import execute  # noqa: PLC0415  heavy; --help stays quick
+    from controller.app.prepare import prepare  # noqa: PLC0415
+    from controller.app.progress import PathProgress  # noqa: PLC0415
+
+    prepared = prepare(run, seed=seed, motion=motion, robot=robot)
+    name = f"{prepared.run.name}-{prepared.run.motion}-seed{prepared.run.seed}"
+    folder = out if out is not None else Path("runs") / name
+    with PathProgress(prepared.path.length_m, len(prepared.run.waypoints_m)) as progress:
+        finished = execute(prepared, folder, port, (progress,))
+    outcome = finished.outcome
+    show(
+        {
+            "run": name,
+            "waypoints": len(prepared.run.waypoints_m),
+            "waypoints_reached": outcome.reached,
+            "duration_s": round(outcome.duration_s, 2),
+            "tripped": outcome.tripped,
+            "advance_alarms": outcome.alarms,
+            "log": str(finished.log),
+            "summary": str(folder / "summary.json"),
+        },
+        as_json,
+    )
+    if not outcome.complete(len(prepared.run.waypoints_m)):
+        raise SystemExit(1)
