@@ -42,13 +42,11 @@ class HeightField:
 
     def elevation_m(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         """Elevation at points (clamped to the border), m; shape of the inputs."""
-        z, gx, gy = self._plane(x_m, y_m)
-        del gx, gy
-        return z
+        return self.plane(x_m, y_m)[0]
 
     def gradient(self, x_m: ArrayLike, y_m: ArrayLike) -> tuple[Floats, Floats]:
         """``dz/dx, dz/dy`` of the triangle under each point."""
-        _, gx, gy = self._plane(x_m, y_m)
+        _, gx, gy = self.plane(x_m, y_m)
         return gx, gy
 
     def slope_rad(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
@@ -56,16 +54,18 @@ class HeightField:
         gx, gy = self.gradient(x_m, y_m)
         return np.arctan(np.hypot(gx, gy))
 
-    def _plane(self, x_m: ArrayLike, y_m: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    def plane(self, x_m: ArrayLike, y_m: ArrayLike) -> tuple[Floats, Floats, Floats]:
+        """Elevation (m) and ``dz/dx, dz/dy`` in one look-up, each of the inputs' shape."""
         rows, columns = self.z_m.shape
         u = np.clip((np.asarray(x_m, float) - self.x0_m) / self.spacing_m, 0.0, columns - 1.0)
         v = np.clip((np.asarray(y_m, float) - self.y0_m) / self.spacing_m, 0.0, rows - 1.0)
-        i = np.minimum(u.astype(int), columns - 2)
-        j = np.minimum(v.astype(int), rows - 2)
+        i = np.minimum(u.astype(np.intp), columns - 2)
+        j = np.minimum(v.astype(np.intp), rows - 2)
         fu, fv = u - i, v - j
-        z = self.z_m
-        z00, z10, z01, z11 = z[j, i], z[j, i + 1], z[j + 1, i], z[j + 1, i + 1]
+        corner = j * columns + i
+        z00, z11 = self.z_m.take(corner), self.z_m.take(corner + (columns + 1))
         lower = fu >= fv  # the triangle that holds the (high x, low y) corner
-        gx = np.where(lower, z10 - z00, z11 - z01)
-        gy = np.where(lower, z11 - z10, z01 - z00)
+        third = self.z_m.take(corner + np.where(lower, 1, columns))
+        first, second = third - z00, z11 - third
+        gx, gy = np.where(lower, first, second), np.where(lower, second, first)
         return z00 + gx * fu + gy * fv, gx / self.spacing_m, gy / self.spacing_m

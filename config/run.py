@@ -15,6 +15,9 @@ class StatesConfig(Strict):
     coefficients: int = Field(7, ge=1, le=20)
     random_count: int = Field(200, ge=0, le=100_000)
     gain_limit: float = Field(0.6, ge=0.0, le=1.0, description="least quasi-static eta_q kept")
+    turn_limit_rad: float = Field(
+        1.5, gt=0.0, description="largest angle kept between a shape's tail and its mean"
+    )
 
 
 class WalkConfig(Strict):
@@ -48,6 +51,10 @@ class SafetyConfig(Strict):
     stale_limit_s: float = Field(0.1, gt=0.0)
     advance_fraction: float = Field(0.5, ge=0.0, lt=1.0, description="alarm below this share")
     watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="register 98, 20 ms steps")
+    recovery: Literal["stop", "confirm", "resume"] = Field(
+        "stop", description="after a vanished port or a rebooted servo: torque off, ask, or go on"
+    )
+    recovery_time_s: float = Field(10.0, gt=0.0, description="how long it is waited for")
 
 
 class RunConfig(Strict):

@@ -1,6 +1,7 @@
 """What the ground is: shape, friction, and how steep a path may be."""
 
-from typing import Annotated, Literal
+import math
+from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
@@ -40,9 +41,11 @@ class PlannerConfig(Strict):
 
     variance_window_m: float = Field(0.3, gt=0.0, description="radius of the elevation variance")
     variance_limit_m2: float = Field(4e-4, gt=0.0)
+    slope_window_m: float = Field(0.1, gt=0.0, description="radius of the plane fitted for slope")
     slope_limit_rad: float = Field(0.35, gt=0.0, lt=1.5)
-    length_weight: float = Field(1e-3, gt=0.0, description="metres of path against variance")
+    length_weight: float = Field(3e-3, gt=0.0, description="metres of path against variance")
     node_spacing_m: float = Field(0.15, gt=0.0)
+    bend_radius_m: float = Field(0.4, ge=0.0, description="wanted of every bend, where possible")
     edge_margin_m: float = Field(0.3, ge=0.0, description="kept free along the border")
 
 
@@ -53,3 +56,22 @@ class WorldConfig(Strict):
     ground: Annotated[FlatGround | ElevationGround, Field(discriminator="kind")] = FlatGround()
     friction: FrictionConfig = FrictionConfig()
     planner: PlannerConfig = PlannerConfig()
+
+    def with_relief(self, factor: float) -> Self:
+        """Return the same ground with its heights times ``factor``, and limits that scale along.
+
+        A planner then lays the same paths, so that steepness alone is compared.
+        """
+        if not isinstance(self.ground, ElevationGround):
+            return self
+        limits = self.planner
+        planner = limits.model_copy(
+            update={
+                "variance_limit_m2": limits.variance_limit_m2 * factor**2,
+                "length_weight": limits.length_weight * factor**2,
+                "slope_limit_rad": math.atan(factor * math.tan(limits.slope_limit_rad)),
+            }
+        )
+        scale = self.ground.vertical_scale * factor
+        ground = self.ground.model_copy(update={"vertical_scale": scale})
+        return self.model_copy(update={"ground": ground, "planner": planner})

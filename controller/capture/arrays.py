@@ -33,20 +33,27 @@ def save_track(path: Path, track: Track) -> None:
 
 
 def load_npz(file: Path, rate_hz: float | None) -> Track:
-    """Load ``points, rate_hz, length_m`` or ``skeletons``; see ``formats.load_track``.
+    """Load ``points`` or ``angles_rad`` with ``rate_hz``, or ``skeletons``: ``formats.load_file``.
 
-    ``points`` are (T, P, 2) head first, in metres where ``length_m`` is a number; their scale is
-    taken from it. ``skeletons`` are pixels, rows downwards.
+    ``points`` are (T, P, 2) head first, in metres where ``length_m`` is a number; ``angles_rad``
+    are the (T, P) directions of equally long pieces, and ``length_m`` is then the body's length.
+    ``skeletons`` are pixels, rows downwards.
     """
     try:
         with np.load(file, allow_pickle=False) as data:
             held = {name: np.asarray(data[name]) for name in data.files if name != "width"}
     except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{file}: is not an .npz of plain arrays: {error}") from None
-    if "points" in held and "rate_hz" in held:
-        points = _floats(file, "points", held["points"])
-        length_m = float(_floats(file, "length_m", held.get("length_m", np.array(np.nan))))
-        said = float(_floats(file, "rate_hz", held["rate_hz"]))
+    if held.keys() & {"points", "angles_rad"} and "rate_hz" in held:
+        length_m = _scalar(file, "length_m", held.get("length_m", np.array(np.nan)))
+        said = _scalar(file, "rate_hz", held["rate_hz"])
+        if "points" in held:
+            points = _floats(file, "points", held["points"])
+        else:
+            angles = _floats(file, "angles_rad", held["angles_rad"])
+            if angles.ndim != 2 or angles.shape[1] < 4:
+                raise InputError(f"{file}: angles_rad must be (frames, 4 or more), {_is(angles)}")
+            points = body_points(angles, length_m if np.isfinite(length_m) else 1.0)
         return track_from_points(
             str(held.get("name", file.stem)),
             points,
@@ -62,13 +69,13 @@ def load_npz(file: Path, rate_hz: float | None) -> Track:
         rate = SKELETON_RATE_HZ if rate_hz is None else rate_hz
         return track_from_points(file.stem, points, rate, rate_assumed=rate_hz is None)
     raise InputError(
-        f"{file}: expected the arrays points and rate_hz (and length_m), or skeletons; "
-        f"found {', '.join(sorted(held)) or 'none'}"
+        f"{file}: expected the arrays points or angles_rad, and rate_hz (and length_m); or "
+        f"skeletons; found {', '.join(sorted(held)) or 'none'}"
     )
 
 
 def load_npy(file: Path, rate_hz: float | None) -> Track:
-    """Load joint angles (T, J), rad, column 0 next to the head; see ``formats.load_track``.
+    """Load joint angles (T, J), rad, column 0 next to the head; see ``formats.load_file``.
 
     Positive bends the head side to the left. Where the body was and faced is not in such a file:
     every frame faces along x in the mean, its head at the origin.
@@ -79,9 +86,7 @@ def load_npy(file: Path, rate_hz: float | None) -> Track:
         raise InputError(f"{file}: is not an .npy of plain numbers: {error}") from None
     joints = _floats(file, "joint angles", np.asarray(held))
     if joints.ndim != 2 or joints.shape[1] < 3:
-        raise InputError(
-            f"{file}: expected joint angles (frames, 3 or more joints), not {joints.shape}"
-        )
+        raise InputError(f"{file}: expected joint angles (frames, 3 or more joints), {_is(joints)}")
     link_rad = np.concatenate([np.zeros((len(joints), 1)), -np.cumsum(joints, axis=1)], axis=1)
     points = body_points(link_rad - link_rad.mean(axis=1, keepdims=True))
     rate = JOINT_RATE_HZ if rate_hz is None else rate_hz
@@ -92,3 +97,14 @@ def _floats(file: Path, what: str, values: NDArray[np.generic]) -> Floats:
     if values.dtype.kind not in "fiu":
         raise InputError(f"{file}: {what}: expected numbers, not {values.dtype}")
     return np.asarray(values, dtype=float)
+
+
+def _scalar(file: Path, what: str, value: NDArray[np.generic]) -> float:
+    number = _floats(file, what, value)
+    if number.size != 1:
+        raise InputError(f"{file}: {what}: expected one number, {_is(number)}")
+    return float(number.reshape(()))
+
+
+def _is(values: Floats) -> str:
+    return f"not an array of shape {values.shape}"

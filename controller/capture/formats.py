@@ -1,19 +1,15 @@
-"""One door for recordings of every kind: the content, not the name, says which it is."""
+"""Recordings of every kind in a file: the content, not the name, says which it is."""
 
 from pathlib import Path
 
 from config.errors import InputError
 from controller.capture.arrays import load_npy, load_npz
+from controller.capture.kinds import KNOWN
 from controller.capture.tables import load_csv
 from controller.capture.track import Track
 
-KNOWN = (
-    "a CSV of midlines (t, frame, point, mxmm, mymm), a SLEAP CSV (<keypoint>.x, <keypoint>.y), "
-    "an .npz (points, rate_hz, length_m; or skeletons) or an .npy of joint angles (frames, joints)"
-)
 
-
-def load_track(path: str | Path, rate_hz: float | None = None) -> Track:
+def load_file(path: str | Path, rate_hz: float | None = None) -> Track:
     """Load a recording.
 
     Args:

@@ -5,15 +5,11 @@ the animal: ``theta(s, t) = a(s) g(tau) sin(phase(tau)) + heading(tau)``, ``tau 
 Same figures, same numbers: nothing is random.
 """
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import InputError
 from config.loader import load, locate, shipped
 from config.recording import RecordingConfig
-from controller.capture.formats import load_track
 from controller.capture.resample import SEGMENTS, body_points
 from controller.capture.track import Track
 
@@ -54,31 +50,10 @@ def embedded(name: str) -> Track:
     """Make a shipped recording by name.
 
     Raises:
-        InputError: there is none of that name.
+        ConfigError: there is none of that name.
 
     """
-    if name not in EMBEDDED:
-        raise InputError(f"track {name!r}: no such recording; embedded are {', '.join(EMBEDDED)}")
     return generate(load(locate("recordings", name), RecordingConfig))
-
-
-def load_named_track(name_or_path: str, rate_hz: float | None = None) -> Track:
-    """Load a shipped recording by name, or a file (``formats.load_track``) by path.
-
-    ``rate_hz`` is for files only. A path has an ending or a folder in it; a name has neither.
-
-    Raises:
-        InputError: neither exists, or the file is at fault.
-
-    """
-    if name_or_path in EMBEDDED:
-        return embedded(name_or_path)
-    path = Path(name_or_path)
-    if path.suffix == ".toml" and path.is_file():
-        return generate(load(path, RecordingConfig))
-    if path.suffix or path.is_file() or len(path.parts) > 1:
-        return load_track(path, rate_hz)
-    return embedded(name_or_path)
 
 
 def _script(

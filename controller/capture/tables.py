@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
+from controller.capture.kinds import KNOWN
 from controller.capture.track import Track, track_from_points
 
 Floats = NDArray[np.float64]
@@ -16,12 +17,12 @@ _MIDLINE = {("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0}
 
 
 def load_csv(file: Path, rate_hz: float | None) -> Track:
-    """Load either table; see ``formats.load_track``."""
+    """Load either table; see ``formats.load_file``."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
             rows = [row for row in csv.reader(stream) if row]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{file}: is no text table: {error}") from None
+    except (UnicodeDecodeError, csv.Error):
+        raise InputError(f"{file}: is no recording; known: {KNOWN}") from None
     if len(rows) < 2:
         raise InputError(f"{file}: expected a line of column names, then rows of numbers")
     column = {name.strip(): index for index, name in enumerate(rows[0])}
@@ -33,8 +34,8 @@ def load_csv(file: Path, rate_hz: float | None) -> Track:
     if keypoints and "frame_idx" in column:
         return _sleap(file, rows, column, keypoints, rate_hz)
     raise InputError(
-        f"{file}: expected the columns t, frame, point, mxmm, mymm (midline) or frame_idx and "
-        f"<keypoint>.x, <keypoint>.y (SLEAP), found {', '.join(rows[0][:6])}"
+        f"{file}: expected the columns t, frame, point, x_m, y_m (or x_mm, y_mm; mxmm, mymm), or "
+        f"SLEAP's frame_idx and <keypoint>.x, <keypoint>.y; found {', '.join(rows[0][:6])[:80]}"
     )
 
 
@@ -60,6 +61,8 @@ def _midline(file: Path, table: Floats, scale_m: float, rate_hz: float | None) -
     """Rows of t (s), frame, point, x, y; point 1 is the head."""
     if not np.isfinite(table[:, :3]).all():
         raise InputError(f"{file}: t, frame and point must be given in every row")
+    if len(np.unique(table[:, 1:3], axis=0)) < len(table):
+        raise InputError(f"{file}: a point twice in a frame: more than one animal; export one")
     table = table[np.lexsort((table[:, 2], table[:, 1]))]
     frames, first, count = np.unique(table[:, 1], return_index=True, return_counts=True)
     if len(set(count.tolist())) != 1:

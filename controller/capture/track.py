@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
-from controller.capture.resample import SEGMENTS, equal_arc_length, tangent_angles
+from controller.capture.resample import equal_arc_length, tangent_angles
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +42,15 @@ class Track:
     def bend_rad(self) -> Floats:
         """K of every frame, (T,): standard deviation of the tangent angles ([PT] 2.6.3)."""
         return np.asarray(self.angles_rad.std(axis=1))
+
+    @property
+    def flips(self) -> int:
+        """Frames that fit the frame before better with head and tail exchanged: tracking faults."""
+        before, after = self.angles_rad[:-1], self.angles_rad[1:]
+        same = 1.0 - np.cos(after - before).mean(axis=1)
+        flipped = 1.0 - np.cos(after[:, ::-1] + np.pi - before).mean(axis=1)
+        joined = np.diff(self.time_s) < 1.5 / self.rate_hz
+        return int(np.count_nonzero((flipped < same) & joined))
 
 
 def track_from_points(
@@ -107,6 +116,4 @@ def _distinct(body: Floats) -> bool:
 def _over_time(angles_rad: Floats) -> Floats:
     """Shift whole frames by turns of 2 pi, so that the mean heading never jumps."""
     mean = angles_rad.mean(axis=1)
-    shifted = angles_rad + (np.unwrap(mean) - mean)[:, None]
-    assert shifted.shape[1] == SEGMENTS
-    return np.asarray(shifted)
+    return np.asarray(angles_rad + (np.unwrap(mean) - mean)[:, None])

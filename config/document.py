@@ -1,0 +1,125 @@
+"""The configuration's reference, written from the schema: ``python -m config.document``."""
+
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from config.robot import RobotConfig
+from config.run import RunConfig
+from config.world import WorldConfig
+
+_HEAD = """# Configuration
+
+A run is a TOML file that names a robot and a world; each is a shipped name or a path ending in
+`.toml` (relative to the file that names it). `snakewalk list` shows what is shipped, and
+`config/runs`, `config/robots` and `config/worlds` hold the files. Unknown keys, wrong types and
+values out of range are reported all at once, one line each, with exit code 2.
+
+```
+# my-run.toml                    # my-robot.toml
+name = "my-run"                  name = "mine"
+robot = "my-robot.toml"          joint_axes = "yyyyyyyyyyyy"
+world = "flat"                   link_length_m = 0.08
+waypoints_m = [[1, 0], [2, 1]]
+seed = 3                         [servo]
+                                 model = "XL330-M288"
+[behaviour]                      supply_v = 5.0
+pulse_body_lengths_s = 0.2
+```
+
+Units are in the names: `_m`, `_rad`, `_s`, `_a` (ampere), `_v`, `_c` (Celsius), `_kg`, `_n_m`.
+This page is written from the schema by `python -m config.document`; a test keeps it true.
+"""
+
+
+def reference() -> str:
+    """Markdown of every table and key."""
+    parts = [_HEAD]
+    for title, model in (("Run", RunConfig), ("Robot", RobotConfig), ("World", WorldConfig)):
+        parts += _tables(title, model)
+    return "\n".join(parts)
+
+
+def _tables(title: str, model: type[BaseModel]) -> list[str]:
+    lines = [
+        f"## {title}",
+        "",
+        _sentence(model),
+        "",
+        "| key | value | default | |",
+        "|---|---|---|---|",
+    ]
+    inner: list[str] = []
+    for name, field in model.model_fields.items():
+        nested = _models(field.annotation)
+        if nested:
+            for one in nested:
+                inner += _tables(_title(title, name, one, len(nested)), one)
+            continue
+        default = "required" if field.is_required() else f"`{_text(field.default)}`"
+        said = field.description or ""
+        lines.append(
+            f"| `{name}` | {_kind(field.annotation)}{_bounds(field)} | {default} | {said} |"
+        )
+    return [*lines, "", *inner]
+
+
+def _title(title: str, name: str, model: type[BaseModel], choices: int) -> str:
+    place = f"{title.partition(': ')[0]}: `[{name}]`"
+    if choices == 1:
+        return place
+    return f'{place} with `kind = "{_text(model.model_fields["kind"].default)}"`'
+
+
+def _sentence(model: type[BaseModel]) -> str:
+    return (model.__doc__ or "").strip().partition("\n")[0]
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    if get_origin(annotation) is Annotated:
+        return _models(get_args(annotation)[0])
+    if get_origin(annotation) in {Union, UnionType}:
+        return [model for part in get_args(annotation) for model in _models(part)]
+    return []
+
+
+def _kind(annotation: Any) -> str:
+    if get_origin(annotation) is Literal:
+        return " or ".join(f"`{value}`" for value in get_args(annotation))
+    if get_origin(annotation) in {Union, UnionType}:
+        return " or ".join(_kind(a) for a in get_args(annotation) if a is not type(None))
+    if get_origin(annotation) is tuple:
+        inner = [_kind(a) for a in get_args(annotation) if a is not Ellipsis]
+        return (
+            f"list of {inner[0]}" if Ellipsis in get_args(annotation) else f"[{', '.join(inner)}]"
+        )
+    names = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+    return names.get(annotation, str(annotation))
+
+
+def _bounds(field: FieldInfo) -> str:
+    signs = (("gt", ">"), ("ge", "≥"), ("lt", "<"), ("le", "≤"))
+    found = [
+        f"{sign} {getattr(rule, name):g}"
+        for name, sign in signs
+        for rule in field.metadata
+        if getattr(rule, name, None) is not None
+    ]
+    return f", {', '.join(found)}" if found else ""
+
+
+def _text(value: Any) -> str:
+    if value is None or value is PydanticUndefined:
+        return "none"
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_text, value))}]"
+    return str(value)
+
+
+if __name__ == "__main__":
+    print(reference(), end="")

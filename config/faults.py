@@ -1,0 +1,112 @@
+"""What goes wrong on a simulated bus, and when: the schema of a fault file.
+
+A file has a ``seed`` and any number of ``[[fault]]`` tables. Every fault has a ``kind``, begins
+``at_s`` seconds after the start, and most last ``for_s`` seconds (to the end, if not given).
+"""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from config.base import Strict
+
+ServoId = Annotated[int, Field(ge=0, le=252)]
+
+
+class _Fault(Strict):
+    at_s: float = Field(0.0, ge=0.0, description="when it begins")
+
+
+class _Lasting(_Fault):
+    for_s: float | None = Field(None, gt=0.0, description="how long; not given: to the end")
+
+
+class Noise(_Lasting):
+    """Packets that a bad cable or a busy host changes; each packet has ``chance``."""
+
+    kind: Literal["drop", "corrupt", "truncate", "duplicate", "delay", "late"]
+    chance: float = Field(1.0, gt=0.0, le=1.0)
+    ids: tuple[ServoId, ...] = Field((), description="of these servos only; not given: of all")
+    of: Literal["answers", "questions", "both"] = "answers"
+    by_s: float | None = Field(None, gt=0.0, description="delay and late: by how much")
+
+    @model_validator(mode="after")
+    def _fits_its_kind(self) -> Self:
+        slow = self.kind in ("delay", "late")
+        if slow and self.of != "answers":
+            raise ValueError(f"{self.kind}: only answers can be slow; leave 'of' out")
+        if not slow and self.by_s is not None:
+            raise ValueError(f"{self.kind}: has no 'by_s'")
+        if self.ids and self.of != "answers":
+            raise ValueError("'ids' are those of answers; a question goes to the whole bus")
+        return self
+
+
+class Servo(_Lasting):
+    """Servos that fall silent, jam, lose their supply, or share an ID."""
+
+    kind: Literal["mute", "stuck", "brown_out"]
+    ids: tuple[ServoId, ...] = Field(min_length=1)
+
+
+class Clash(_Lasting):
+    """One servo takes the ID of another."""
+
+    kind: Literal["clash"]
+    id: ServoId
+    takes: ServoId
+
+
+class Trip(_Fault):
+    """Servos detect an error (Hardware Error Status(70)), reboot, or get hot."""
+
+    kind: Literal["reboot", "overload", "overheating", "voltage", "encoder", "shock"]
+    ids: tuple[ServoId, ...] = Field(min_length=1)
+
+
+class Heat(_Fault):
+    """The housing of servos has a temperature, from which they cool down or trip."""
+
+    kind: Literal["heat"]
+    ids: tuple[ServoId, ...] = Field(min_length=1)
+    celsius: float = Field(ge=-20.0, le=200.0)
+
+
+class Supply(_Lasting):
+    """The supply of the whole bus has another voltage."""
+
+    kind: Literal["supply"]
+    volts: float = Field(ge=0.0, le=40.0)
+
+
+class Unplug(_Lasting):
+    """The cable behind one servo is out: all that follow in the chain lose bus and supply."""
+
+    kind: Literal["unplug"]
+    behind: ServoId
+
+
+class Stall(_Fault):
+    """The host does not run for a while: what it was going to send goes out later."""
+
+    kind: Literal["stall"]
+    for_s: float = Field(gt=0.0)
+
+
+class Port(_Lasting):
+    """The port vanishes, as an adapter does that is pulled out, and comes back."""
+
+    kind: Literal["port"]
+
+
+Fault = Annotated[
+    Noise | Servo | Clash | Trip | Heat | Supply | Unplug | Stall | Port,
+    Field(discriminator="kind"),
+]
+
+
+class FaultPlan(Strict):
+    """A fault file."""
+
+    seed: int = Field(0, ge=0, description="of every chance and every wrong bit")
+    fault: tuple[Fault, ...] = ()

@@ -1,0 +1,7 @@
+"""What a file of a recording may be, for faults and help."""
+
+KNOWN = (
+    "a CSV of midlines (t, frame, point, x_m, y_m), a SLEAP CSV (frame_idx, <keypoint>.x, "
+    "<keypoint>.y), an .npz (points or angles_rad, with rate_hz; or skeletons) or an .npy of joint "
+    "angles (frames, joints)"
+)
