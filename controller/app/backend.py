@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from config.heightfield import HeightField
 from config.robot import RobotConfig
 from config.run import RunConfig
 from config.world import WorldConfig
@@ -40,17 +41,21 @@ def simulated(
     run: RunConfig,
     robot: RobotConfig,
     world: WorldConfig,
+    ground: HeightField | None,
     *,
     heading_rad: float,
+    joint_rad: Floats | None = None,
     compiled: bool | None = None,
 ) -> Backend:
-    """Servos on a simulated line that turn a MuJoCo body, straight, with its head at the start.
+    """Servos on a simulated line that turn a MuJoCo body with its head at the start.
 
     Args:
         run: start and physics step.
         robot: the body and its servos.
-        world: the ground.
-        heading_rad: of the straight body.
+        world: friction and ground.
+        ground: the world's height field, where it has one.
+        heading_rad: of the body.
+        joint_rad: (J,) to begin with; None is straight.
         compiled: None takes numba where it is installed.
 
     """
@@ -59,8 +64,9 @@ def simulated(
     from sim.bus.line import SimLine  # noqa: PLC0415
     from sim.physics.plant import MujocoPlant  # noqa: PLC0415
 
-    plant = MujocoPlant(robot, world, None, run.physics_step_s, compiled=compiled)
-    plant.reset(run.start_m, heading_rad, np.zeros(robot.joint_count))
+    plant = MujocoPlant(robot, world, ground, run.physics_step_s, compiled=compiled)
+    bent = np.zeros(robot.joint_count) if joint_rad is None else joint_rad
+    plant.reset(run.start_m, heading_rad, bent)
     servo = robot.servo
     line = SimLine(ServoBank(robot.servo_ids, servo.model, servo.baud), plant, baud=servo.baud)
     chain = ServoChain(DynamixelBus(line, servo.model), robot, watchdog_s=run.safety.watchdog_s)
@@ -78,6 +84,8 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
     """
     serial = SerialPort(port, robot.servo.baud)
     chain = ServoChain(
-        DynamixelBus(serial, robot.servo.model), robot, watchdog_s=run.safety.watchdog_s
+        DynamixelBus(serial, robot.servo.model, latency_s=serial.latency_s),
+        robot,
+        watchdog_s=run.safety.watchdog_s,
     )
     return Backend(port, chain, serial.clock, None, None, lambda: float("nan"))

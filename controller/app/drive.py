@@ -84,9 +84,10 @@ class Drive:
         with self._link:
             found = self._link.enable()
             self._wire_s = self._wire_busy_s()
+            view = body_in_world(self._robot, self._pose(found), found.position_rad)
             ramp = Ramp(
                 found.position_rad,
-                pilot.first_goal_rad(),
+                pilot.lay(pilot.first_goal_rad(), period_s, view),
                 self._robot.joint_speed_limit_rad_s,
                 self._robot.joint_acceleration_limit_rad_s2,
             )
@@ -106,7 +107,7 @@ class Drive:
                 else:
                     goal = self._steer(period_s, view)
                 self._send(tick, state, pose, view, goal)
-                if self._link.tripped or pilot.done:
+                if self._link.tripped or pilot.at_rest:
                     break
             tripped = self._link.tripped
             if tripped:

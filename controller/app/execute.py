@@ -1,6 +1,5 @@
 """Carry out a prepared run: folder, log, link, loop, summary."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import numpy as np
 from controller.app.backend import Backend, metal, simulated
 from controller.app.drive import Drive, Outcome, PoseSource, Watcher
 from controller.app.prepare import Prepared
-from controller.app.report.summary import summary
+from controller.app.report.build import write_summary
 from controller.runtime.dead_reckoning import DeadReckoning
 from drivers.safe_link import SafeLink
 from drivers.safety import SafetyLimits
@@ -39,7 +38,13 @@ def execute(
     ahead = prepared.forecast()
     heading_rad = prepared.start_heading_rad
     if port is None:
-        backend = simulated(prepared.run, prepared.robot, prepared.world, heading_rad=heading_rad)
+        backend = simulated(
+            prepared.run,
+            prepared.robot,
+            prepared.world,
+            prepared.ground,
+            heading_rad=heading_rad,
+        )
     else:
         backend = metal(prepared.run, prepared.robot, port)
     log_path = folder / "log.mcap"
@@ -56,6 +61,8 @@ def execute(
                 predicted_speed_m_s=prepared.gain * ahead.pulse_m / ahead.duration_s,
                 states=None if prepared.run.motion == "serpenoid" else prepared.library.counts,
             ),
+            ground=prepared.ground,
+            torque_constant_n_m_a=_torque_constant_n_m_a(prepared.robot.servo.model),
         )
         limits = SafetyLimits.from_config(prepared.robot, prepared.run.safety)
         drive = Drive(
@@ -71,9 +78,15 @@ def execute(
             wire_busy_s=backend.wire_busy_s,
         )
         outcome = drive.run()
-    numbers = dict(summary(read_log(log_path)))
-    (folder / "summary.json").write_text(json.dumps(numbers, indent=2) + "\n")
+    numbers = dict(write_summary(read_log(log_path), folder))
     return Finished(outcome, log_path, numbers)
+
+
+def _torque_constant_n_m_a(model: str) -> float:
+    """Of the servo's specification table; NaN where the simulator does not know the model."""
+    from sim.bus.motor import MOTORS  # noqa: PLC0415  only for this figure
+
+    return MOTORS[model].torque_constant_n_m_a if model in MOTORS else float("nan")
 
 
 def _pose_source(prepared: Prepared, backend: Backend) -> PoseSource:

@@ -8,25 +8,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
+from config.ground import build_ground
+from config.heightfield import HeightField
 from config.loader import checked, load_robot, load_run, load_world
 from config.robot import RobotConfig
 from config.run import RunConfig, WalkConfig
 from config.world import WorldConfig
-from controller.capture.generated import embedded
+from controller.capture.load import load_track, track_beside
+from controller.motion.joint_track import JointTrack
+from controller.motion.lift import Lift
 from controller.motion.pulse import Pulse
 from controller.motion.retarget import Retarget
 from controller.motion.serpentine import Serpentine
 from controller.motion.traction import quasi_static_gain
+from controller.motion.usable import refusals
 from controller.motion.walker import Walker
 from controller.runtime.forecast import Forecast, forecast
+from controller.runtime.margins import margin_faults
 from controller.runtime.pilot import Pilot, TrackSource
-from controller.shape.crossing import self_touches
-from controller.shape.library import StateLibrary, build_library
+from controller.shape.library import Refuse, StateLibrary, build_library
 from controller.terrain.path import SplinePath
+from controller.terrain.planner import TerrainPlanner
 
 Floats = NDArray[np.float64]
 POINTS = 100
-_SPEED_HEADROOM = 1.1  # a piece may end between two looks of the pulse
 
 
 @dataclass(frozen=True)
@@ -38,26 +43,27 @@ class Prepared:
     world: WorldConfig
 
     @cached_property
+    def ground(self) -> HeightField | None:
+        """The world's height field; None on a flat floor."""
+        return build_ground(self.world)
+
+    @cached_property
     def retarget(self) -> Retarget:
         """Skeleton to joints."""
         return Retarget(self.robot, POINTS)
 
     @cached_property
+    def refusals(self) -> dict[str, Refuse]:
+        """What a shape must pass: turn, joints in range, no self-contact, traction."""
+        return refusals(self.robot, self.world.friction, self.run.states, POINTS)
+
+    @cached_property
     def library(self) -> StateLibrary:
         """Shapes that this robot can make, that do not touch themselves, and that push."""
-        limit = np.array(self.robot.limit_rad)
-        robot, friction, states = self.robot, self.world.friction, self.run.states
-
-        def beyond(shapes_rad: Floats) -> NDArray[np.bool_]:
-            return np.asarray((np.abs(self.retarget.joints_rad(shapes_rad)) > limit).any(axis=-1))
-
+        states = self.run.states
         return build_library(
-            embedded(self.run.track).angles_rad,
-            {
-                "joint limits": beyond,
-                "self-contact": lambda x: self_touches(x, robot.length_m, robot.body_radius_m),
-                "traction": lambda x: quasi_static_gain(x, friction) < states.gain_limit,
-            },
+            load_track(self.run.track).angles_rad,
+            self.refusals,
             coefficients=states.coefficients,
             random_count=states.random_count,
             curvature=self.run.behaviour.curvature,
@@ -65,9 +71,19 @@ class Prepared:
         )
 
     @cached_property
+    def planner(self) -> TerrainPlanner:
+        """Lays paths over safe ground."""
+        return TerrainPlanner(self.ground, self.world.planner)
+
+    @cached_property
     def path(self) -> SplinePath:
         """Through the start and the waypoints."""
-        return SplinePath(np.vstack([self.run.start_m, self.run.waypoints_m]))
+        return self.planner.plan(np.vstack([self.run.start_m, self.run.waypoints_m]))
+
+    @cached_property
+    def lift(self) -> Lift:
+        """Lays the chain on the ground; on a level floor it lifts nothing."""
+        return Lift(self.robot, self.ground)
 
     @cached_property
     def gain(self) -> float:
@@ -84,15 +100,24 @@ class Prepared:
         given = self.run.start_heading_rad
         return self.path.heading_rad(0.05) if given is None else given
 
-    def pilot(self) -> Pilot:
-        """Make a fresh pilot; the same configuration and seed give the same one."""
+    def pilot(self, *, level: bool = False) -> Pilot:
+        """Make a fresh pilot; the same configuration and seed give the same one.
+
+        ``level`` leaves the pitch joints at 0, whatever the ground.
+        """
         run, robot = self.run, self.robot
         wanted = run.behaviour.pulse_body_lengths_s * (1.0 - run.behaviour.sliding) * POINTS
+        source = self._source()
         return Pilot(
-            self._source(),
-            Pulse(self.retarget.joints_rad, wanted, robot.joint_speed_limit_rad_s),
-            self.retarget.joints_rad,
-            plan=SplinePath,
+            source,
+            Pulse(
+                JointTrack(source.track, self.retarget.joints_rad),
+                wanted,
+                speed_limit_rad_s=robot.joint_speed_limit_rad_s,
+                acceleration_limit_rad_s2=robot.joint_acceleration_limit_rad_s2,
+            ),
+            plan=self.planner,
+            lift=None if level or self.ground is None else self.lift,
             start_m=np.array(run.start_m),
             waypoints_m=run.waypoints_m,
             length_m=robot.length_m,
@@ -110,24 +135,14 @@ class Prepared:
 
         """
         plan = forecast(
-            self.pilot(),
+            self.pilot(level=True),
             self.robot,
             self.world.friction,
             start_m=np.array(self.run.start_m),
             heading_rad=self.start_heading_rad,
             limit_s=self.run.time_limit_s,
         )
-        limit = np.array(self.robot.limit_rad)
-        reach = np.abs(plan.joint_rad).max(axis=0)
-        speed = plan.joint_speed_rad_s
-        most = self.robot.joint_speed_limit_rad_s
-        faults = [
-            f"plan: joint {j + 1} would bend to {reach[j]:.2f} rad; its limit is {limit[j]:.2f}"
-            for j in np.flatnonzero(reach > limit)
-        ] + [
-            f"plan: joint {j + 1} would turn at {speed[j]:.2f} rad/s; the limit is {most:.2f}"
-            for j in np.flatnonzero(speed > _SPEED_HEADROOM * most)
-        ]
+        faults = margin_faults(plan, self.robot)
         if faults:
             raise InputError(faults)
         return plan
@@ -148,13 +163,7 @@ class Prepared:
 
     def _usable(self, body_rad: Floats) -> bool:
         """Whether a body between two shapes can be made, does not touch itself, and pushes."""
-        robot = self.robot
-        if (np.abs(self.retarget.joints_rad(body_rad)) > robot.limit_rad).any():
-            return False
-        if self_touches(body_rad, robot.length_m, robot.body_radius_m)[0]:
-            return False
-        gain = quasi_static_gain(body_rad, self.world.friction)[0]
-        return bool(gain >= self.run.states.gain_limit)
+        return not any(refuse(body_rad[None])[0] for refuse in self.refusals.values())
 
 
 def prepare(run: str, **changes: object) -> Prepared:
@@ -166,14 +175,8 @@ def prepare(run: str, **changes: object) -> Prepared:
 
     """
     loaded = load_run(run)
-    wanted = {key: value for key, value in changes.items() if value is not None}
-    if wanted:
-        loaded = checked(RunConfig, loaded.model_dump() | wanted, "command line")
     beside = Path(run).parent if run.endswith(".toml") else None
-    prepared = Prepared(loaded, load_robot(loaded.robot, beside), load_world(loaded.world, beside))
-    if prepared.world.ground.kind != "flat":
-        raise InputError(
-            f"world {prepared.world.name}: runs on elevation models are not offered yet; "
-            "use a flat world"
-        )
-    return prepared
+    wanted = {key: value for key, value in changes.items() if value is not None}
+    wanted.setdefault("track", track_beside(loaded.track, beside))
+    loaded = checked(RunConfig, loaded.model_dump() | wanted, "command line")
+    return Prepared(loaded, load_robot(loaded.robot, beside), load_world(loaded.world, beside))

@@ -49,6 +49,10 @@ class AngleTrack:
         at = head - np.arange(1, self.points + 1)
         return np.asarray(np.interp(at, np.arange(self.end), self._samples))
 
+    def at_rad(self, sample: Floats) -> Floats:
+        """Angles at places on the track, between samples linearly; clamped to its ends."""
+        return np.asarray(np.interp(sample, np.arange(self.end), self._samples))
+
     def way(self, start: int, stop: int, rotation_rad: float = 0.0) -> Floats:
         """Displacement (2,), in segments, of a head that follows the samples without slip."""
         angles = self._samples[start:stop] + rotation_rad

@@ -1,40 +1,86 @@
-"""How fast the head may travel along the track: the joints' speed is the limit (METHOD 12)."""
+"""How fast the head may travel along the track: joint speed and acceleration are the limits.
 
-from collections.abc import Callable
+METHOD 12 retimes by joint speed alone, ``u = min(u0, limit / max |dq/dS|)``; a shape that bends
+quickly then asks for a jump of speed. Here half of the acceleration limit is left to the bending
+(``q'' u^2``) and half to speeding up and braking (``q' du/dt``), and the brake looks ahead over all
+of the track that is known.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.motion.angle_track import AngleTrack
+from controller.motion.joint_track import JointTrack
 
 Floats = NDArray[np.float64]
-# Segments around the head where slopes are looked up; half steps, as junctions have kinks.
-_LOOK = np.arange(-1.0, 3.1, 0.5)
+_TINY = 1e-9
 
 
 class Pulse:
-    """Advances the head along an angle track, ``u = min(u0, limit / max |dq/dS|)`` with a ramp."""
+    """Time law of a head on a joint track."""
 
     def __init__(
         self,
-        joints_of: Callable[[Floats], Floats],
+        joints: JointTrack,
         wanted_segments_s: float,
-        joint_speed_limit_rad_s: float,
+        *,
+        speed_limit_rad_s: float,
+        acceleration_limit_rad_s2: float,
         ramp_time_s: float = 1.0,
     ) -> None:
-        self._joints_of = joints_of
-        self._wanted = wanted_segments_s
-        self._limit = joint_speed_limit_rad_s
-        self._slew = wanted_segments_s / ramp_time_s
+        """Start at rest on the first head of ``joints``; ``ramp_time_s`` to the wanted speed."""
+        self.joints = joints
+        self.head = float(joints.first)
+        """Segments travelled."""
         self.speed_segments_s = 0.0
+        self._wanted = wanted_segments_s
+        self._speed_limit = speed_limit_rad_s
+        self._half_acceleration = 0.5 * acceleration_limit_rad_s2
+        self._slew = wanted_segments_s / ramp_time_s
+        self._stopping = False
+        self._first = joints.first
+        self._allowed = np.array([wanted_segments_s])
+        self._slope = np.zeros(1)
 
-    def advance(self, track: AngleTrack, head: float, dt_s: float) -> float:
-        """Return the head position after ``dt_s``; never beyond the track's end."""
-        look = np.clip(head + _LOOK, track.points, track.end)
-        bodies = np.stack([track.body_rad(float(h)) for h in look])
-        run = np.diff(look)
-        moved = np.abs(np.diff(self._joints_of(bodies), axis=0)).max(axis=1)
-        steepest = float(np.max(np.divide(moved, run, out=np.zeros_like(run), where=run > 1e-9)))
-        allowed = min(self._wanted, self._limit / max(steepest, 1e-9))
-        self.speed_segments_s = min(allowed, self.speed_segments_s + self._slew * dt_s)
-        return min(head + self.speed_segments_s * dt_s, float(track.end))
+    def stop(self) -> None:
+        """Slow down to rest from now on."""
+        self._stopping = True
+
+    def advance(self, dt_s: float) -> float:
+        """Move on by ``dt_s``; returns the head, never beyond what is known of the track."""
+        if self.joints.grow():
+            self._look_ahead()
+        k = min(int(self.head) - self._first, len(self._slope) - 1)
+        thrust = min(self._slew, self._half_acceleration / max(self._slope[k], _TINY))
+        if self._stopping:
+            self.speed_segments_s = max(0.0, self.speed_segments_s - thrust * dt_s)
+        else:
+            soon = self.head + self.speed_segments_s * dt_s
+            faster = self.speed_segments_s + thrust * dt_s
+            self.speed_segments_s = min(self._limit_at(soon), faster)
+        self.head = min(self.head + self.speed_segments_s * dt_s, float(self.joints.last))
+        return self.head
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint goals at the head's place."""
+        return self.joints.goal_rad(self.head)
+
+    def _limit_at(self, head: float) -> float:
+        at = np.clip(head - self._first, 0.0, len(self._allowed) - 1.0)
+        low = min(int(at), len(self._allowed) - 2) if len(self._allowed) > 1 else 0
+        part = at - low
+        if part == 0.0 or len(self._allowed) == 1:
+            return float(self._allowed[low])
+        squared = self._allowed[low] ** 2 * (1.0 - part) + self._allowed[low + 1] ** 2 * part
+        return float(np.sqrt(squared))
+
+    def _look_ahead(self) -> None:
+        """Tabulate the speed allowed from the head's place on, braking distance included."""
+        self._first = max(self.joints.first, int(self.head) - 1)
+        slope, turn = self.joints.bends(self._first)
+        by_speed = self._speed_limit / np.maximum(slope, _TINY)
+        by_bend = np.sqrt(self._half_acceleration / np.maximum(turn, _TINY))
+        allowed = np.minimum(np.minimum(by_speed, by_bend), self._wanted)
+        for k in range(len(allowed) - 2, -1, -1):
+            brake = self._half_acceleration / max(slope[k], slope[k + 1], _TINY)
+            allowed[k] = min(allowed[k], np.sqrt(allowed[k + 1] ** 2 + 2.0 * brake))
+        self._allowed, self._slope = allowed, slope

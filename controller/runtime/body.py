@@ -23,12 +23,17 @@ class BodyView:
     @property
     def headings_rad(self) -> Floats:
         """(L,) unwrapped headings of the links in the horizontal plane."""
-        return np.unwrap(np.arctan2(self.forward[:, 1], self.forward[:, 0]))
+        angles = np.arctan2(self.forward[:, 1], self.forward[:, 0])
+        turns = np.rint(
+            (angles[1:] - angles[:-1]) / (2.0 * np.pi)
+        )  # np.unwrap takes 4 times longer
+        angles[1:] -= 2.0 * np.pi * turns.cumsum()
+        return np.asarray(angles)
 
     @property
     def centre_m(self) -> Floats:
         """(3,) centre of mass of equal links; [PT] 2.6.2 calls it S_k."""
-        return np.asarray(self.link_m.mean(axis=0))
+        return np.asarray(self.link_m.sum(axis=0) / len(self.link_m))
 
 
 def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> BodyView:
@@ -37,22 +42,24 @@ def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> Body
     Yaw turns the link behind by ``-q`` about the up axis, pitch by ``+q`` about the left axis, so a
     positive joint bends the head side to the left, or lifts it.
     """
+    # In plain floats: seventeen steps in a row, on vectors of three, in every control cycle
     half = 0.5 * robot.link_length_m
-    links = robot.joint_count + 1
-    centres = np.empty((links, 3))
-    forward = np.empty((links, 3))
-    rotation = np.array(pose.rotation, dtype=float)
-    centre = np.array(pose.head_in_world_m, dtype=float)
-    cos, sin = np.cos(joint_rad), np.sin(joint_rad)
-    centres[0], forward[0] = centre, rotation[:, 0]
-    for j, axis in enumerate(robot.joint_axes):
-        joint_m = centre - half * rotation[:, 0]
-        c, s = cos[j], sin[j]
+    rows = np.asarray(pose.rotation, dtype=float).T.tolist()
+    (fx, fy, fz), (lx, ly, lz), (ux, uy, uz) = rows
+    x, y, z = np.asarray(pose.head_in_world_m, dtype=float).tolist()
+    centres, forward = [(x, y, z)], [(fx, fy, fz)]
+    turns = zip(np.cos(joint_rad).tolist(), np.sin(joint_rad).tolist(), strict=True)
+    for axis, (c, s) in zip(robot.joint_axes, turns, strict=True):
+        x, y, z = x - half * fx, y - half * fy, z - half * fz
         if axis == "y":
-            turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+            fx, lx = c * fx - s * lx, s * fx + c * lx
+            fy, ly = c * fy - s * ly, s * fy + c * ly
+            fz, lz = c * fz - s * lz, s * fz + c * lz
         else:
-            turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-        rotation = rotation @ turn
-        centre = joint_m - half * rotation[:, 0]
-        centres[j + 1], forward[j + 1] = centre, rotation[:, 0]
-    return BodyView(centres, forward)
+            fx, ux = c * fx - s * ux, s * fx + c * ux
+            fy, uy = c * fy - s * uy, s * fy + c * uy
+            fz, uz = c * fz - s * uz, s * fz + c * uz
+        x, y, z = x - half * fx, y - half * fy, z - half * fz
+        centres.append((x, y, z))
+        forward.append((fx, fy, fz))
+    return BodyView(np.array(centres), np.array(forward))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from config.robot import RobotConfig
 from config.world import FrictionConfig
+from controller.motion.load import STANDARD_GRAVITY_M_S2, friction_n, yaw_load_n_m
 from controller.motion.rigid import rigid_velocity
 from controller.runtime.body import BodyView, body_in_world
 from controller.runtime.pilot import Pilot
@@ -29,6 +30,8 @@ class Forecast:
     """(T, J)"""
     centre_m: Floats
     """(T, 2) centre of mass in the world."""
+    torque_n_m: Floats
+    """(T, J) that the yaw joints must hold against friction."""
     pulse_m: float
     """How far the shape has travelled along the body."""
     reached: int
@@ -44,6 +47,18 @@ class Forecast:
         """(J,) largest speed asked of each joint."""
         speeds = np.diff(self.joint_rad, axis=0) / np.diff(self.time_s)[:, None]
         return np.asarray(np.abs(speeds).max(axis=0))
+
+    @property
+    def joint_acceleration_rad_s2(self) -> Floats:
+        """(J,) largest acceleration asked of each joint."""
+        speeds = np.diff(self.joint_rad, axis=0) / np.diff(self.time_s)[:, None]
+        changes = np.diff(speeds, axis=0) / np.diff(self.time_s)[1:, None]
+        return np.asarray(np.abs(changes).max(axis=0, initial=0.0))
+
+    @property
+    def joint_torque_n_m(self) -> Floats:
+        """(J,) largest torque that each joint must hold."""
+        return np.asarray(np.abs(self.torque_n_m).max(axis=0))
 
 
 def pose_at(position_m: Floats, heading_rad: float, time_s: float = 0.0) -> BodyPose:
@@ -85,10 +100,13 @@ def forecast(
     head_rad = heading_rad - mean_heading_rad(robot, joints)
     velocity = np.zeros(3)
     times, angles, centres, pulse_m = [0.0], [joints], [], 0.0
+    torques = [np.zeros(robot.joint_count)]
+    yaw = np.array([axis == "y" for axis in robot.joint_axes])
+    weight_n = robot.link_mass_kg * STANDARD_GRAVITY_M_S2
     while True:
         view = body_in_world(robot, pose_at(head_m, head_rad), joints)
         centres.append(view.centre_m[:2])
-        if pilot.done or times[-1] >= limit_s:
+        if pilot.at_rest or times[-1] >= limit_s:
             break
         goal = pilot.step(step_s, view)
         before, after = _in_head_frame(robot, joints), _in_head_frame(robot, goal)
@@ -96,6 +114,11 @@ def forecast(
         velocity = rigid_velocity(
             before.link_m[:, :2], before.headings_rad, shape_m_s, friction, velocity
         )
+        points, headings = before.link_m[:, :2], before.headings_rad
+        lever = np.stack([-points[:, 1], points[:, 0]], axis=1)
+        moving = shape_m_s + velocity[:2] + velocity[2] * lever
+        force_n = friction_n(moving, headings, friction, weight_n)
+        torques.append(yaw * yaw_load_n_m(points, headings, robot.link_length_m, force_n))
         c, s = np.cos(head_rad), np.sin(head_rad)
         head_m = head_m + step_s * np.array([[c, -s], [s, c]]) @ velocity[:2]
         head_rad += step_s * velocity[2]
@@ -104,7 +127,13 @@ def forecast(
         times.append(times[-1] + step_s)
         angles.append(joints)
     return Forecast(
-        np.array(times), np.array(angles), np.array(centres), pulse_m, pilot.reached, pilot.missed
+        np.array(times),
+        np.array(angles),
+        np.array(centres),
+        np.array(torques),
+        pulse_m,
+        pilot.reached,
+        pilot.missed,
     )
 
 

@@ -5,12 +5,15 @@ method, kept to show what a body with friction makes of it.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from config.errors import InputError
 from controller.motion.angle_track import AngleTrack
+from controller.motion.lift import Lift
 from controller.motion.pulse import Pulse
 from controller.motion.steering import Path, aim_rad, offset_rad
 from controller.motion.walker import Decision
@@ -19,6 +22,9 @@ from controller.runtime.body import BodyView
 Floats = NDArray[np.float64]
 
 
+# Segments of track left when the next piece is decided: the time law must see beyond the head.
+_FORESIGHT = 3.0
+_LIFT_S = 0.1
 # Body lengths of track before another path may be laid: turning back takes about as much.
 _PATIENCE_BODIES = 2.0
 
@@ -43,9 +49,9 @@ class Pilot:
         self,
         source: TrackSource,
         pulse: Pulse,
-        joints_of: Callable[[Floats], Floats],
         *,
         plan: Planner,
+        lift: Lift | None = None,
         start_m: Floats,
         waypoints_m: Sequence[tuple[float, float]],
         length_m: float,
@@ -56,8 +62,9 @@ class Pilot:
     ) -> None:
         self._source = source
         self._pulse = pulse
-        self._joints_of = joints_of
         self._plan = plan
+        self._lift = lift
+        self._pitch_rad: Floats | None = None
         self._waypoints_m = np.asarray(waypoints_m, float)
         self._along_m = self._head_along_m = 0.0
         self._lay_path(np.asarray(start_m, float), 0)
@@ -67,7 +74,6 @@ class Pilot:
         self._feedback = feedback
         self._aim_at_waypoint = aim_at_waypoint
         self._start: tuple[Floats, float] | None = None
-        self.head = float(source.track.points)
         self.reached = 0
         self._patience = 0.0
         self.missed = 0
@@ -81,6 +87,16 @@ class Pilot:
         return self.reached == len(self._waypoints_m)
 
     @property
+    def at_rest(self) -> bool:
+        """Whether every waypoint has been reached and the shape has come to rest."""
+        return self.done and self._pulse.speed_segments_s == 0.0
+
+    @property
+    def head(self) -> float:
+        """Segments that the head has travelled along the track."""
+        return self._pulse.head
+
+    @property
     def along_m(self) -> float:
         """Arc length of the path point nearest to the body's centre."""
         return self._along_m
@@ -92,7 +108,7 @@ class Pilot:
 
     def first_goal_rad(self) -> Floats:
         """Joint angles of the initial shape."""
-        return self._joints_of(self._source.track.body_rad(self.head))
+        return self._pulse.goal_rad()
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Advance by ``dt_s`` and return the joint goals (J,)."""
@@ -100,12 +116,26 @@ class Pilot:
         self._along_m = self.path.nearest(centre, self._along_m)
         self._head_along_m = self.path.nearest(head_m, self._head_along_m)
         self._count(centre, head_m)
-        track = self._source.track
         self.decision = None
-        if self.head >= track.end - 1e-9:
+        if self.head >= self._source.track.end - _FORESIGHT and not self.done:
             self.decision = self._source.decide(*self._aim(view))
-        self.head = self._pulse.advance(track, self.head, dt_s)
-        return self._joints_of(track.body_rad(self.head))
+        if self.done:
+            self._pulse.stop()
+        self._pulse.advance(dt_s)
+        return self.lay(self._pulse.goal_rad(), dt_s, view)
+
+    def lay(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:
+        """Add to yaw goals (J,) the pitch that lays the body on the ground under it.
+
+        Smoothed over ``_LIFT_S``: the ground is known in facets.
+        """
+        if self._lift is None:
+            return goal_rad
+        wanted = self._lift(view.link_m[0], view.headings_rad).goal_rad
+        if self._pitch_rad is None:
+            self._pitch_rad = wanted
+        self._pitch_rad = self._pitch_rad + min(1.0, dt_s / _LIFT_S) * (wanted - self._pitch_rad)
+        return goal_rad + self._pitch_rad
 
     def _count(self, centre_m: Floats, head_m: Floats) -> None:
         """Count a waypoint when the centre is near it; when it was passed by, go back for it."""
@@ -120,7 +150,8 @@ class Pilot:
         ):
             self.missed += 1
             self._patience = self.head + _PATIENCE_BODIES * self._source.track.points
-            self._lay_path(head_m, self.reached)
+            with suppress(InputError):  # from here no safe way leads back: the old path stays
+                self._lay_path(head_m, self.reached)
 
     def _lay_path(self, from_m: Floats, first: int) -> None:
         """Plan from a point through the waypoints from ``first`` on."""

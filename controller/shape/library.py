@@ -67,8 +67,8 @@ def build_library(
         reasons = ", ".join(f"{name}: {count}" for name, count in rejected.items())
         raise InputError(
             f"states: only {len(fresh)} of {random_count} random states can be used by this robot "
-            f"(refused for {reasons}); lower behaviour.curvature or states.gain_limit, raise the "
-            "robot's joint limits, or take another track"
+            f"(refused for {reasons}); raise behaviour.curvature if it is traction, lower it if it "
+            "is anything else, or take another track"
         )
     kept = float(energy_kept(track_rad, coefficients).mean())
     return StateLibrary(np.concatenate([recorded, fresh]), len(recorded), rejected, kept)

@@ -5,7 +5,6 @@ import pytest
 
 from config.run import WalkConfig
 from controller.motion.angle_track import AngleTrack
-from controller.motion.pulse import Pulse
 from controller.motion.steering import offset_rad, wrap
 from controller.motion.walker import Walker
 
@@ -97,19 +96,3 @@ def test_offset_is_the_rotation_between_measured_and_believed_headings() -> None
     believed = RNG.uniform(-1, 1, 17)
     assert offset_rad(believed + 3.0, believed) == pytest.approx(3.0)
     assert offset_rad(believed + 3.5, believed) == pytest.approx(3.5 - 2 * np.pi)
-
-
-def test_joint_speed_stays_under_the_limit_and_the_end_is_respected() -> None:
-    walker = Walker(shapes(40), WalkConfig())
-    joints = lambda body: body[..., 3::6][..., :16] - body[..., 9::6][..., :16]  # noqa: E731
-    pulse = Pulse(joints, 60.0, 2.0)
-    head, dt, last = 100.0, 0.02, None
-    for _ in range(600):
-        if head >= walker.track.end - 1e-9:
-            walker.decide(0.0, 0.0)
-        head = pulse.advance(walker.track, head, dt)
-        q = joints(walker.track.body_rad(head))
-        if last is not None:
-            assert np.abs(q - last).max() / dt <= 2.0 * 1.1
-        last = q
-    assert head > 300

@@ -14,6 +14,9 @@ RunName = Annotated[str, typer.Argument(help="shipped run, or a RUN.toml", show_
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 Seed = Annotated[int | None, typer.Option(help="of every random choice")]
 Motion = Annotated[str | None, typer.Option(help="walk, walk-printed, walk-blind or serpenoid")]
+Port = Annotated[
+    str | None, typer.Option(help="serial port; default: the only USB adapter there is")
+]
 Robot = Annotated[str | None, typer.Option(help="shipped robot, or a TOML file")]
 World = Annotated[str | None, typer.Option(help="shipped world, or a TOML file")]
 TrackFile = Annotated[

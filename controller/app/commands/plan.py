@@ -1,19 +1,39 @@
 """``snakewalk plan``: a run on paper."""
 
-from controller.app.commands.common import DEFAULT_RUN, Json, Motion, RunName, Seed, show
+import math
+
+from controller.app.commands.common import (
+    DEFAULT_RUN,
+    Json,
+    Motion,
+    Robot,
+    RunName,
+    Seed,
+    TrackFile,
+    World,
+    show,
+)
 
 
 def plan(
-    run: RunName = DEFAULT_RUN, seed: Seed = None, motion: Motion = None, as_json: Json = False
+    run: RunName = DEFAULT_RUN,
+    robot: Robot = None,
+    world: World = None,
+    track: TrackFile = None,
+    seed: Seed = None,
+    motion: Motion = None,
+    as_json: Json = False,
 ) -> None:
     """Judge a run on paper: library, path and joint limits, with no servo and no simulator."""
     from controller.app.prepare import prepare  # noqa: PLC0415  heavy; --help stays quick
+    from controller.terrain.summary import path_relief  # noqa: PLC0415
 
-    prepared = prepare(run, seed=seed, motion=motion)
+    prepared = prepare(run, seed=seed, motion=motion, robot=robot, world=world, track=track)
     ahead = prepared.forecast()
     found: dict[str, object] = {
         "run": prepared.run.name,
         "robot": prepared.robot.name,
+        "world": prepared.world.name,
         "motion": prepared.run.motion,
         "seed": prepared.run.seed,
         "waypoints": len(prepared.run.waypoints_m),
@@ -21,10 +41,19 @@ def plan(
         "passed_by": ahead.missed,
         "path_m": round(prepared.path.length_m, 3),
         "duration_s": round(ahead.duration_s, 2),
-        "joint_speed_rad_s": round(float(ahead.joint_speed_rad_s.max()), 3),
         "joint_reach_rad": round(float(abs(ahead.joint_rad).max()), 3),
+        "joint_speed_rad_s": round(float(ahead.joint_speed_rad_s.max()), 3),
+        "joint_acceleration_rad_s2": round(float(ahead.joint_acceleration_rad_s2.max()), 2),
+        "joint_torque_n_m": round(float(ahead.joint_torque_n_m.max()), 3),
         "predicted_gain": round(prepared.gain, 3),
     }
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts
+    if prepared.ground is not None:
+        relief = path_relief(prepared.planner, prepared.path)
+        found["slope_median_deg"] = round(math.degrees(relief.median_slope_rad), 1)
+        found["slope_max_deg"] = round(math.degrees(relief.max_slope_rad), 1)
+        found["world_slope_median_deg"] = round(math.degrees(relief.world_median_slope_rad), 1)
+        found["climb_m"] = round(relief.climb_m, 3)
+        found["safe_nodes"] = f"{relief.safe_node_share:.0%}"
     show(found, as_json)

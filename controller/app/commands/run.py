@@ -1,33 +1,51 @@
 """``snakewalk run``: the main job, on servos or in the simulator."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from controller.app.commands.common import DEFAULT_RUN, Json, Motion, Robot, RunName, Seed, show
+from controller.app.commands.common import (
+    DEFAULT_RUN,
+    Json,
+    Motion,
+    Robot,
+    RunName,
+    Seed,
+    TrackFile,
+    World,
+    show,
+)
 
 
 def run(
     run: RunName = DEFAULT_RUN,
     port: Annotated[str | None, typer.Option(help="serial port; without it, the simulator")] = None,
     robot: Robot = None,
+    world: World = None,
+    track: TrackFile = None,
     seed: Seed = None,
     motion: Motion = None,
     out: Annotated[Path | None, typer.Option(help="folder for log and summary")] = None,
+    film: Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")] = True,
     as_json: Json = False,
 ) -> None:
-    """Run a job on servos or in the simulator; leaves a log and a summary."""
+    """Run a job on servos or in the simulator; leaves a log, a report and a film."""
     from controller.app.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from controller.app.prepare import prepare  # noqa: PLC0415
     from controller.app.progress import PathProgress  # noqa: PLC0415
+    from controller.app.report.leave import leave_report  # noqa: PLC0415
 
-    prepared = prepare(run, seed=seed, motion=motion, robot=robot)
+    prepared = prepare(run, seed=seed, motion=motion, robot=robot, world=world, track=track)
     name = f"{prepared.run.name}-{prepared.run.motion}-seed{prepared.run.seed}"
     folder = out if out is not None else Path("runs") / name
     with PathProgress(prepared.path.length_m, len(prepared.run.waypoints_m)) as progress:
         finished = execute(prepared, folder, port, (progress,))
     outcome = finished.outcome
+    left = leave_report(finished.log, folder, film=film)
+    for line in left.notes:
+        print(f"snakewalk: {line}", file=sys.stderr)
     show(
         {
             "run": name,
@@ -38,6 +56,8 @@ def run(
             "advance_alarms": outcome.alarms,
             "log": str(finished.log),
             "summary": str(folder / "summary.json"),
+            "report": None if left.report is None else str(left.report),
+            "film": None if left.film is None else str(left.film),
         },
         as_json,
     )

@@ -32,5 +32,5 @@ def film_html(film: Path, out_dir: Path) -> str:
     if kind.startswith("image"):
         shown = f"<img src='{escape(source)}' alt='Film of the run'>"
     else:
-        shown = f"<video controls muted loop playsinline src='{escape(source)}'></video>"
+        shown = f"<video controls autoplay muted loop playsinline src='{escape(source)}'></video>"
     return f"<section><h2>Film</h2><figure>{shown}</figure></section>"

@@ -40,6 +40,7 @@ def page(
     body = [
         f"<header><p class='kind'>snakewalk run</p><h1>{escape(str(numbers['run']))}</h1>",
         f"<p class='{_mood(numbers)} outcome'>{escape(str(numbers['outcome']))}</p>{note}",
+        f"<p class='verdict'>{escape(_verdict(numbers))}</p>",
         f"<p class='facts'>{_facts(numbers)}</p></header>",
         f"<section class='tiles'>{''.join(_tiles(numbers))}</section>",
         film,
@@ -61,6 +62,22 @@ def _mood(n: Summary) -> str:
     if n["trip"] is not None:
         return "bad"
     return "good" if n["waypoints_reached"] == n["waypoints"] else "fair"
+
+
+def _verdict(n: Summary) -> str:
+    """One sentence: how far it came, how fast, how well it kept to its path, whether on time."""
+    where = "on the simulator" if n["backend"] == "sim" else f"on {n['backend']}"
+    late = n["missed_deadlines"]
+    return (
+        f"{n['robot']} reached {n['waypoints_reached']} of {_count(n['waypoints'], 'waypoint')} "
+        f"{where}: {_fmt(n['travelled_m'], 1)} m in {_fmt(n['duration_s'], 1)} s, "
+        f"{_centimetres(n['path_error_mean_m'])} from its path on average, "
+        f"{_count(late, 'deadline') if late else 'no deadline'} missed."
+    )
+
+
+def _centimetres(length_m: float | None) -> str:
+    return "–" if length_m is None else f"{100.0 * length_m:.1f} cm"
 
 
 def _facts(n: Summary) -> str:

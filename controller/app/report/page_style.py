@@ -16,6 +16,7 @@ h2 { font-size: 18px; margin: 0 0 10px; }
 .outcome.good { background: #d8f1e7; color: #00593f; }
 .outcome.fair { background: #fcefcf; color: #6e4c00; }
 .outcome.bad { background: #fbe0d2; color: #8c3a00; }
+.verdict { margin: 0 0 10px; font-size: 16px; }
 .note { margin: 0 0 10px; color: #8c3a00; }
 .facts { margin: 0; color: var(--grey); font-size: 13px; }
 .facts span { margin-right: 16px; white-space: nowrap; }

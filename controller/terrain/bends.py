@@ -1,0 +1,65 @@
+"""Wider bends: a body of a metre cannot follow a corner of a hand's breadth."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.terrain.path import SplinePath
+
+Floats = NDArray[np.float64]
+
+_CHORD_M = 0.05  # the path is tabulated every centimetre; a shorter arc has no curvature
+_WORTH = 1.1  # a change must widen the sharpest bend by this much
+_CHANGES = 8
+_NEAREST = 2
+
+
+def widen(
+    points_m: Floats, free: NDArray[np.bool_], radius_m: float, safe: Callable[[SplinePath], bool]
+) -> SplinePath:
+    """Spline through points, with free ones near its sharpest bends dropped or pulled straight.
+
+    Ends when every bend has ``radius_m``, or when no change that keeps the path safe helps; the
+    points that are not free stay.
+    """
+    path = SplinePath(points_m)
+    for _ in range(_CHANGES):
+        radius, at_m = sharpest_bend(path)
+        if radius >= radius_m:
+            break
+        best = None
+        for k in _near(points_m, free, at_m):
+            straight = points_m.copy()
+            straight[k] = (points_m[k - 1] + 2.0 * points_m[k] + points_m[k + 1]) / 4.0
+            dropped = np.delete(points_m, k, axis=0), np.delete(free, k)
+            for points, still_free in (dropped, (straight, free)):
+                changed = SplinePath(points)
+                wider = sharpest_bend(changed)[0]
+                if wider > _WORTH * (radius if best is None else best[0]) and safe(changed):
+                    best = wider, points, still_free, changed
+        if best is None:
+            break
+        _, points_m, free, path = best
+    return path
+
+
+def sharpest_bend(path: SplinePath) -> tuple[float, Floats]:
+    """Least radius of curvature (infinite on a straight path) and the point where it is.
+
+    Radius of the circle through three points of the path, five centimetres apart.
+    """
+    count = max(1, int(path.length_m / 0.02))
+    s = np.linspace(_CHORD_M, max(_CHORD_M, path.length_m - _CHORD_M), count)
+    a, b, c = (path.position(s + step) for step in (-_CHORD_M, 0.0, _CHORD_M))
+    (ux, uy), (vx, vy) = (b - a).T, (c - b).T
+    turn = np.abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy))
+    k = int(np.argmax(turn))
+    return (_CHORD_M / float(turn[k]) if turn[k] > 1e-6 else float("inf")), b[k]
+
+
+def _near(points: Floats, free: NDArray[np.bool_], at_m: Floats) -> list[int]:
+    """Free points nearest to a place."""
+    which = np.flatnonzero(free)
+    order = np.argsort(np.hypot(*(points[which] - at_m).T))
+    return [int(k) for k in which[order[:_NEAREST]]]

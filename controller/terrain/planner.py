@@ -1,0 +1,162 @@
+"""The path planner: waypoints in, a smooth path over safe ground out ([PT] 2.6.1, [KP] 4.3)."""
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from config.errors import InputError
+from config.heightfield import HeightField
+from config.world import PlannerConfig
+from controller.terrain.bends import widen
+from controller.terrain.path import SplinePath
+from controller.terrain.relief import Relief
+from controller.terrain.safe_graph import SafeGraph
+from controller.terrain.straighten import straighten
+
+Floats = NDArray[np.float64]
+
+_LOOK_M = 0.02  # how densely a spline is checked again
+_ROUNDS = 7  # halvings: a corner's pieces end at a hundredth of their length
+
+
+class TerrainPlanner:
+    """Lays paths on one piece of ground; on a flat floor, plain splines through the points.
+
+    Built once (fields and graph), then called with the points of each path; the first point is
+    where the head is, and may lie anywhere.
+    """
+
+    def __init__(self, ground: HeightField | None, config: PlannerConfig) -> None:
+        self.relief = None if ground is None else Relief(ground, config)
+        self.graph = None if self.relief is None else SafeGraph(self.relief)
+
+    def __call__(self, points_m: ArrayLike) -> SplinePath:
+        """Lay a path from where the body is, on good ground or bad, through (n, 2) waypoints.
+
+        From an unsafe first point the path leads straight to the nearest safe node.
+
+        Raises:
+            InputError: a waypoint is off the world or on unsafe ground, or no safe way leads to it.
+
+        """
+        points = np.asarray(points_m, float)
+        if self.relief is None or self.graph is None:
+            return SplinePath(points)
+        faults = [f for k in range(1, len(points)) for f in _fault(self, k, points[k])]
+        if faults:
+            raise InputError(faults)
+        return self._spline(self._polygon(points, self.graph), points, self.relief)
+
+    def plan(self, points_m: ArrayLike) -> SplinePath:
+        """Lay a path as a call does, but refuse a start that is off the world or on unsafe ground.
+
+        Raises:
+            InputError: as for a call, and for the first point.
+
+        """
+        points = np.asarray(points_m, float)
+        faults = [f for k in range(len(points)) for f in _fault(self, k, points[k])]
+        if faults:
+            raise InputError(faults)
+        return self(points)
+
+    def _polygon(self, points: Floats, graph: SafeGraph) -> Floats:
+        """(k, 2) corners through all points, leg by leg."""
+        anchors = [graph.nearest(point) for point in points]
+        pieces = [points[:1]]
+        for k in range(1, len(points)):
+            here, there = anchors[k - 1], anchors[k]
+            if k == 1 and there is not None:  # the body may stand beside an island of safe nodes
+                here = graph.nearest(points[0], graph.reaching(there))
+            way = None if here is None or there is None else graph.way(here, there)
+            if way is None:
+                raise InputError(self._blocked(k, points))
+            pieces.append(straighten(np.vstack([points[k - 1], way, points[k]]), graph)[1:])
+        return np.vstack(pieces)
+
+    def _spline(self, corners: Floats, points: Floats, relief: Relief) -> SplinePath:
+        """Spline through the corners, with more of them wherever it would leave safe ground.
+
+        A cubic overshoots its polygon; the polygon is safe, and enough points hold the cubic to it.
+        Bends are widened last, as far as that stays safe.
+        """
+        for _ in range(_ROUNDS):
+            path = SplinePath(corners)
+            bad = self._unsafe(path, points[0], relief)
+            if not len(bad):
+                free = ~(corners[:, None] == points[None]).all(axis=-1).any(axis=1)
+                return widen(
+                    corners,
+                    free,
+                    relief.config.bend_radius_m,
+                    lambda wider: not len(self._unsafe(wider, points[0], relief)),
+                )
+            corners = _denser(corners, path, bad)
+        x, y = path.position(float(bad[0]))
+        raise InputError(
+            f"path: no smooth way over safe ground near ({x:.2f}, {y:.2f}); "
+            "move a waypoint or allow more slope or variance"
+        )
+
+    def _unsafe(self, path: SplinePath, start: Floats, relief: Relief) -> Floats:
+        """Arc lengths where a path is on unsafe ground, past the way out of a bad start."""
+        s = np.linspace(0.0, path.length_m, max(2, int(path.length_m / _LOOK_M) + 1))
+        safe = relief.safe(*path.position(s).T)
+        if not relief.safe(*start):
+            safe[: int(np.argmax(safe))] = True
+        return s[~safe]
+
+    def _blocked(self, k: int, points: Floats) -> str:
+        assert self.relief is not None
+        config = self.relief.config
+        return (
+            f"{_name(k, points[k])} cannot be reached from {_name(k - 1, points[k - 1])}: no way "
+            f"stays under a slope of {np.degrees(config.slope_limit_rad):.1f} deg and an elevation "
+            f"variance of {config.variance_limit_m2:.2g} m2"
+        )
+
+
+def _denser(points: Floats, path: SplinePath, bad_s_m: Floats) -> Floats:
+    """Halve the pieces of the polygon on which the spline is bad, and their neighbours."""
+    at, ends = 0.0, [0.0]
+    for before, point in pairwise(points):
+        at = path.nearest(point, at, window_m=2.0 * float(np.hypot(*(point - before))) + 0.1)
+        ends.append(at)
+    worst = np.unique(np.clip(np.searchsorted(ends, bad_s_m) - 1, 0, len(points) - 2))
+    split = {int(piece) + step for piece in worst for step in (-1, 0, 1)}
+    out = [points[0]]
+    for piece, (before, point) in enumerate(pairwise(points)):
+        if piece in split:
+            out.append((before + point) / 2)
+        out.append(point)
+    return np.array(out)
+
+
+def _fault(planner: TerrainPlanner, k: int, point: Floats) -> list[str]:
+    """Return what is wrong with the k-th point; 0 is the start."""
+    relief, graph = planner.relief, planner.graph
+    if relief is None or graph is None or relief.safe(*point):
+        return []
+    node = graph.nearest(point)
+    if node is None:
+        return [f"{_name(k, point)}: this world has no safe ground at all"]
+    x, y = graph.nodes_m[node]
+    if not relief.ground.contains(*point):
+        w, h = relief.ground.size_m
+        why = f"is outside the world, {w:.1f} m by {h:.1f} m around (0, 0)"
+    elif not relief.within(*point):
+        why = f"is within {relief.config.edge_margin_m:g} m of the world's border"
+    else:
+        slope = np.degrees(float(relief.slope_rad(*point)))
+        variance, most = float(relief.variance_m2(*point)), relief.config.variance_limit_m2
+        limit = np.degrees(relief.config.slope_limit_rad)
+        why = (
+            f"is on unsafe ground: slope {slope:.1f} deg (limit {limit:.1f}), elevation variance "
+            f"{variance:.2g} m2 (limit {most:.2g})"
+        )
+    return [f"{_name(k, point)} {why}; the nearest safe point is ({x:.2f}, {y:.2f})"]
+
+
+def _name(k: int, point: Floats) -> str:
+    return f"{'start' if k == 0 else f'waypoint {k}'} ({point[0]:.2f}, {point[1]:.2f})"

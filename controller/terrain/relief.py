@@ -1,0 +1,110 @@
+"""What the ground is to a body: elevation variance and slope over a window, and how risky that is.
+
+[PT] 2.6.1 and [KP] 4.3 call a point safe when the elevation around it varies little. A snake also
+needs a bound on slope, or it rolls over (METHOD 12); both are windowed, since a body bridges what
+is smaller than itself.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import map_coordinates
+from scipy.signal import fftconvolve
+
+from config.heightfield import HeightField
+from config.world import PlannerConfig
+
+Floats = NDArray[np.float64]
+
+
+class Relief:
+    """Windowed elevation variance and slope of a height field, anywhere on it.
+
+    Both are exact on the field's samples, up to its border, and bilinear between them.
+    """
+
+    def __init__(self, ground: HeightField, config: PlannerConfig) -> None:
+        self.ground = ground
+        self.config = config
+        self._variance = elevation_variance_m2(ground, config.variance_window_m)
+        self._slope = fitted_slope_rad(ground, config.slope_window_m)
+        # The larger of two, interpolated, is never below either, interpolated: this keeps both.
+        self._risk = np.maximum(
+            self._variance / config.variance_limit_m2, self._slope / config.slope_limit_rad
+        )
+
+    def variance_m2(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
+        """Elevation variance in a disc of ``variance_window_m`` around each point."""
+        return self._at(self._variance, x_m, y_m)
+
+    def slope_rad(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
+        """Inclination of the plane fitted in a disc of ``slope_window_m`` around each point."""
+        return self._at(self._slope, x_m, y_m)
+
+    def risk(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
+        """Variance or slope over its limit, whichever is more; infinite beyond the edge margin."""
+        x, y = np.asarray(x_m, float), np.asarray(y_m, float)
+        return np.where(self.within(x, y), self._at(self._risk, x, y), np.inf)
+
+    def safe(self, x_m: ArrayLike, y_m: ArrayLike) -> NDArray[np.bool_]:
+        """Whether points keep both limits and the margin."""
+        return np.asarray(self.risk(x_m, y_m) <= 1.0)
+
+    def within(self, x_m: ArrayLike, y_m: ArrayLike) -> NDArray[np.bool_]:
+        """Whether points lie on the field and ``edge_margin_m`` away from its border."""
+        x, y = np.asarray(x_m, float), np.asarray(y_m, float)
+        ground, margin = self.ground, self.config.edge_margin_m - 1e-9
+        w, h = ground.size_m
+        inside = np.minimum(x - ground.x0_m, ground.x0_m + w - x) >= margin
+        inside &= np.minimum(y - ground.y0_m, ground.y0_m + h - y) >= margin
+        return np.asarray(inside)
+
+    def _at(self, field: Floats, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
+        ground = self.ground
+        column = (np.asarray(x_m, float) - ground.x0_m) / ground.spacing_m
+        row = (np.asarray(y_m, float) - ground.y0_m) / ground.spacing_m
+        at = np.stack([row, column])
+        flat = map_coordinates(field, at.reshape(2, -1), order=1, mode="nearest")
+        return np.asarray(flat).reshape(at.shape[1:])
+
+
+def elevation_variance_m2(ground: HeightField, radius_m: float) -> Floats:
+    """(rows, columns) variance of the elevation in a disc around each sample ([PT] 2.6.1).
+
+    The disc is cut at the border. It reaches at least the next sample.
+    """
+    _, _, disc = _disc(ground, radius_m)
+    z = ground.z_m - ground.z_m.mean()  # small numbers first: the variance is a difference
+    count = _summed(np.ones_like(z), disc)
+    mean = _summed(z, disc) / count
+    return np.maximum(_summed(z * z, disc) / count - mean**2, 0.0)
+
+
+def fitted_slope_rad(ground: HeightField, radius_m: float) -> Floats:
+    """(rows, columns) inclination of the least-squares plane in a disc around each sample."""
+    dx, dy, disc = _disc(ground, radius_m)
+    z = ground.z_m - ground.z_m.mean()
+    ones = np.ones_like(z)
+    count = _summed(ones, disc)
+    x, y = _summed(ones, disc * dx) / count, _summed(ones, disc * dy) / count
+    xx = _summed(ones, disc * dx * dx) / count - x * x
+    yy = _summed(ones, disc * dy * dy) / count - y * y
+    xy = _summed(ones, disc * dx * dy) / count - x * y
+    mean = _summed(z, disc) / count
+    zx = _summed(z, disc * dx) / count - mean * x
+    zy = _summed(z, disc * dy) / count - mean * y
+    determinant = xx * yy - xy * xy
+    gx, gy = (zx * yy - zy * xy) / determinant, (zy * xx - zx * xy) / determinant
+    return np.asarray(np.arctan(np.hypot(gx, gy)))
+
+
+def _disc(ground: HeightField, radius_m: float) -> tuple[Floats, Floats, Floats]:
+    """Offsets in x and y of a window's samples, and 1 within the radius."""
+    reach_m = max(radius_m, 1.5 * ground.spacing_m)  # a plane needs the diagonal neighbours
+    cells = int(reach_m / ground.spacing_m)
+    dy, dx = np.mgrid[-cells : cells + 1, -cells : cells + 1] * ground.spacing_m
+    return dx, dy, (np.hypot(dx, dy) <= reach_m + 1e-9).astype(float)
+
+
+def _summed(values: Floats, weight: Floats) -> Floats:
+    """Sum of ``values`` around each sample, weighted by offset; nothing beyond the border."""
+    return np.asarray(fftconvolve(values, weight[::-1, ::-1], mode="same"))

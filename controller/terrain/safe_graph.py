@@ -1,0 +1,111 @@
+"""The graph of safe nodes, and the cheapest ways through it ([PT] 2.6.1, [KP] 4.3)."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from controller.terrain.relief import Relief
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+# A tenth is kept back for the nodes and edges: the spline may leave the polygon by a little.
+IN_HAND = 0.9
+# Half of the sixteen neighbours; the other half are the same edges seen from the other end.
+_STEPS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (2, -1), (1, -2))
+_SAMPLE_M = 0.05
+
+
+class SafeGraph:
+    """Safe nodes on a grid, joined to up to sixteen neighbours; built once, asked often.
+
+    The printed weight of an edge, the variance of the elevation along it, is zero along every
+    contour, also across the steepest slope, and grows with the square of an edge's length. Here it
+    is the mean *windowed* variance on the edge per node spacing, so that a side slope counts and
+    cutting an edge in two changes nothing, plus ``length_weight`` times length, so that flat ground
+    does not tie.
+    """
+
+    def __init__(self, relief: Relief) -> None:
+        self._relief = relief
+        self.length_weight = relief.config.length_weight
+        """Weight of a metre of path on level ground."""
+        ground, config = relief.ground, relief.config
+        w, h = (size - 2.0 * config.edge_margin_m for size in ground.size_m)
+        x = _centred(ground.x0_m + ground.size_m[0] / 2, w, config.node_spacing_m)
+        y = _centred(ground.y0_m + ground.size_m[1] / 2, h, config.node_spacing_m)
+        xx, yy = np.meshgrid(x, y)
+        safe = relief.risk(xx, yy) <= IN_HAND
+        index = np.where(safe, np.cumsum(safe).reshape(safe.shape) - 1, -1)
+        self.nodes_m = np.stack([xx[safe], yy[safe]], axis=-1)
+        """(n, 2) safe nodes."""
+        self.safe_share = float(safe.mean()) if safe.size else 0.0
+        """Safe nodes over all nodes inside the margin."""
+        self._edges = self._joined(index)
+        self._trees: dict[int, tuple[Floats, Ints]] = {}
+
+    def nearest(self, point_m: Floats, among: NDArray[np.bool_] | None = None) -> int | None:
+        """Return the safe node nearest to a point; None if there is none."""
+        gap = np.hypot(*(self.nodes_m - point_m).T)
+        if among is not None:
+            gap = np.where(among, gap, np.inf)
+        if not np.isfinite(gap).any():
+            return None
+        return int(np.argmin(gap))
+
+    def reaching(self, target: int) -> NDArray[np.bool_]:
+        """(n,) nodes from which ``target`` can be reached."""
+        return np.isfinite(self._tree(target)[0])
+
+    def way(self, start: int, target: int) -> Floats | None:
+        """(m, 2) nodes of the cheapest way, both ends included; None if there is no way."""
+        score, towards = self._tree(target)
+        if not np.isfinite(score[start]):
+            return None
+        at = [start]
+        while at[-1] != target:
+            at.append(int(towards[at[-1]]))
+        return self.nodes_m[at]
+
+    def price(self, from_m: Floats, to_m: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """Weights of straight pieces (k, 2) to (k, 2), and whether each is safe all along."""
+        config = self._relief.config
+        length = np.hypot(*(to_m - from_m).T)
+        count = max(2, int(np.ceil(length.max(initial=0.0) / _SAMPLE_M)) + 1)
+        part = np.linspace(0.0, 1.0, count)[:, None, None]
+        x, y = np.moveaxis(from_m + part * (to_m - from_m), -1, 0)
+        variance = self._relief.variance_m2(x, y).mean(axis=0)
+        safe = np.asarray((self._relief.risk(x, y) <= IN_HAND).all(axis=0))
+        per_m = np.asarray(variance, float) / config.node_spacing_m + config.length_weight
+        return length * per_m, safe
+
+    def _tree(self, target: int) -> tuple[Floats, Ints]:
+        """Score to ``target`` and the next node towards it, from every node.
+
+        Kept: a path laid again has the same waypoints and another start, and costs no search.
+        """
+        if target not in self._trees:
+            score, towards = dijkstra(
+                self._edges, directed=False, indices=[target], return_predecessors=True
+            )
+            self._trees[target] = score[0], towards[0].astype(np.intp)
+        return self._trees[target]
+
+    def _joined(self, index: Ints) -> csr_array:
+        rows, columns = index.shape
+        pairs = []
+        for up, right in _STEPS:
+            here = index[: rows - up, max(0, -right) : columns - max(0, right)]
+            there = index[up:, max(0, right) : columns + min(0, right)]
+            both = (here >= 0) & (there >= 0)
+            pairs.append(np.stack([here[both], there[both]]))
+        a, b = np.concatenate(pairs, axis=1)
+        weight, safe = self.price(self.nodes_m[a], self.nodes_m[b])
+        n = len(self.nodes_m)
+        return csr_array(coo_array((weight[safe], (a[safe], b[safe])), shape=(n, n)))
+
+
+def _centred(middle: float, extent: float, spacing: float) -> Floats:
+    count = max(0, int(extent / spacing + 1e-9)) + 1 if extent >= 0.0 else 0
+    return np.asarray(middle + (np.arange(count) - (count - 1) / 2) * spacing)

@@ -1,0 +1,24 @@
+"""The errata page names modules and tests that exist."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "errata.md").read_text()
+
+
+def test_every_module_and_test_named_exists() -> None:
+    named = re.findall(r"`([\w/]+\.py)`", PAGE)
+    assert len(named) > 20
+    assert [path for path in named if not (ROOT / path).is_file()] == []
+
+    tests = set(re.findall(r"`(test_\w+)`", PAGE))
+    sources = "\n".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
+    defined = set(re.findall(r"def (test_\w+)\(", sources))
+    assert len(tests) > 15
+    assert tests - defined == set()
+
+
+def test_no_row_of_a_table_is_torn() -> None:
+    for block in re.findall(r"(?:^\|.*\n)+", PAGE, re.MULTILINE):
+        assert len({line.count("|") for line in block.splitlines()}) == 1, block
