@@ -14,7 +14,7 @@ from numba.extending import intrinsic, register_jitable
 from numpy.typing import NDArray
 
 from sim.physics.drive import shaft_torque
-from sim.physics.friction import ellipse_force
+from sim.physics.friction import ellipse_force, stop_drag
 from sim.physics.layout import StepLayout
 from sim.physics.mechanics import LEAST_DEPTH_M, Mechanics
 from sim.plant import ServoDrive
@@ -22,6 +22,7 @@ from sim.plant import ServoDrive
 Floats = NDArray[np.float64]
 
 register_jitable(ellipse_force)
+register_jitable(stop_drag)
 register_jitable(shaft_torque)
 
 
@@ -108,8 +109,9 @@ def _add_friction(
     reals, integers, count, at = contacts
     size, at_dist, at_place, at_up, at_geom, _ = at
     v, w, wrench, depth, before = work
-    mu_along, mu_across, still, step_s = law
+    mu_along, mu_across, mass_kg, radius_m, step_s = law
     centre, rotation = chain[0], chain[1]
+    still = stop_drag(centre[1:], mass_kg, radius_m, step_s)
     depth[:] = 0.0
     for c in range(count):
         i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
@@ -265,7 +267,7 @@ class CompiledSteps:
             np.zeros(links),
             m.before_m,
         )
-        self._law = (m.mu_along, m.mu_across, m.still_n_s_m, m.step_s)
+        self._law = (m.mu_along, m.mu_across, m.link_mass_kg, m.radius_m, m.step_s)
 
     def run(self, steps: int, drive: ServoDrive) -> None:
         """Advance ``steps`` steps."""

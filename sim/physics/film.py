@@ -14,8 +14,9 @@ from config.errors import InputError
 from config.heightfield import HeightField
 from config.robot import RobotConfig
 from config.world import WorldConfig
-from sim.physics.looks import REACHED, dressed_model
+from sim.physics.looks import dressed_model, mark_reached
 from sim.physics.offscreen import Offscreen
+from sim.physics.shade import add_shade
 
 if TYPE_CHECKING:
     import av
@@ -42,6 +43,7 @@ def render_film(
     waypoint_radius_m: float = 0.3,
     path_m: Floats | None = None,
     title: str = "",
+    fine: bool = False,
     on_frame: Callable[[int, int], None] | None = None,
 ) -> int:
     """Write an MP4 (H.264 where PyAV has it) of ``qpos`` (T, 7 + J) at ``time_s`` (T,).
@@ -56,10 +58,11 @@ def render_film(
         fps: frames a second of film.
         speed_up: seconds of run a second of film.
         size: even width and height, pixels.
-        waypoints_m: drawn as discs that turn green when the head has been there, in order.
-        waypoint_radius_m: of these discs.
+        waypoints_m: drawn as rings that turn green when the body's centre is inside, in order.
+        waypoint_radius_m: of these rings.
         path_m: (P, 2) planned path, drawn as dots.
         title: shown in the caption.
+        fine: smooth edges, at three times the cost.
         on_frame: told (frames done, of) after each.
 
     Returns:
@@ -79,11 +82,12 @@ def render_film(
     if faults:
         raise InputError(faults)
     shots = poses_at(times, poses, np.arange(times[0], times[-1], speed_up / fps))
-    model = dressed_model(robot, world, ground, waypoints_m, waypoint_radius_m, path_m)
+    model = dressed_model(robot, world, ground, waypoints_m, waypoint_radius_m, path_m, fine=fine)
     data = mujoco.MjData(model)
     camera = _camera(model, data, shots, fps, robot.length_m)
-    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 10)
+    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + robot.joint_count + 11)
     scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
+    scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
     view, option = mujoco.MjvCamera(), mujoco.MjvOption()
     reached = 0
     with Offscreen(model, *size) as screen, _Film(path, fps, size) as film:
@@ -92,12 +96,14 @@ def render_film(
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
             mujoco.mj_camlight(model, data)
-            reached = _colour(model, shot[:2], waypoints_m, waypoint_radius_m, reached)
+            centre_m = data.xipos[1:, :2].mean(axis=0)
+            reached = _colour(model, centre_m, waypoints_m, waypoint_radius_m, reached)
             view.lookat[:], view.azimuth = camera[k, :3], camera[k, 3]
             view.distance, view.elevation = camera[k, 4], -33.0
             mujoco.mjv_updateScene(
                 model, data, option, None, view, mujoco.mjtCatBit.mjCAT_ALL, scene
             )
+            add_shade(scene, np.array(data.xipos[1:]), np.array(data.xmat[1:, ::3]), robot, ground)
             now = times[0] + k * speed_up / fps
             film.add(screen.draw(scene, f"{title}  {now:6.1f} s   {speed_up:g}x".strip()))
             if on_frame is not None:
@@ -130,22 +136,22 @@ def _camera(
     heading = gaussian_filter1d(body, TURN_CALM_S * fps, axis=0, mode="nearest")
     azimuth = np.degrees(np.unwrap(np.arctan2(heading[:, 1], heading[:, 0]))) + 28.0
     stray = np.abs(centre - calm).max()
-    distance = np.full(len(shots), 1.75 * length_m + stray)
+    distance = np.full(len(shots), 1.55 * length_m + stray)
     return np.column_stack([calm, azimuth, distance])
 
 
 def _colour(
     model: mujoco.MjModel,
-    head_m: Floats,
+    centre_m: Floats,
     waypoints_m: Sequence[tuple[float, float]],
     radius_m: float,
     reached: int,
 ) -> int:
-    """Turn the next waypoint green if the head is there; returns how many are."""
+    """Turn the next waypoint green if the body's centre is there; returns how many are."""
     if reached < len(waypoints_m):
         x, y = waypoints_m[reached]
-        if np.hypot(head_m[0] - x, head_m[1] - y) <= radius_m:
-            model.geom(f"waypoint{reached}").rgba = REACHED
+        if np.hypot(centre_m[0] - x, centre_m[1] - y) <= radius_m:
+            mark_reached(model, reached)
             return reached + 1
     return reached
 

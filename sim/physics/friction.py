@@ -13,10 +13,34 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-STOP_SHARE = 0.6
-"""Share of the link's momentum that friction may take in one step. A straight body can also roll,
-which makes a contact three times lighter than its link (solid cylinder: 1 + m r^2 / (m r^2 / 2));
-the explicit step is stable while 3 * share < 2."""
+STOP_SHARE = 1.8
+"""Share of a contact's momentum that friction may take in one step; the explicit step is stable
+below 2."""
+MOST_SHARE = 1.4
+"""The same of a link's, where it cannot roll: less is safer, more tells no difference any more."""
+
+
+def stop_drag(centre_m: Floats, mass_kg: float, radius_m: float, step_s: float) -> float:
+    """Drag that stops a link within a step, N s/m; ``centre_m`` (L, 3) are the links' centres.
+
+    A body that lies straight can also roll, which makes each contact three times lighter than its
+    link (``1 + r^2 / (r^2 / 2)``, solid cylinder); a bent one cannot, as the links beside its axis
+    resist: their mean square distance from it, seen from above, adds to the ``r^2 / 2``.
+    """
+    links = len(centre_m)
+    x = y = xx = xy = yy = 0.0
+    for i in range(links):
+        x += centre_m[i, 0] / links
+        y += centre_m[i, 1] / links
+    for i in range(links):
+        dx, dy = centre_m[i, 0] - x, centre_m[i, 1] - y
+        xx += dx * dx / links
+        xy += dx * dy / links
+        yy += dy * dy / links
+    off_axis = 0.5 * (xx + yy) - math.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
+    square = radius_m * radius_m
+    lightness = 1.0 + square / (0.5 * square + max(off_axis, 0.0))
+    return min(STOP_SHARE / lightness, MOST_SHARE) * mass_kg / step_s
 
 
 def ellipse_force(
@@ -30,7 +54,7 @@ def ellipse_force(
 ) -> tuple[float, float]:
     """Force along and across a link at one contact, N.
 
-    ``still_n_s_m`` is ``STOP_SHARE * mass / step``, the drag that stops a link;
+    ``still_n_s_m`` is the drag that stops a link, see ``stop_drag``;
     ``link_normal_n`` the sum of the normal forces of the link's contacts, which share it.
     """
     gauge = math.hypot(mu_along * along_m_s, mu_across * across_m_s)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.physics.drive import drive_shafts
-from sim.physics.friction import ellipse_forces
+from sim.physics.friction import ellipse_forces, stop_drag
 from sim.physics.mechanics import LEAST_DEPTH_M, Mechanics, velocities
 from sim.plant import ServoDrive
 
@@ -59,8 +59,9 @@ def friction_forces(m: Mechanics) -> Floats:
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
     across = np.cross(up, along)
     v_along, v_across = (sliding * along).sum(axis=1), (sliding * across).sum(axis=1)
+    still = stop_drag(centre, m.link_mass_kg, m.radius_m, m.step_s)
     f_along, f_across = ellipse_forces(
-        normal_n, v_along, v_across, m.mu_along, m.mu_across, m.still_n_s_m, load
+        normal_n, v_along, v_across, m.mu_along, m.mu_across, still, load
     )
     m.totals[0] -= float(f_along @ v_along + f_across @ v_across) * m.step_s
     m.totals[1] += float((np.abs(v_across) * share).sum()) * m.step_s / len(centre)

@@ -1,5 +1,6 @@
 """How the body and its ground look in a film; nothing here takes part in the physics."""
 
+import itertools
 from collections.abc import Sequence
 
 import mujoco
@@ -10,6 +11,7 @@ from config.heightfield import HeightField
 from config.robot import RobotConfig
 from config.world import WorldConfig
 from sim.physics.model import finish, mjcf
+from sim.physics.shade import SUN_DIRECTION
 
 Floats = NDArray[np.float64]
 Rgba = tuple[float, float, float, float]
@@ -19,9 +21,10 @@ HEAD: Rgba = (0.25, 0.15, 0.08, 1)
 EYE: Rgba = (0.95, 0.80, 0.25, 1)
 PUPIL: Rgba = (0.02, 0.02, 0.02, 1)
 TONGUE: Rgba = (0.75, 0.10, 0.15, 1)
-AHEAD: Rgba = (0.95, 0.35, 0.15, 0.35)
-REACHED: Rgba = (0.25, 0.75, 0.35, 0.30)
-WAY: Rgba = (0.98, 0.98, 0.95, 0.9)
+AHEAD: Rgba = (0.93, 0.33, 0.12, 1)
+REACHED: Rgba = (0.10, 0.62, 0.38, 1)
+WAY: Rgba = (0.98, 0.98, 0.95, 1)
+RING_PARTS = 32
 LOWLAND, HIGHLAND = np.array([96.0, 112, 70]), np.array([214.0, 192, 152])
 CONTOURS = 12
 TEXELS = 1024
@@ -39,20 +42,29 @@ def dressed_model(
     waypoints_m: Sequence[tuple[float, float]] = (),
     waypoint_radius_m: float = 0.3,
     path_m: Floats | None = None,
+    *,
+    fine: bool = False,
 ) -> mujoco.MjModel:
-    """Build the model with skin, floor, sky, waypoints (geoms ``waypointN``) and path (P, 2)."""
+    """Build the model with skin, floor, sky, waypoints (poles and rings) and path (P, 2).
+
+    ``fine`` smooths edges: three times the work of a software renderer.
+    """
     spec = mujoco.MjSpec.from_string(mjcf(robot, world, ground, 0.002))
     for geom in spec.geoms:
         geom.group = 0 if geom.name == "ground" else 4  # the bellies are not drawn
-    _light(spec, robot)
+    _light(spec, robot, fine)
     _floor(spec, ground)
     _skin(spec, robot)
     for k, (x, y) in enumerate(waypoints_m):
         z = 0.0 if ground is None else float(ground.elevation_m(x, y))
         _add(
-            spec.worldbody, _CYLINDER, (waypoint_radius_m, 0.012, 0), (x, y, z), AHEAD
+            spec.worldbody, _CYLINDER, (0.008, 0.15, 0), (x, y, z + 0.15), AHEAD
         ).name = f"waypoint{k}"
-        _add(spec.worldbody, _CYLINDER, (0.012, 0.2, 0), (x, y, z + 0.2), AHEAD)
+        ring = _ring(ground, x, y, waypoint_radius_m)
+        for part, (one, other) in enumerate(itertools.pairwise(ring)):
+            _add(
+                spec.worldbody, _CAPSULE, (0.007, 0, 0), (), AHEAD, (*one, *other)
+            ).name = f"waypoint{k}ring{part}"
     for x, y in _dots(path_m):
         z = 0.0 if ground is None else float(ground.elevation_m(x, y))
         _add(spec.worldbody, _SPHERE, (0.012, 0, 0), (float(x), float(y), z + 0.004), WAY)
@@ -60,6 +72,20 @@ def dressed_model(
     if ground is not None:
         _paint(model, ground)
     return model
+
+
+def mark_reached(model: mujoco.MjModel, waypoint: int) -> None:
+    """Turn a waypoint green."""
+    for name in (f"waypoint{waypoint}", *(f"waypoint{waypoint}ring{n}" for n in range(RING_PARTS))):
+        model.geom(name).rgba = REACHED
+
+
+def _ring(ground: HeightField | None, x: float, y: float, radius_m: float) -> Floats:
+    """Corners (RING_PARTS + 1, 3) of a circle that lies on the ground."""
+    turn = np.linspace(0.0, 2.0 * np.pi, RING_PARTS + 1)
+    east, north = x + radius_m * np.cos(turn), y + radius_m * np.sin(turn)
+    z = np.zeros_like(turn) if ground is None else ground.elevation_m(east, north)
+    return np.stack([east, north, z + 0.004], axis=1)
 
 
 def _add(
@@ -76,23 +102,22 @@ def _add(
     )
 
 
-def _light(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
-    spec.visual.quality.shadowsize = 2048
-    spec.visual.quality.offsamples = 4
+def _light(spec: mujoco.MjSpec, robot: RobotConfig, fine: bool) -> None:
+    spec.visual.quality.offsamples = 4 if fine else 0
+    spec.visual.quality.numslices, spec.visual.quality.numstacks = (28, 16) if fine else (20, 10)
     spec.visual.headlight.ambient = [0.32, 0.32, 0.34]
     spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
     spec.visual.headlight.specular = [0.0, 0.0, 0.0]
-    spec.visual.map.shadowclip = 1.5
     spec.visual.map.znear = 0.02
     spec.stat.extent = robot.length_m
     spec.worldbody.add_light(
         name="sun",
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=[-1.0, -1.5, 3.0],
-        dir=[0.35, 0.45, -1.0],
+        pos=list(-3.0 * SUN_DIRECTION),
+        dir=list(SUN_DIRECTION),
         diffuse=[0.75, 0.73, 0.68],
         specular=[0.25, 0.25, 0.25],
-        castshadow=True,
+        castshadow=False,
     )
 
 

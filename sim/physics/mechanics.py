@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from config.robot import RobotConfig
 from config.world import WorldConfig
-from sim.physics.friction import STOP_SHARE
 
 Floats = NDArray[np.float64]
 
@@ -24,8 +23,8 @@ class Mechanics:
     data: mujoco.MjData
     mu_along: float
     mu_across: float
-    still_n_s_m: float
-    """Drag that takes ``STOP_SHARE`` of a link's momentum in one step."""
+    link_mass_kg: float
+    radius_m: float
     gear_drag_n_m_s: float
     """Viscous loss of a gearbox, powered or not."""
     load_n: Floats
@@ -44,11 +43,11 @@ class Mechanics:
         gear_drag_n_m_s: float,
     ) -> "Mechanics":
         """Gather what the steps need."""
-        still = STOP_SHARE * robot.link_mass_kg / float(model.opt.timestep)
         mu = world.friction
         load, before = np.zeros(robot.joint_count + 1), np.zeros((robot.joint_count + 1, 3))
         data = mujoco.MjData(model)
-        return cls(model, data, mu.along, mu.across, still, gear_drag_n_m_s, load, before)
+        mass, radius = robot.link_mass_kg, robot.body_radius_m
+        return cls(model, data, mu.along, mu.across, mass, radius, gear_drag_n_m_s, load, before)
 
     @property
     def joint_count(self) -> int:

@@ -39,7 +39,7 @@ class Offscreen:
         if caption:
             mujoco.mjr_overlay(
                 mujoco.mjtFont.mjFONT_NORMAL,
-                mujoco.mjtGridPos.mjGRID_BOTTOMLEFT,
+                mujoco.mjtGridPos.mjGRID_TOPLEFT,
                 self._view,
                 caption,
                 "",

@@ -1,0 +1,144 @@
+"""A simulated robot at the start of a run, and what watches its cycles."""
+
+import time
+from typing import Any, Protocol
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.app.drive import Drive
+from controller.app.prepare import Prepared
+from controller.runtime.loop import ticks
+from controller.runtime.pilot import Pilot
+from drivers.bus import DynamixelBus
+from drivers.chain import ServoChain
+from drivers.safe_link import SafeLink
+from drivers.safety import SafetyLimits
+from drivers.telemetry.writer import RunLog
+from drivers.types import JointCommand
+from sim.bus.bank import ServoBank
+from sim.bus.line import SimLine
+from sim.physics.plant import MujocoPlant
+
+Floats = NDArray[np.float64]
+State = tuple[Floats, Floats, Floats, Floats]
+
+
+class Watcher(Protocol):
+    """Told of every cycle."""
+
+    def cycle(self, time_s: float, pilot: Pilot | None, speed_m_s: float) -> None:
+        """After the command of a cycle has been sent."""
+        ...
+
+
+class Recorder:
+    """Keeps what the body was doing in every cycle: position, velocity, force, warm start."""
+
+    def __init__(self, data: mujoco.MjData) -> None:
+        self._data = data
+        self.states: list[State] = []
+
+    def cycle(self, time_s: float, pilot: Pilot | None, speed_m_s: float) -> None:
+        """Copy the state."""
+        d = self._data
+        self.states.append(
+            (d.qpos.copy(), d.qvel.copy(), d.qfrc_applied.copy(), d.qacc_warmstart.copy())
+        )
+
+
+class Stopwatch:
+    """CPU time of the cycles, from the end of the first to the end of the last."""
+
+    def __init__(self) -> None:
+        self.cycles = -1
+        self._first = self._last = 0.0
+
+    def cycle(self, time_s: float, pilot: Pilot | None, speed_m_s: float) -> None:
+        """Take the time."""
+        self._last = time.process_time()
+        if self.cycles < 0:
+            self._first = self._last
+        self.cycles += 1
+
+    @property
+    def cycle_s(self) -> float:
+        """Mean, s."""
+        return (self._last - self._first) / self.cycles
+
+
+class NoLog(RunLog):
+    """Takes everything and writes nothing."""
+
+    def __init__(self) -> None:
+        """Open no file."""
+
+    def cycle(self, *given: Any, **named: Any) -> None:
+        """Nothing."""
+
+    def pose(self, *given: Any, **named: Any) -> None:
+        """Nothing."""
+
+    def walk(self, *given: Any, **named: Any) -> None:
+        """Nothing."""
+
+    def path_laid(self, *given: Any, **named: Any) -> None:
+        """Nothing."""
+
+    def event(self, *given: Any, **named: Any) -> None:
+        """Nothing."""
+
+
+def travelling_wave(time_s: float, joints: int) -> Floats:
+    """(J,) goals of a wave that grows within two seconds."""
+    grown = 0.4 * min(1.0, 0.5 * time_s)
+    return np.asarray(grown * np.sin(3.0 * time_s - np.arange(joints) / 2.2))
+
+
+class SimulatedRobot:
+    """Body, servos, line, chain and safety as ``snakewalk run`` joins them."""
+
+    def __init__(self, prepared: Prepared) -> None:
+        run, robot = prepared.run, prepared.robot
+        self._prepared = prepared
+        self.plant = MujocoPlant(robot, prepared.world, prepared.ground, run.physics_step_s)
+        straight = np.zeros(robot.joint_count)
+        self.plant.reset(run.start_m, prepared.start_heading_rad, straight)
+        servo = robot.servo
+        bank = ServoBank(robot.servo_ids, servo.model, servo.baud)
+        self.line = SimLine(bank, self.plant, baud=servo.baud)
+        chain = ServoChain(DynamixelBus(self.line, servo.model), robot)
+        limits = SafetyLimits.from_config(robot, run.safety)
+        self.link = SafeLink(chain, limits, self.line.clock)
+
+    def walk(self, log: RunLog, watcher: Watcher) -> None:
+        """Run the job until its time limit."""
+        drive = Drive(
+            link=self.link,
+            clock=self.line.clock,
+            pose=lambda _: self.plant.head_pose(),
+            pilot=self._prepared.pilot(),
+            log=log,
+            robot=self._prepared.robot,
+            run=self._prepared.run,
+            gain=self._prepared.gain,
+            watchers=(watcher,),
+            wire_busy_s=lambda: self.line.busy_s,
+        )
+        tripped = drive.run().tripped
+        if tripped:
+            raise RuntimeError(tripped)
+
+    def wave(self, seconds: float, watcher: Watcher) -> None:
+        """Read the joints and write a travelling wave, nothing else."""
+        joints = self._prepared.robot.joint_count
+        with self.link:
+            self.link.enable()
+            clock, hz = self.line.clock, self._prepared.run.cycle_hz
+            start_s = clock.now_s()
+            for tick in ticks(clock, 1.0 / hz, start_s + seconds):
+                self.link.read()
+                goal = travelling_wave(tick.deadline_s - start_s, joints)
+                self.link.write(JointCommand(tick.deadline_s, goal))
+                watcher.cycle(tick.deadline_s, None, 0.0)
