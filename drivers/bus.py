@@ -23,6 +23,7 @@ from drivers.cycle import GroupCycle
 from drivers.errors import BusError, NoAnswerError
 from drivers.exchange import check_accepted, read_register, write_register
 from drivers.port import BytePort
+from drivers.probe import Probe, probe
 from drivers.protocol.packet import (
     ALERT,
     BROADCAST_ID,
@@ -97,6 +98,10 @@ class DynamixelBus:
             for servo_id, (number, firmware) in sorted(answers.items())
         }
 
+    def probe(self, servo_id: int, asked: int = 5) -> Probe:
+        """Ping and listen to the end: finds two servos of one ID, which a ping does not."""
+        return probe(self.port, servo_id, asked, self.latency_s)
+
     def read(self, servo_id: int, name: str) -> int:
         """Value of a register by its name.
 
@@ -168,7 +173,7 @@ class DynamixelBus:
             ControlTableError: the model lacks one of the registers.
 
         """
-        return self._cycle(servo_ids, "Present Current", "Present Position", fast)
+        return self.block(servo_ids, "Present Current", "Present Position", fast=fast)
 
     def slow_cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> GroupCycle:
         """Codec that reads voltage and temperature.
@@ -177,9 +182,17 @@ class DynamixelBus:
             ControlTableError: the model lacks one of the registers.
 
         """
-        return self._cycle(servo_ids, "Present Input Voltage", "Present Temperature", fast)
+        return self.block(servo_ids, "Present Input Voltage", "Present Temperature", fast=fast)
 
-    def _cycle(self, servo_ids: Sequence[int], first: str, last: str, fast: bool) -> GroupCycle:
+    def block(
+        self, servo_ids: Sequence[int], first: str, last: str, *, fast: bool = True
+    ) -> GroupCycle:
+        """Codec that reads the registers from ``first`` to ``last``, both included.
+
+        Raises:
+            ControlTableError: the model lacks one of the registers.
+
+        """
         start, end = self.table[first].address, self.table[last].address + self.table[last].size
         return GroupCycle(
             self.port,

@@ -4,11 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RobotConfig
+from drivers.alive import AliveCheck
 from drivers.bus import DynamixelBus
 from drivers.clock import Clock
 from drivers.cycle import CycleCounters, GroupCycle
-from drivers.errors import BusError, ChainError
+from drivers.errors import BusError, ChainError, PortError
+from drivers.port import BytePort, reopen
 from drivers.readings import Readings
+from drivers.recheck import Recheck, recheck
 from drivers.start_up import Inspection, check_pose, configure, goal_limits_raw, inspect
 from drivers.types import JointCommand, JointState
 from drivers.units import WATCHDOG_UNIT_S, ServoUnits
@@ -39,13 +42,17 @@ class ServoChain:
             bus: servos of the robot's model.
             robot: ids, limits, gains.
             watchdog_s: after so long without an instruction the servos stop by themselves.
-            slow_every: cycles from one reading of voltages and temperatures to the next.
+            slow_every: cycles from one reading of voltages and temperatures to the next, at least
+                3; torque and watchdog are looked at as often, in other cycles.
             fast: use fast sync reads where every firmware has them.
 
         Raises:
             ControlTableError: the model lacks a register or a unit that the cycle needs.
+            ValueError: ``slow_every`` is below 3.
 
         """
+        if slow_every < 3:
+            raise ValueError(f"slow_every must be at least 3, got {slow_every}")
         self.robot = robot
         self.inspection: Inspection | None = None
         """The servos as found by the last ``enable``."""
@@ -59,6 +66,7 @@ class ServoChain:
         self._readings = Readings(robot.joint_count, bus.table, self._units)
         self._cycle: GroupCycle = bus.cycle(robot.servo_ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(robot.servo_ids, fast=fast)
+        self._alive = AliveCheck(bus, robot.servo_ids, fast=fast)
         self._reads = 0
         self._armed = False
         self._spoke_at_s = -np.inf
@@ -67,6 +75,11 @@ class ServoChain:
     def joint_count(self) -> int:
         """Number of joints J."""
         return self.robot.joint_count
+
+    @property
+    def port(self) -> BytePort:
+        """The line."""
+        return self._bus.port
 
     @property
     def clock(self) -> Clock:
@@ -100,37 +113,94 @@ class ServoChain:
         fast = self._fast and self.inspection.fast_reads
         self._cycle = bus.cycle(ids, fast=fast)
         self._slow = bus.slow_cycle(ids, fast=fast)
+        self._alive = AliveCheck(bus, ids, fast=fast)
         self._reads = 0
         state = self._first_state()
         check_pose(self.robot, state.position_rad)
         try:
-            goals = self._send_goals(state.position_rad)
-            for servo_id, goal in zip(ids, goals.tolist(), strict=True):
-                self._expect(servo_id, "Goal Position", goal)
-            bus.sync_write(ids, "Torque Enable", 1)
-            for servo_id in ids:
-                self._expect(servo_id, "Torque Enable", 1)
-            ticks = min(127, max(1, round(self._watchdog_s / WATCHDOG_UNIT_S)))
-            bus.sync_write(ids, "Bus Watchdog", ticks)
-            for servo_id in ids:
-                self._expect(servo_id, "Bus Watchdog", ticks)
-            self._armed = True
-            return self.read()
+            return self._hold_and_arm(state)
         except BaseException:
             self.disable()
             raise
+
+    def recheck(self) -> Recheck:
+        """Look at the chain after an interruption and compare it with what it was; moves nothing.
+
+        Raises:
+            BusError: a servo does not answer.
+            PortError: the port is gone.
+
+        """
+        before = self._readings.state(self._clock.now_s()).position_rad
+        return recheck(self._bus, self.robot, self._units, self.inspection, before)
+
+    def resume(self, found: Recheck) -> JointState:
+        """Go on after an interruption: torque that is on stays on, nothing moves.
+
+        Servos that lost their torque (rebooted) are set up again. The others are freed from their
+        watchdog's stop and in the same breath told to stay where they are.
+
+        Raises:
+            ChainError: ``found`` forbids it.
+            BusError: a servo does not do as told; torque is off again then.
+            PortError: the port is gone.
+
+        """
+        if found.faults:
+            raise ChainError(found.faults)
+        configure(self._bus, self.robot, self._units, found.torque_off)
+        self._reads = 0
+        state = self._first_state()
+        check_pose(self.robot, state.position_rad)
+        try:
+            return self._hold_and_arm(state)
+        except BaseException:
+            self.disable()
+            raise
+
+    def hold(self) -> None:
+        """Tell all servos to stay where they were last seen.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        here = self._readings.state(self._clock.now_s()).position_rad
+        if np.isfinite(here).all():
+            self._send_goals(here)
+
+    def _hold_and_arm(self, state: JointState) -> JointState:
+        """Goal = present, torque on, watchdog armed; every step read back."""
+        bus, ids = self._bus, self.robot.servo_ids
+        bus.sync_write(ids, "Bus Watchdog", 0)  # no gap before the goals: an old one would count
+        goals = self._send_goals(state.position_rad)
+        for servo_id, goal in zip(ids, goals.tolist(), strict=True):
+            self._expect(servo_id, "Goal Position", goal)
+        bus.sync_write(ids, "Torque Enable", 1)
+        for servo_id in ids:
+            self._expect(servo_id, "Torque Enable", 1)
+        ticks = min(127, max(1, round(self._watchdog_s / WATCHDOG_UNIT_S)))
+        bus.sync_write(ids, "Bus Watchdog", ticks)
+        for servo_id in ids:
+            self._expect(servo_id, "Bus Watchdog", ticks)
+        self._armed = True
+        return self.read()
 
     def disable(self) -> None:
         """Torque off, then the watchdog; every servo is asked, whatever the others do.
 
         Raises:
             BusError: servos that did not confirm; their watchdog stays armed and stops them.
-            PortError: the port is gone.
+            PortError: the port is gone and cannot be opened again; the watchdog stops the servos.
 
         """
         self._armed = False
         bus, ids = self._bus, self.robot.servo_ids
-        bus.sync_write(ids, "Torque Enable", 0)
+        try:
+            bus.sync_write(ids, "Torque Enable", 0)
+        except PortError:
+            reopen(bus.port)  # it may be back; if not, this says so
+            bus.sync_write(ids, "Torque Enable", 0)
         silent = []
         for servo_id in ids:
             try:
@@ -145,17 +215,23 @@ class ServoChain:
         """Read all joints once; in every ``slow_every``-th call voltages and temperatures too.
 
         Raises:
+            BusError: a servo has lost its torque (it has rebooted), or its watchdog has stopped it.
             PortError: the port is gone.
 
         """
+        self._spoke_at_s = self._clock.now_s()
         answer = self._cycle.read()
         for joint in self._readings.take(answer, self._clock.now_s()):
             self._read_alarm(int(joint))
-        if self._reads % self._slow_every == 0:
-            self._readings.take_slow(self._slow.read())
+        turn = self._reads % self._slow_every
         self._reads += 1
-        self._spoke_at_s = self._clock.now_s()
-        return self._readings.state(self._spoke_at_s)
+        if turn == 0:
+            self._readings.take_slow(self._slow.read())
+        elif self._armed and turn == self._slow_every // 3:
+            self._alive.torque()
+        elif self._armed and turn == 2 * self._slow_every // 3:
+            self._alive.watchdog()
+        return self._readings.state(self._clock.now_s())
 
     def write(self, command: JointCommand) -> None:
         """Send goal positions, kept inside the joint limits.

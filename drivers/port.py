@@ -10,6 +10,7 @@ both, and nothing above can tell what answers.
 from typing import Protocol
 
 from drivers.clock import Clock
+from drivers.errors import PortError
 
 
 class SdkPort(Protocol):
@@ -107,3 +108,15 @@ class BytePort(SdkPort, Protocol):
         the next question.
         """
         ...
+
+
+def reopen(port: BytePort) -> None:
+    """Close and open again, after the port was gone.
+
+    Raises:
+        PortError: it is still not there.
+
+    """
+    port.closePort()
+    if not port.openPort():
+        raise PortError(f"{port.name}: cannot be opened again")

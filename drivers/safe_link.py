@@ -2,16 +2,19 @@
 
 import signal
 import threading
+from dataclasses import replace
 from types import FrameType, TracebackType
 
 from drivers.clock import Clock
 from drivers.errors import DriverError, SafetyTrippedError
 from drivers.link import JointLink
+from drivers.recovery import Recovery
 from drivers.safety import (
     SafetyLimits,
     SafetyMemory,
     Verdict,
     over_current_since_s,
+    stale_fault,
     state_fault,
     vet,
 )
@@ -27,14 +30,26 @@ class SafeLink:
     ``tripped`` says why, ``write`` raises; ``read`` goes on, for the log. Only ``reset`` by an
     operator and a new ``enable`` let it move again. Inside the context SIGTERM, SIGINT and SIGHUP
     unwind the program through the exit; if it is killed, the servos' bus watchdog stops them.
+
+    With a ``recovery`` a line or servo that went away does not latch at once: the chain holds, and
+    goes on from where it stands if the recovery's policy lets it.
     """
 
-    def __init__(self, link: JointLink, limits: SafetyLimits, clock: Clock) -> None:
+    def __init__(
+        self,
+        link: JointLink,
+        limits: SafetyLimits,
+        clock: Clock,
+        recovery: Recovery | None = None,
+    ) -> None:
         self.tripped: str | None = None
         """Why it has latched; None while it lets commands pass."""
         self.last_verdict: Verdict | None = None
         """Of the last command."""
+        self.recoveries = 0
+        """Interruptions after which it went on."""
         self._link = link
+        self._recovery = recovery
         self._limits = limits
         self._clock = clock
         self._state: JointState | None = None
@@ -99,21 +114,27 @@ class SafeLink:
         """Read all joints; latches if the state is a reason to, and returns it all the same.
 
         Raises:
-            SafetyTrippedError: the link below failed just now.
+            SafetyTrippedError: the link below failed just now, and was not brought back.
 
         """
         try:
             state = self._link.read()
         except DriverError as fault:
-            self._trip(str(fault))
-            raise SafetyTrippedError(str(self.tripped)) from fault
+            return self._bring_back(str(fault), fault)
+        if self._memory is None:
+            self._state = state
+            return state
+        stale = stale_fault(state, self._limits, self._clock.now_s())
+        if stale is not None and self._recovery is not None and self.tripped is None:
+            return self._bring_back(stale, None)
         self._state = state
-        if self._memory is not None:
-            self._judge(state, self._memory)
+        self._judge(state, self._memory)
         return state
 
     def write(self, command: JointCommand) -> None:
         """Vet a command against the last state read and send what may pass.
+
+        After an interruption that was mended in this call, nothing is sent: the joints hold.
 
         Raises:
             SafetyTrippedError: latched, before or by this command.
@@ -133,8 +154,9 @@ class SafeLink:
         try:
             self._link.write(JointCommand(command.time_s, verdict.goal_rad))
         except DriverError as fault:
-            self._trip(str(fault))
-            raise SafetyTrippedError(str(self.tripped)) from fault
+            self._bring_back(str(fault), fault)
+        else:  # if the program stood still in between, the next step counts from here
+            self._memory = replace(verdict.memory, time_s=self._clock.now_s())
 
     def request_stop(self, reason: str) -> None:
         """Latch at the next read or write; may be called from another thread (a stop button)."""
@@ -151,6 +173,23 @@ class SafeLink:
             raise ValueError("a reset needs the name of the operator")
         self.tripped = None
         self._stop_requested = None
+
+    def _bring_back(self, reason: str, fault: DriverError | None) -> JointState:
+        """Let the recovery mend what broke; else latch and raise."""
+        state = None
+        if self._recovery is not None and self._memory is not None:
+            try:
+                state = self._recovery.bring_back(reason, lambda: self._stop_requested)
+            except DriverError as again:
+                fault = again
+                reason = f"{reason}; while going on: {again}"
+        if state is None:
+            self._trip(reason)
+            raise SafetyTrippedError(str(self.tripped)) from fault
+        self.recoveries += 1
+        self._state, self._memory = state, SafetyMemory.at_rest(state)
+        self._judge(state, self._memory)
+        return state
 
     def _judge(self, state: JointState, memory: SafetyMemory) -> None:
         since_s = over_current_since_s(state, memory, self._limits)

@@ -107,8 +107,7 @@ def vet(
     # After a pause the allowance does not pile up: never more than that of one stale limit
     dt_s = min(max(now_s - last.time_s, 0.0), limits.stale_limit_s)
     step = limits.goal_rate_rad_s * dt_s
-    goal = np.clip(command.goal_rad, -limits.limit_rad, limits.limit_rad)
-    goal = np.clip(goal, last.goal_rad - step, last.goal_rad + step)
+    goal = np.clip(command.goal_rad, last.goal_rad - step, last.goal_rad + step)
     lead = limits.goal_lead_rad
     goal = np.clip(goal, state.position_rad - lead, state.position_rad + lead)
     goal = np.clip(goal, -limits.limit_rad, limits.limit_rad)
@@ -125,6 +124,16 @@ def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLi
     return np.where(state.valid, np.where(over, started, np.nan), since)
 
 
+def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | None:
+    """First joint that was not read for too long; None if there is none."""
+    age_s = state.age_s + (now_s - state.time_s)
+    stale = ~(age_s <= limits.stale_limit_s)  # also a NaN
+    if not stale.any():
+        return None
+    joint = int(np.argmax(stale))
+    return f"joint {joint}: not read for {age_s[joint]:.3f} s"
+
+
 def state_fault(
     state: JointState, over_since_s: Floats, limits: SafetyLimits, now_s: float
 ) -> str | None:
@@ -132,14 +141,15 @@ def state_fault(
 
     Temperature and voltage that were not read yet (NaN) are no reason.
     """
-    age_s = state.age_s + (now_s - state.time_s)
+    stale = stale_fault(state, limits, now_s)
+    if stale is not None:
+        return stale
     over_s = state.time_s - over_since_s
     alarm = (state.hardware_error != 0) | ((state.error & ALERT) != 0)
     numbers = np.stack([state.position_rad, state.velocity_rad_s, state.current_a])
     # not (a <= b) also stops at a NaN, where a > b would let it pass
     checks: tuple[tuple[Any, NDArray[Any], str], ...] = (
-        (~(age_s <= limits.stale_limit_s), age_s, "not read for {:.3f} s"),
-        (~np.isfinite(numbers).all(axis=0), state.position_rad, "measured {}: not a number"),
+        (~np.isfinite(numbers).all(axis=0), numbers.sum(axis=0), "measured {}: not a number"),
         (alarm, state.hardware_error, "alarm"),
         (
             ~(np.abs(state.position_rad) <= limits.limit_rad + limits.limit_slack_rad),

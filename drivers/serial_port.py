@@ -17,6 +17,8 @@ from drivers.errors import PortError
 
 _LATENCY_MS = 16.0
 """What an FTDI adapter may hold bytes back by default (its ``latency_timer``)."""
+_PROGRAM_S = 0.02
+"""How late a program at the other end of a pseudo-terminal may be: it has to be scheduled."""
 _NOISE_LIMIT_BYTES = 1 << 16
 
 
@@ -71,6 +73,8 @@ class SerialPort:
     @property
     def latency_s(self) -> float:
         """How long bytes may be held back on this side, for ``DynamixelBus(latency_s=...)``."""
+        if os.path.realpath(self._device).startswith("/dev/pts/"):
+            return _PROGRAM_S
         timer_ms = self.latency_timer_ms
         return 0.003 + (timer_ms if timer_ms is not None else 1) * 1e-3
 

@@ -5,6 +5,7 @@ of 500 us a servo, alarms that were there before, turn counts lost at a reboot.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,8 +108,16 @@ def _report(bus: DynamixelBus, servo_id: int, name: str) -> ServoReport:
     )
 
 
-def configure(bus: DynamixelBus, robot: RobotConfig, units: ServoUnits) -> None:
+def configure(
+    bus: DynamixelBus, robot: RobotConfig, units: ServoUnits, joints: Iterable[int] | None = None
+) -> None:
     """Torque off, then every setting that the chain relies on, each read back.
+
+    Args:
+        bus: where the servos are.
+        robot: what they shall be.
+        units: of their model.
+        joints: only these; None is all.
 
     Raises:
         ChainError: a setting of the robot is beyond what a servo allows.
@@ -116,9 +125,11 @@ def configure(bus: DynamixelBus, robot: RobotConfig, units: ServoUnits) -> None:
 
     """
     limits = goal_limits_raw(robot, units)
-    for joint, servo_id in enumerate(robot.servo_ids):
-        bus.write(servo_id, "Bus Watchdog", 0)  # in its error state goals cannot be written
+    for joint in range(robot.joint_count) if joints is None else joints:
+        servo_id = robot.servo_ids[joint]
         bus.write_verified(servo_id, "Torque Enable", 0)  # else the EEPROM is locked
+        # In its error state goals cannot be written; it ends with torque off, or an old goal counts
+        bus.write(servo_id, "Bus Watchdog", 0)
         bus.write_verified(servo_id, "Status Return Level", 2)
         bus.write_verified(servo_id, "Return Delay Time", 0)
         pitch = robot.joint_axes[joint] == "p"

@@ -6,10 +6,18 @@ from pathlib import Path
 import typer
 
 from config.errors import InputError
+from controller.app.commands.bus import serve, sniff
+from controller.app.commands.bus_set import bus_set
+from controller.app.commands.doctor import doctor
 from controller.app.commands.listing import list_
 from controller.app.commands.plan import plan
+from controller.app.commands.replay import replay
+from controller.app.commands.report import report
 from controller.app.commands.run import run
+from controller.app.commands.scan import scan
+from controller.app.commands.track import track
 from controller.app.commands.trials import trials
+from drivers.errors import DriverError
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -28,9 +36,30 @@ app.command(epilog=_examples("plan", "plan flat-slalom --motion serpenoid --json
 app.command(
     epilog=_examples("run", "run flat-slalom --seed 3", "run my-run.toml --port /dev/ttyUSB0")
 )(run)
+app.command(epilog=_examples("report runs/flat-square-walk-seed0/log.mcap"))(report)
+app.command(epilog=_examples("replay runs/flat-square-walk-seed0/log.mcap --json"))(replay)
 app.command(
     epilog=_examples("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json")
 )(trials)
+app.command(epilog=_examples("track", "track MIDLINES.csv --rate 60 --picture track.png"))(track)
+
+app.command(epilog=_examples("scan", "scan --port /dev/ttyUSB0 --baud 57600 --json"))(scan)
+app.command(epilog=_examples("doctor", "doctor --port /dev/ttyUSB0 --robot alternating16"))(doctor)
+bus = typer.Typer(no_args_is_help=True, help="Servos and their settings.")
+app.add_typer(bus, name="bus")
+bus.command(
+    "set",
+    epilog=_examples(
+        "bus set --id 1 --baud 57600 --new-id 7 --new-baud 1000000 --dry-run",
+        "bus set --id 7 --return-delay 0 --yes",
+    ),
+)(bus_set)
+bus.command(
+    epilog=_examples(
+        "bus serve --servos 1-16", "bus serve --robot yaw16 --faults faults.toml --pace 0.5"
+    )
+)(serve)
+bus.command(epilog=_examples("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))(sniff)
 
 
 def main() -> None:
@@ -41,6 +70,9 @@ def main() -> None:
         for line in error.faults:
             print(f"snakewalk: {line}", file=sys.stderr)
         raise SystemExit(2) from None
+    except DriverError as error:
+        print(f"snakewalk: {error}", file=sys.stderr)
+        raise SystemExit(1) from None
     except OSError as error:
         print(f"snakewalk: {Path(str(error.filename or ''))}: {error.strerror}", file=sys.stderr)
         raise SystemExit(2) from None

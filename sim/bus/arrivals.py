@@ -44,6 +44,10 @@ class Arrivals:
             packets.popleft()
         return bytes(taken)
 
+    def clear(self) -> None:
+        """Lose everything."""
+        self._packets.clear()
+
     def cut(self, at_s: float) -> None:
         """Lose what has not arrived by ``at_s``."""
         kept = [(packet[0], packet[1][: self._arrived(packet, at_s)]) for packet in self._packets]

@@ -9,18 +9,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.control_table import ControlTable, load_control_table
+from drivers.control_table import Register
+from drivers.errors import ControlTableError
 from drivers.protocol.packet import ALERT, ResultError
+from sim.bus.indirect import Indirect
 from sim.bus.registers import (
     BAUDS,
+    CURRENT_MODES,
     EEPROM_END,
     GOALS,
     MODE_RESETS,
     MODES,
     POSITION_MODE,
     WATCHDOG_TRIPPED,
-    Rule,
-    rules,
+    indirect_blocks,
+    registers_of,
 )
 
 Rows = NDArray[np.intp]
@@ -30,31 +33,45 @@ TABLE_BYTES = 1024
 
 
 class ServoBank:
-    """S servos of one model with distinct IDs, factory new but for ID and baud rate.
+    """S servos of one model, factory new but for ID and baud rate.
+
+    ``clashing`` allows two servos to share an ID, as an unlucky chain does.
 
     Raises:
-        ControlTableError: the model is unknown, or cannot be simulated.
-        ValueError: an ID is used twice, or the baud rate is not one of the servos'.
+        ControlTableError: the model cannot be simulated, an ID is out of range or used twice, or
+            the baud rate is not one of the model's.
 
     """
 
     def __init__(
-        self, ids: Sequence[int], model: str = "XM430-W350", baud: int = 1_000_000
+        self,
+        ids: Sequence[int],
+        model: str = "XM430-W350",
+        baud: int = 1_000_000,
+        *,
+        clashing: bool = False,
     ) -> None:
-        if len(set(ids)) != len(ids):
-            raise ValueError(f"two servos share an ID: {sorted(ids)}")
-        if baud not in BAUDS:
-            raise ValueError(f"{baud} baud: the servos have {', '.join(map(str, BAUDS))}")
         self.ids = tuple(ids)
-        self.layout = load_control_table(model)
+        self.layout, self._registers, self._rules = registers_of(model.upper().replace("_", "-"))
         self.model = self.layout.model
-        self._rules = {
-            name: rule for name, rule in rules(self.model).items() if name in self.layout
-        }
+        known = BAUDS[: (self._rules["Baud Rate"].high or 0) + 1]
+        faults = [f"ID {each}: a servo has 0 to 252" for each in self.ids if not 0 <= each <= 252]
+        if len(set(self.ids)) != len(self.ids) and not clashing:
+            faults.append(f"two servos share an ID: {', '.join(map(str, sorted(self.ids)))}")
+        if baud not in known:
+            faults.append(f"{baud} baud: {self.model} has {', '.join(map(str, known))}")
+        if faults:
+            raise ControlTableError(faults)
         self.table = np.zeros((len(self.ids), TABLE_BYTES), np.uint8)
         self._views = {name: self._view(name) for name in self._rules}
-        self._spans = _spans(self.layout, self._rules)
+        self._spans = {
+            register.address: (register, self._rules[name])
+            for name, register in self._registers.items()
+        }
+        self.indirect = Indirect(self.table, indirect_blocks(self.layout))
+        self.measures_current = "Present Current" in self._rules
         self._registered: dict[int, tuple[int, bytes]] = {}
+        self._backup: dict[int, bytes] = {}
         self.reset(np.arange(len(self.ids)), keep=())
         self["ID"][:] = self.ids
         self["Baud Rate"][:] = BAUDS.index(baud)
@@ -66,13 +83,21 @@ class ServoBank:
         """(S,) live view of a register of all servos, by the SDK's name."""
         return self._views[name]
 
-    def rows_at(self, baud: int) -> Rows:
-        """(256,) row of each ID among the servos that listen at ``baud``; -1: nobody."""
-        rows = np.full(256, -1, np.intp)
+    def __contains__(self, name: object) -> bool:
+        return name in self._views
+
+    def register(self, name: str) -> Register:
+        """Address, size and sign of a register, also of those that the SDK's table lacks."""
+        return self._registers[name]
+
+    def names(self) -> tuple[str, ...]:
+        """All registers of the model."""
+        return tuple(self._registers)
+
+    def listeners(self, baud: int) -> Rows:
+        """Rows of the servos that are tuned to ``baud``."""
         index = BAUDS.index(baud) if baud in BAUDS else -1
-        hear = np.flatnonzero(self["Baud Rate"] == index)
-        rows[self["ID"][hear]] = hear
-        return rows
+        return np.flatnonzero(self["Baud Rate"] == index)
 
     def alert(self, rows: Rows | slice | int) -> NDArray[np.uint8]:
         """Bit 7 of the error field: set while Hardware Error Status(70) is not 0."""
@@ -86,31 +111,41 @@ class ServoBank:
         """Whether a block lies in the table; gaps between registers read as 0."""
         return length > 0 and address >= 0 and address + length <= TABLE_BYTES
 
-    def check(self, row: int, address: int, data: bytes) -> ResultError:
-        """Say what a write of ``data`` would answer; nothing is written."""
-        at = address
-        while at < address + len(data):
-            span = self._spans.get(at)
-            if span is None:
-                return ResultError.ACCESS
-            name, size, rule = span
-            if at + size > address + len(data):
-                return ResultError.DATA_LENGTH
-            if not rule.writable or (at < EEPROM_END and self["Torque Enable"][row]):
-                return ResultError.ACCESS
-            raw = data[at - address : at - address + size]
-            value = int.from_bytes(raw, "little", signed=self.layout[name].signed)
-            error = self._check_value(row, name, value)
-            if error:
-                return error
-            at += size
-        return ResultError.NONE if data else ResultError.DATA_LENGTH
+    def check(self, row: int, address: int, data: bytes, *, ram_only: bool = False) -> ResultError:
+        """Say what a write of ``data`` would answer; nothing is written.
 
-    def write(self, row: int, address: int, data: bytes) -> ResultError:
+        ``ram_only`` refuses the EEPROM, as a servo does that is addressed by its secondary ID.
+        """
+        if not data:
+            return ResultError.DATA_LENGTH
+        for start, run in self.indirect.runs(row, address, data):
+            at = start
+            while at < start + len(run):
+                span = self._spans.get(at)
+                if span is None:
+                    return ResultError.ACCESS
+                register, rule = span
+                end = at + register.size
+                if end > start + len(run):
+                    return ResultError.DATA_LENGTH
+                locked = at < EEPROM_END and (ram_only or self["Torque Enable"][row])
+                if not rule.writable or locked:
+                    return ResultError.ACCESS
+                error = self._check_value(
+                    row, register.name, register.decode(run[at - start : end - start])
+                )
+                if error:
+                    return error
+                at = end
+        return ResultError.NONE
+
+    def write(self, row: int, address: int, data: bytes, *, ram_only: bool = False) -> ResultError:
         """Write a block to one servo, all of it or, with an error, none of it."""
-        error = self.check(row, address, data)
+        error = self.check(row, address, data, ram_only=ram_only)
         if not error:
-            self.table[row, address : address + len(data)] = np.frombuffer(data, np.uint8)
+            for at, run in self.indirect.runs(row, address, data):
+                self.table[row, at : at + len(run)] = np.frombuffer(run, np.uint8)
+            self.indirect.written(address, len(data))
         return error
 
     def register_write(self, row: int, address: int, data: bytes) -> ResultError:
@@ -130,27 +165,57 @@ class ServoBank:
     def reset(self, rows: Rows, keep: Sequence[str], ram_only: bool = False) -> None:
         """Set initial values, in the RAM area alone (reboot) or in both (factory reset)."""
         for name, rule in self._rules.items():
-            if name not in keep and not (ram_only and self.layout[name].address < EEPROM_END):
+            if name not in keep and not (ram_only and self.register(name).address < EEPROM_END):
                 self[name][rows] = rule.initial
-        for goal, limit in zip(
-            GOALS[:3], ("PWM Limit", "Current Limit", "Velocity Limit"), strict=True
-        ):
-            self[goal][rows] = self[limit][rows]
+        for goal in GOALS[:3]:
+            if goal in self:
+                self[goal][rows] = self[_limit_of(goal)][rows]
         for row in rows:
             self._registered.pop(int(row), None)
+            self["Backup Ready"][row] = int(row) in self._backup
+        self.indirect.look()
+
+    def back_up(self, row: int) -> ResultError:
+        """Store the EEPROM and the saved part of the RAM; only with torque off (e-manual)."""
+        if self["Torque Enable"][row]:
+            return ResultError.RESULT_FAIL
+        self._backup[row] = self.table[row].tobytes()
+        self["Backup Ready"][row] = 1
+        return ResultError.NONE
+
+    def restore(self, row: int) -> ResultError:
+        """Put the stored EEPROM back; the servo then reboots."""
+        if self["Torque Enable"][row] or row not in self._backup:
+            return ResultError.RESULT_FAIL
+        self.table[row, :EEPROM_END] = np.frombuffer(self._backup[row], np.uint8)[:EEPROM_END]
+        return ResultError.NONE
+
+    def restore_ram(self, row: int) -> None:
+        """Put the stored gains, profile and indirect addresses back (RAM Restore, at start)."""
+        kept = self._backup.get(row)
+        if kept is None:
+            return
+        stored = np.frombuffer(kept, np.uint8)
+        names = [*MODE_RESETS, *(n for n in self._rules if n.startswith("Indirect Address"))]
+        for name in names:
+            register = self.register(name)
+            block = slice(register.address, register.address + register.size)
+            self.table[row, block] = stored[block]
+        self.indirect.look()
 
     def switch_mode(self, rows: Rows) -> None:
         """Set back what a new Operating Mode(11) does: gains, profile, and limits of the output."""
         for name in MODE_RESETS:
             self[name][rows] = self._rules[name].initial
-        self["Goal PWM"][rows] = self["PWM Limit"][rows]
-        self["Goal Current"][rows] = self["Current Limit"][rows]
+        for goal in ("Goal PWM", "Goal Current"):
+            if goal in self:
+                self[goal][rows] = self[_limit_of(goal)][rows]
 
     def _check_value(self, row: int, name: str, value: int) -> ResultError:
         rule = self._rules[name]
         if rule.low is not None and rule.high is not None and not rule.low <= value <= rule.high:
             return ResultError.DATA_RANGE
-        if name == "Operating Mode" and value not in MODES:
+        if name == "Operating Mode" and not self._has_mode(value):
             return ResultError.DATA_RANGE
         if name == "Torque Enable" and value and self.shut_down(row):
             return ResultError.RESULT_FAIL
@@ -169,15 +234,18 @@ class ServoBank:
                 return int(self["Min Position Limit"][row]), int(self["Max Position Limit"][row])
             rule = self._rules[name]
             return int(rule.low or 0), int(rule.high or 0)
-        limit = int(self[name.removeprefix("Goal ") + " Limit"][row])
+        limit = int(self[_limit_of(name)][row])
         return -limit, limit
 
+    def _has_mode(self, mode: int) -> bool:
+        return mode in MODES and (self.measures_current or mode not in CURRENT_MODES)
+
     def _view(self, name: str) -> Ints:
-        field = self.layout[name]
+        field = self.register(name)
         kind = f"<{'i' if field.signed else 'u'}{field.size}"
         block = self.table[:, field.address : field.address + field.size]
         return block.view(kind)[:, 0]
 
 
-def _spans(layout: ControlTable, known: dict[str, Rule]) -> dict[int, tuple[str, int, Rule]]:
-    return {layout[name].address: (name, layout[name].size, rule) for name, rule in known.items()}
+def _limit_of(goal: str) -> str:
+    return goal.removeprefix("Goal ") + " Limit"

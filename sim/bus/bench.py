@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.bus.gearbox import Gearbox
 from sim.plant import ServoDrive
 
 Floats = NDArray[np.float64]
@@ -14,7 +15,8 @@ class BenchPlant:
     """J shafts with inertia and friction, semi-implicit Euler; a ``sim.plant.Plant``.
 
     Viscous damping and back-EMF are taken implicitly, and dry friction never reverses a shaft, so
-    that any step size is stable and a shaft without drive comes to rest exactly.
+    that any step size is stable and a shaft without drive comes to rest exactly. A ``gear`` brings
+    its own inertia, added, and its own friction, in place of ``viscous_n_m_s`` and ``dry_n_m``.
     """
 
     def __init__(
@@ -27,11 +29,13 @@ class BenchPlant:
         step_s: float = 1e-3,
         load_n_m: Callable[[Floats], Floats] | None = None,
         start_rad: ArrayLike = 0.0,
+        gear: Gearbox | None = None,
     ) -> None:
         self._step_s = step_s
         self._steps = 0
-        self._inertia = inertia_kg_m2
-        self._viscous = viscous_n_m_s
+        self._gear = gear
+        self._inertia = inertia_kg_m2 + (gear.armature_kg_m2 if gear is not None else 0.0)
+        self._viscous = gear.viscous_n_m_s if gear is not None else viscous_n_m_s
         self._dry = dry_n_m
         self._load = load_n_m
         self._position = np.full(joints, start_rad, dtype=np.float64)
@@ -76,12 +80,17 @@ class BenchPlant:
         )
         damping = self._viscous + np.where(limited, 0.0, stiff * drive.back_emf_v_s)
         free = (self._inertia * w + h * (push + load)) / (self._inertia + h * damping)
-        brake = h * self._dry / (self._inertia + h * damping)
+        brake = h * self._friction(push - damping * w, load) / (self._inertia + h * damping)
         w[:] = np.sign(free) * np.maximum(np.abs(free) - brake, 0.0)
         q += h * w
         amps = (drive.pwm * drive.supply_v - drive.back_emf_v_s * w) / drive.resistance_ohm * on
         drive.current_a[:] = _within(amps, limit)
         drive.torque_n_m[:] = drive.current_a * drive.torque_constant_n_m_a
+
+    def _friction(self, motor_n_m: Floats, load_n_m: ArrayLike) -> Floats | float:
+        if self._gear is None:
+            return self._dry
+        return self._gear.friction_n_m(self._velocity, motor_n_m, np.asarray(load_n_m))
 
 
 def _within(value: Floats, limit: Floats) -> Floats:

@@ -7,8 +7,12 @@ protection is due), and only then registers are read or written.
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.bus.agenda import Agenda
 from sim.bus.bank import ServoBank
-from sim.bus.motor import MOTORS, PWM_FULL, TICKS_PER_RAD, TICKS_PER_REV, make_drive, p_gain_per_rad
+from sim.bus.jam import Jam
+from sim.bus.loops import CONTROL_S, Loops
+from sim.bus.motor import MOTORS, PWM_FULL, TICKS_PER_RAD, TICKS_PER_REV, make_drive
+from sim.bus.profile import VELOCITY_UNIT_RAD_S
 from sim.bus.protection import SLICE_S, Protection, Surroundings
 from sim.bus.registers import (
     CURRENT_MODE,
@@ -26,13 +30,18 @@ Ints = NDArray[np.int64]
 
 CENTRE_TICKS = 2048
 """Present Position(132) of a straight joint."""
-VELOCITY_UNIT_RAD_S = 0.229 * 2.0 * np.pi / 60.0
-"""Present Velocity(128): 0.229 rev/min a unit, e-manual."""
 WATCHDOG_UNIT_S = 0.02
 FAR_RAD = 1e9
 """Where a motor is sent that only has to push: the output saturates at its limit."""
-REVERSE = 0x01
-"""Drive Mode(10), bit 0."""
+REVERSE, TORQUE_ON_BY_GOAL = 0x01, 0x08
+"""Drive Mode(10), bits 0 and 3."""
+STARTUP_TORQUE_ON, STARTUP_RAM_RESTORE = 0x01, 0x02
+"""Startup Configuration(60)."""
+HOMING_LIMIT_TICKS = 1_024
+"""Homing Offset(20) beyond this is ignored in position control mode (e-manual)."""
+IN_POSITION_TICKS, FOLLOWING_TICKS = 20, 100
+"""Deviations behind the flags of Moving Status(123), "predefined" in the e-manual: ours."""
+IN_POSITION, PROFILE_ONGOING, FOLLOWING_ERROR = 0x01, 0x02, 0x08
 
 
 class Firmware:
@@ -47,7 +56,8 @@ class Firmware:
         self.motor = MOTORS[bank.model]
         around = surroundings or Surroundings(supply_v=self.motor.nominal_v)
         self.drive = make_drive([self.motor] * joints, around.supply_v)
-        self.protection = Protection(bank, self.drive, self.motor, around)
+        self.jam = Jam(self.drive, self.motor)
+        self.protection = Protection(bank, self.drive, self.motor, around, self.jam)
         self._start_s = self._time_s = plant.time_s
         self._slice_s = self._time_s + SLICE_S
         self._heard_s = self._time_s
@@ -56,6 +66,13 @@ class Firmware:
         self._was_on = np.zeros(joints, bool)
         self._was_mode = bank["Operating Mode"].copy()
         self._held = np.zeros(joints, bool)
+        self.powered = np.ones(joints, bool)
+        """(S,) False while a servo has no supply: it hears nothing and lets go."""
+        self.agenda = Agenda()
+        """What happens to the servos at a time of its own, whoever talks."""
+        self.loops = Loops(bank, self.drive, self.motor)
+        self._goal = self.drive.goal_rad.copy()
+        self._control_s = self._time_s + CONTROL_S
         self.changed()
         self.power_up(np.arange(joints))
 
@@ -64,10 +81,18 @@ class Firmware:
     def advance(self, until_s: float) -> None:
         """Step physics, watchdog, heat and protections to ``until_s``."""
         while self._time_s < until_s:
-            stop_s = min(until_s, self._slice_s, self._watchdog_s)
+            stop_s = min(until_s, self._slice_s, self._watchdog_s, self.agenda.next_s)
+            if self.loops.active:
+                stop_s = min(stop_s, self._control_s)
             self.plant.advance(stop_s, self.drive)
             self.protection.pass_time(stop_s - self._time_s)
             self._time_s = stop_s
+            if self.loops.active and stop_s >= self._control_s:
+                self._control_s = stop_s + CONTROL_S
+                self.loops.tick(self.plant, self._goal, self._sign, self._held)
+            if stop_s >= self.agenda.next_s:
+                self.agenda.carry_out(stop_s)
+                self.changed()
             if stop_s >= self._watchdog_s:
                 self._trip_watchdog()
             if stop_s >= self._slice_s:
@@ -90,25 +115,34 @@ class Firmware:
         switched = np.flatnonzero(mode != self._was_mode)
         if len(switched):
             bank.switch_mode(switched)
+        on &= self.powered
         again = (mode == POSITION_MODE) & ((on & ~self._was_on) | (mode != self._was_mode))
         self._sign = np.where(bank["Drive Mode"] & REVERSE, -1.0, 1.0)
         if again.any():
             self._forget_turns(again)
-        self._zero = CENTRE_TICKS + bank["Homing Offset"] - TICKS_PER_REV * self._turns
+        offset = bank["Homing Offset"].astype(np.int64)
+        offset[(mode == POSITION_MODE) & (np.abs(offset) > HOMING_LIMIT_TICKS)] = 0
+        self._zero = CENTRE_TICKS + offset - TICKS_PER_REV * self._turns
         self._was_on, self._was_mode = on, mode.copy()
+        self._woken_by_goals = bool((bank["Drive Mode"] & TORQUE_ON_BY_GOAL).any())
         tripped = bank["Bus Watchdog"] == WATCHDOG_TRIPPED
         self._held &= tripped
-        drive.torque_on[:] = on & (mode != VELOCITY_MODE)
-        drive.p_gain_per_rad[:] = p_gain_per_rad(bank["Position P Gain"], self.motor)
+        drive.torque_on[:] = on
+        self._was_active = self.loops.active
+        self.loops.take_over(on, self.plant.position_rad)
+        if self.loops.active and not self._was_active:
+            self._control_s = self._time_s + CONTROL_S
         drive.pwm_limit[:] = np.abs(bank["Goal PWM"].astype(float)) / PWM_FULL
         self._push = np.zeros(len(bank))
         for pushing, goal in ((PWM_MODE, "Goal PWM"), (CURRENT_MODE, "Goal Current")):
-            self._push += (mode == pushing) * self._sign * np.sign(bank[goal]) * FAR_RAD
+            if goal in bank:
+                self._push += (mode == pushing) * self._sign * np.sign(bank[goal]) * FAR_RAD
         self._push[tripped] = 0.0
         self._pushed = bool(np.isin(mode, (PWM_MODE, CURRENT_MODE)).any())
         limited = (mode == CURRENT_POSITION_MODE) | (mode == CURRENT_MODE)
-        goal_a = np.abs(bank["Goal Current"].astype(float)) * self.motor.current_unit_a
-        drive.current_limit_a[:] = np.where(limited, goal_a, np.inf)
+        if bank.measures_current:
+            goal_a = np.abs(bank["Goal Current"].astype(float)) * self.motor.current_unit_a
+            drive.current_limit_a[:] = np.where(limited, goal_a, np.inf)
         single = mode == POSITION_MODE
         low = np.where(single, bank["Min Position Limit"].astype(int), -EXTENDED_RANGE_TICKS)
         high = np.where(single, bank["Max Position Limit"].astype(int), EXTENDED_RANGE_TICKS)
@@ -116,13 +150,24 @@ class Firmware:
         self._high = np.where(tripped, -EXTENDED_RANGE_TICKS - 1, high)
         self._aim()
         self._arm_watchdog()
+        self.jam.hold()
 
     def write_goals(self, rows: NDArray[np.intp] | slice, ticks: NDArray[np.int32]) -> None:
         """Goal Position(116) of many servos at once; values out of limits are refused."""
         goal = self.bank["Goal Position"]
         taken = (ticks >= self._low[rows]) & (ticks <= self._high[rows])
         goal[rows] = ticks if taken.all() else np.where(taken, ticks, goal[rows])
+        if self._woken_by_goals:
+            self.wake(np.asarray(np.arange(len(self.bank))[rows])[taken])
         self._aim()
+
+    def wake(self, rows: NDArray[np.intp]) -> None:
+        """Torque on by goal update (Drive Mode(10), bit 3), unless an error holds it off."""
+        for row in rows:
+            asks = self.bank["Drive Mode"][row] & TORQUE_ON_BY_GOAL
+            if asks and not self.bank.shut_down(int(row)) and not self.bank["Torque Enable"][row]:
+                self.bank["Torque Enable"][row] = 1
+                self.changed()
 
     def reboot(self, row: int, factory_keeping: tuple[str, ...] | None = None) -> None:
         """Restart one servo; with ``factory_keeping``, first reset all but these registers."""
@@ -138,10 +183,18 @@ class Firmware:
         self._forget_turns(np.isin(np.arange(len(self.bank)), rows))
         self.protection.restart(rows)
         self._was_on[rows] = False
+        start = self.bank["Startup Configuration"]
+        for row in rows:
+            if start[row] & STARTUP_RAM_RESTORE:
+                self.bank.restore_ram(int(row))
         self.changed()
         self.refresh()
         self.bank["Goal Position"][rows] = self.bank["Present Position"][rows]
         self._aim()
+        eager = rows[(start[rows] & STARTUP_TORQUE_ON) != 0]
+        if len(eager):
+            self.bank["Torque Enable"][eager] = 1
+            self.changed()
 
     def clear_turns(self, row: int) -> bool:
         """Clear instruction: position back into one turn; refused (False) while moving."""
@@ -151,13 +204,48 @@ class Firmware:
         self.changed()
         return True
 
+    def clear_error(self, row: int) -> bool:
+        """Clear instruction: forget hardware errors whose cause is gone; False if one is not."""
+        self.bank["Hardware Error Status"][row] = 0
+        self.protection.restart(np.array([row]))
+        self.protection.look(self.plant)
+        self.changed()
+        return not self.bank["Hardware Error Status"][row]
+
+    def seize(self, rows: NDArray[np.intp]) -> None:
+        """Jam shafts where they are."""
+        for row in rows:
+            self.jam.seize(int(row), float(self.plant.position_rad[row]))
+        self.changed()
+
+    def release(self, rows: NDArray[np.intp]) -> None:
+        """Free jammed shafts."""
+        for row in rows:
+            self.jam.free(int(row))
+        self.changed()
+
+    def cut_power(self, rows: NDArray[np.intp]) -> None:
+        """Take the supply away: shafts go limp, and all that is not EEPROM is lost."""
+        self.powered[rows] = False
+        self.changed()
+
+    def give_power(self, rows: NDArray[np.intp]) -> None:
+        """Give the supply back: the servos start anew, their turns forgotten."""
+        self.powered[rows] = True
+        self.bank.reset(rows, keep=(), ram_only=True)
+        self.power_up(rows)
+
     # shafts to registers
 
     def refresh_motion(self) -> None:
         """Present Current, Velocity and Position(126, 128, 132)."""
         bank, sign = self.bank, self._sign
-        scale = sign / self.motor.current_unit_a
-        bank["Present Current"][:] = np.rint(self.drive.current_a * scale)
+        if bank.measures_current:
+            scale = sign / self.motor.current_unit_a
+            bank["Present Current"][:] = np.rint(self.jam.current_a() * scale)
+        else:  # "inferred from the internal output": torque in tenths of a per cent of stall
+            scale = sign * (1e3 / self.motor.stall_current_a)
+            bank["Present Load"][:] = np.clip(np.rint(self.jam.current_a() * scale), -1e3, 1e3)
         bank["Present Velocity"][:] = np.rint(
             self.plant.velocity_rad_s * (sign / VELOCITY_UNIT_RAD_S)
         )
@@ -169,14 +257,36 @@ class Firmware:
         """All present values."""
         bank = self.bank
         self.refresh_motion()
-        bank["Present PWM"][:] = np.rint(self.drive.pwm * self._sign * PWM_FULL)
-        bank["Position Trajectory"][:] = bank["Goal Position"]
+        bank["Present PWM"][:] = np.rint(self.jam.pwm() * self._sign * PWM_FULL)
+        self._refresh_trajectory()
         bank["Present Input Voltage"][:] = np.rint(self.drive.supply_v * 10.0)
         bank["Present Temperature"][:] = np.clip(np.rint(self.protection.temperature_c), 0, 255)
-        bank["Moving"][:] = np.abs(self.plant.velocity_rad_s) > self._moving_rad_s()
         bank["Realtime Tick"][:] = int((self._time_s - self._start_s) * 1e3) % 32_768
+        if bank.indirect.used:
+            bank.indirect.gather()
 
     # inside
+
+    def _refresh_trajectory(self) -> None:
+        """Velocity and Position Trajectory(136, 140), Moving(122), Moving Status(123)."""
+        bank, path, loops = self.bank, self.loops.trajectory, self.loops
+        goal, present = bank["Goal Position"].astype(float), bank["Present Position"]
+        shown = np.where(
+            loops.position, path.position * self._sign * TICKS_PER_RAD + self._zero, goal
+        )
+        bank["Position Trajectory"][:] = np.rint(shown)
+        run = loops.position | loops.velocity
+        bank["Velocity Trajectory"][:] = np.rint(
+            np.where(run, path.velocity * self._sign / VELOCITY_UNIT_RAD_S, 0.0)
+        )
+        ongoing = loops.position & path.ongoing
+        turning = np.abs(self.plant.velocity_rad_s) > self._moving_rad_s()
+        bank["Moving"][:] = turning | ongoing
+        placed = ~np.isin(bank["Operating Mode"], (CURRENT_MODE, VELOCITY_MODE, PWM_MODE))
+        status = IN_POSITION * (np.abs(goal - present) <= IN_POSITION_TICKS)
+        status |= FOLLOWING_ERROR * (np.abs(shown - present) > FOLLOWING_TICKS)
+        status = np.where(placed, status, 0) | PROFILE_ONGOING * ongoing
+        bank["Moving Status"][:] = status | np.where(loops.position, path.kind, 0)
 
     def _moving_rad_s(self) -> Floats:
         return np.asarray(self.bank["Moving Threshold"] * VELOCITY_UNIT_RAD_S)
@@ -184,10 +294,17 @@ class Firmware:
     def _aim(self) -> None:
         goal = (self.bank["Goal Position"] - self._zero) * (self._sign / TICKS_PER_RAD)
         if self._held.any():
-            goal = np.where(self._held, self.drive.goal_rad, goal)
-        self.drive.goal_rad[:] = (
-            np.where(self._push != 0.0, self._push, goal) if self._pushed else goal
-        )
+            goal = np.where(self._held, self._goal, goal)
+        self._goal = goal
+        drive_goal = np.where(self._push != 0.0, self._push, goal) if self._pushed else goal
+        loops = self.loops
+        if loops.active:
+            loops.aim(goal)
+            run = loops.position | loops.velocity
+            drive_goal = np.where(run, self.drive.goal_rad, drive_goal)
+        self.drive.goal_rad[:] = drive_goal
+        if self.jam.any:
+            self.jam.hold()
 
     def _forget_turns(self, which: NDArray[np.bool_]) -> None:
         ticks = np.rint(self.plant.position_rad * self._sign * TICKS_PER_RAD) + CENTRE_TICKS
@@ -205,5 +322,5 @@ class Firmware:
         late &= self._heard_s + WATCHDOG_UNIT_S * dog <= self._time_s + 1e-9
         dog[late] = WATCHDOG_TRIPPED
         self._held |= late
-        self.drive.goal_rad[late] = self.plant.position_rad[late]
+        self._goal[late] = self.plant.position_rad[late]
         self.changed()

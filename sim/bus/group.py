@@ -62,7 +62,7 @@ class GroupPath:
         block = values.reshape(-1, 5)
         ids = block[:, 0].tobytes()
         if self._goal_rows is None or self._goal_rows[0] != ids:
-            rows = self._service.rows[block[:, 0]]
+            rows = self._service.roll.rows[block[:, 0]]
             if (rows < 0).any() or len(np.unique(rows)) != len(rows):
                 return None
             self._goal_rows = (ids, _as_slice(rows))
@@ -75,7 +75,7 @@ class GroupPath:
             return None
         address, length = int.from_bytes(raw[8:10], "little"), int.from_bytes(raw[10:12], "little")
         ids = np.frombuffer(raw, np.uint8, len(raw) - 14, 12)
-        rows = self._service.rows[ids]
+        rows = self._service.roll.rows[ids]
         if (rows < 0).any() or not self._bank.readable(address, length):
             return None
         if (self._bank["Status Return Level"][rows] < 1).any():

@@ -1,16 +1,19 @@
 """Motor constants by servo model, and what the registers make of them.
 
 Torque, current and speed figures are those of the e-manual's specification tables at the voltage
-that ROBOTIS recommends; everything else is derived from them here. Thermal figures are not
-published: ours are marked, and only shape when a hot servo shuts down, not how it moves.
+that ROBOTIS recommends (``sim.bus.models``); everything else is derived from them here. Thermal
+figures are not published: ours are marked, and only shape when a hot servo shuts down, not how it
+moves.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.bus.models import MODELS, ModelFacts
 from sim.plant import ServoDrive
 
 Floats = NDArray[np.float64]
@@ -20,6 +23,14 @@ TICKS_PER_REV = 4096
 TICKS_PER_RAD = TICKS_PER_REV / math.tau
 PWM_FULL = 885.0
 """Goal PWM(100): 885 is 100 %, e-manual."""
+_RPM = math.tau / 60.0
+_DIVISOR = 128.0
+"""K_P = Position P Gain(84) / 128, e-manual, in PWM units a tick of position error."""
+_DIVISOR_330 = 256.0
+"""The 330 models: the e-manual says 128 here too, but in recordings of a real XL330-M288 (Rhoban,
+bam) the output follows the position error at gain / 256, r > 0.998 at three gains, up to 885."""
+_HEAVY_A = 1.6
+"""Models that stall at less heat up quicker (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +44,6 @@ class MotorModel:
     current_unit_a: float
     """Ampere of one unit of Present Current(126)."""
     p_gain_divisor: float
-    """K_P = Position P Gain(84) / divisor, in PWM units a tick of position error."""
     standby_a: float
     winding_k_per_w: float
     """Heating of the housing sensor in the long run, kelvin per watt of I^2 R (ours)."""
@@ -56,19 +66,23 @@ class MotorModel:
         return self.nominal_v / self.no_load_rad_s
 
 
-_RPM = math.tau / 60.0
+def _motor(facts: ModelFacts) -> MotorModel:
+    small = facts.pwm_slope is not None
+    light = small or facts.stall_current_a < _HEAVY_A
+    return MotorModel(
+        facts.nominal_v,
+        facts.stall_torque_n_m,
+        facts.stall_current_a,
+        facts.no_load_rpm * _RPM,
+        facts.current_unit_a,
+        _DIVISOR_330 if small else _DIVISOR,
+        facts.standby_a,
+        12.0 if light else 6.0,
+        150.0 if light else 300.0,
+    )
 
-MOTORS = {
-    # e-manual XM430-W350, Specifications: 4.1 N m at 12.0 V and 2.3 A, 46 rev/min at 12.0 V,
-    # standby 40 mA; Current Limit(38): about 2.69 mA a unit;
-    # Position PID Gain: divisor 128.
-    "XM430-W350": MotorModel(12.0, 4.1, 2.3, 46.0 * _RPM, 2.69e-3, 128.0, 0.040, 6.0, 300.0),
-    # e-manual XL330-M288-T, Specifications: 0.52 N m at 5.0 V and 1.47 A, 103 rev/min at 5.0 V,
-    # standby 17 mA; Current Limit(38): 1 mA a unit.
-    # Divisor: the e-manual says 128 here too, but in recordings of a real one (Rhoban, bam) the
-    # output follows the position error at gain / 256, r > 0.998 at three gains, up to 885.
-    "XL330-M288": MotorModel(5.0, 0.52, 1.47, 103.0 * _RPM, 1.0e-3, 256.0, 0.017, 12.0, 150.0),
-}
+
+MOTORS: Mapping[str, MotorModel] = {model: _motor(facts) for model, facts in MODELS.items()}
 
 
 def p_gain_per_rad(register: int | Ints, motor: MotorModel) -> Floats:

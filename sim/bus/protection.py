@@ -4,12 +4,13 @@ Detected faults go to Hardware Error Status(70); those in the mask of Shutdown(6
 off until a reboot (e-manual, Shutdown).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.bus.bank import ServoBank
+from sim.bus.jam import Jam
 from sim.bus.motor import MotorModel
 from sim.plant import Plant, ServoDrive
 
@@ -17,9 +18,12 @@ Floats = NDArray[np.float64]
 
 SLICE_S = 0.05
 """How often this is looked at; the shafts are seen far more often."""
+STARVED = 0.6
+"""Share of Min Voltage Limit(34) below which a powered motor is "insufficient power" (ours)."""
 OVERLOAD_S = 1.0
 """How long a motor at full output may be held ("persistent load", e-manual; the time is ours)."""
 VOLTAGE_ERROR, OVERHEATING_ERROR, OVERLOAD_ERROR = 0x01, 0x04, 0x20
+ENCODER_ERROR, SHOCK_ERROR = 0x08, 0x10
 """Bits of Hardware Error Status(70) and Shutdown(63)."""
 
 
@@ -37,13 +41,36 @@ class Protection:
     """Temperatures, supply and load of all servos of a bank."""
 
     def __init__(
-        self, bank: ServoBank, drive: ServoDrive, motor: MotorModel, around: Surroundings
+        self,
+        bank: ServoBank,
+        drive: ServoDrive,
+        motor: MotorModel,
+        around: Surroundings,
+        jam: Jam,
     ) -> None:
         self._bank, self._drive, self._motor, self._around = bank, drive, motor, around
+        self._jam = jam
         self.temperature_c = np.full(len(bank), around.ambient_c)
         """(S,) at the sensor: first order in the winding's loss."""
         self._heat_j = np.zeros(len(bank))
         self._blocked_s = np.zeros(len(bank))
+
+    @property
+    def supply_v(self) -> float:
+        """Voltage of the supply, before the cable."""
+        return self._around.supply_v
+
+    def supply(self, volts: float) -> None:
+        """Change the supply."""
+        self._around = replace(self._around, supply_v=volts)
+
+    def heat(self, rows: NDArray[np.intp], celsius: float) -> None:
+        """Set housings to a temperature."""
+        self.temperature_c[rows] = celsius
+
+    def detect(self, rows: NDArray[np.intp], error: int) -> None:
+        """Let servos find an error: shown, and off with the torque if Shutdown(63) says so."""
+        self._note(np.isin(np.arange(len(self._bank)), rows) * error)
 
     def restart(self, rows: NDArray[np.intp]) -> None:
         """Forget what led up to an overload; heat stays."""
@@ -51,7 +78,7 @@ class Protection:
 
     def pass_time(self, seconds: float) -> None:
         """Add up the windings' loss at the present currents."""
-        amps = self._drive.current_a
+        amps = self._jam.current_a()
         self._heat_j += amps * amps * (seconds * self._motor.resistance_ohm)
 
     def look(self, plant: Plant) -> bool:
@@ -59,9 +86,11 @@ class Protection:
         self._warm_up()
         volts = self._sag()
         bank, drive = self._bank, self._drive
-        full = np.abs(drive.pwm) >= 0.98 * drive.pwm_limit
-        along_rad_s = np.sign(drive.pwm) * plant.velocity_rad_s
-        held = full & (along_rad_s < 0.05 * self._motor.no_load_rad_s) & (drive.torque_on > 0)
+        drive_on = drive.torque_on > 0
+        pwm = self._jam.pwm()
+        full = np.abs(pwm) >= 0.98 * np.minimum(drive.pwm_limit, 1.0)
+        along_rad_s = np.sign(pwm) * plant.velocity_rad_s
+        held = full & (along_rad_s < 0.05 * self._motor.no_load_rad_s) & drive_on
         self._blocked_s = np.where(held, self._blocked_s + SLICE_S, 0.0)
         tenths = round(volts * 10.0)
         outside = (tenths < bank["Min Voltage Limit"]) | (tenths > bank["Max Voltage Limit"])
@@ -69,12 +98,17 @@ class Protection:
             VOLTAGE_ERROR * outside
             | OVERHEATING_ERROR * (np.rint(self.temperature_c) > bank["Temperature Limit"])
             | OVERLOAD_ERROR * (self._blocked_s >= OVERLOAD_S)
+            | SHOCK_ERROR * ((volts < STARVED * bank["Min Voltage Limit"] * 0.1) & drive_on)
         )
         if not errors.any():
             return False
+        self._note(errors)
+        return True
+
+    def _note(self, errors: NDArray[np.integer]) -> None:
+        bank = self._bank
         bank["Hardware Error Status"][:] |= errors.astype(np.uint8)
         bank["Torque Enable"][(bank["Hardware Error Status"] & bank["Shutdown"]) != 0] = 0
-        return True
 
     def _warm_up(self) -> None:
         motor = self._motor

@@ -1,14 +1,15 @@
 """What the e-manual says of each register beside its address: access, initial value, range.
 
 Addresses and sizes come from the SDK's own control tables (``drivers.control_table``); the columns
-"Access", "Initial Value" and "Range" are only in the e-manual's control table of each model, and
-stand here.
+"Access", "Initial Value" and "Range" are only in the e-manual's control table of each model: what
+the whole X series shares stands here, what differs in ``sim.bus.models``.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from drivers.errors import ControlTableError
+from drivers.control_table import ControlTable, Register, load_control_table
+from sim.bus.models import facts_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,8 @@ CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, EXTENDED_MODE = 0, 1, 3, 4
 CURRENT_POSITION_MODE, PWM_MODE = 5, 16
 MODES = (0, 1, 3, 4, 5, 16)
 """Operating Mode(11)."""
+CURRENT_MODES = (CURRENT_MODE, CURRENT_POSITION_MODE)
+"""Those that a model without current sensing lacks."""
 
 BAUDS = (9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
 """Baud Rate(8), by value."""
@@ -74,6 +77,7 @@ _X_SERIES: Mapping[str, Rule] = {
     "Velocity Limit": Rule(350, 0, 1_023),
     "Max Position Limit": Rule(4_095, 0, 4_095),
     "Min Position Limit": Rule(0, 0, 4_095),
+    "Startup Configuration": Rule(0, 0, 3),
     "Shutdown": Rule(52, 0, 255),
     "Torque Enable": Rule(0, 0, 1),
     "LED": Rule(0, 0, 1),
@@ -99,46 +103,95 @@ _X_SERIES: Mapping[str, Rule] = {
     "Moving Status": Rule(0),
     "Present PWM": Rule(0),
     "Present Current": Rule(0),
+    "Present Load": Rule(0),
     "Present Velocity": Rule(0),
     "Present Position": Rule(0),
     "Velocity Trajectory": Rule(0),
     "Position Trajectory": Rule(0),
     "Present Input Voltage": Rule(0),
     "Present Temperature": Rule(0),
+    "Backup Ready": Rule(0),
+    **dict.fromkeys((f"External Port Mode {n}" for n in (1, 2, 3)), Rule(3, 0, 3)),
+    **dict.fromkeys((f"External Port Data {n}" for n in (1, 2, 3)), Rule(0, 0, 4_095)),
 }
 
-# e-manual, the model's own page, where it differs from the above.
-_OWN: Mapping[str, Mapping[str, Rule]] = {
-    "XM430-W350": {"Model Number": Rule(1_020)},
-    "XL330-M288": {
-        "Model Number": Rule(1_200),
-        "Baud Rate": Rule(1, 0, 6),
-        "Temperature Limit": Rule(70, 0, 100),
-        "Max Voltage Limit": Rule(70, 31, 70),
-        "Min Voltage Limit": Rule(35, 31, 70),
-        "Current Limit": Rule(1_750, 0, 1_750),
-        "Velocity Limit": Rule(445, 0, 2_047),
-        "PWM Slope": Rule(140, 1, 255),
-        "Shutdown": Rule(53, 0, 255),
-        "Velocity I Gain": Rule(1_600, *_GAIN),
-        "Velocity P Gain": Rule(180, *_GAIN),
-        "Position P Gain": Rule(400, *_GAIN),
-        "Goal Current": Rule(1_750, -1_750, 1_750),
-        "Goal Velocity": Rule(445, -2_047, 2_047),
-    },
-}
 
-MODELS = tuple(_OWN)
-"""Servo models that can be simulated."""
+_UNLISTED = (
+    Register("Startup Configuration", 60, 1, signed=False),
+    Register("Backup Ready", 147, 1, signed=False),
+)
+"""In the e-manual's tables from firmware 45 (330: 46) on, but not in the SDK's."""
+
+INDIRECT_FROM, INDIRECT_TO = 64, 661
+"""What Indirect Address registers may point at: the RAM area."""
 
 
-def rules(model: str) -> dict[str, Rule]:
-    """Register rules of a model by the SDK's register names.
+@dataclass(frozen=True, slots=True)
+class IndirectBlock:
+    """Consecutive Indirect Address registers and the data bytes that they give a meaning to."""
+
+    addresses: int
+    data: int
+    count: int
+
+
+def registers_of(model: str) -> tuple[ControlTable, dict[str, Register], dict[str, Rule]]:
+    """Control table, all registers (indirect ones numbered), and their rules, of a model.
 
     Raises:
         ControlTableError: the model cannot be simulated.
 
     """
-    if model not in _OWN:
-        raise ControlTableError(f"{model}: not simulated; those that are: {', '.join(MODELS)}")
-    return {**_X_SERIES, **_OWN[model]}
+    shared = _rules(model)
+    layout = load_control_table(model)
+    listed = {name: layout[name] for name in layout if name in shared}
+    listed |= {register.name: register for register in _UNLISTED}
+    rules = {name: shared[name] for name in listed}
+    first = 1
+    for block in indirect_blocks(layout):
+        for k in range(block.count):
+            address, data = f"Indirect Address {first + k}", f"Indirect Data {first + k}"
+            listed[address] = Register(address, block.addresses + 2 * k, 2, signed=False)
+            listed[data] = Register(data, block.data + k, 1, signed=False)
+            rules[address] = Rule(block.data + k, INDIRECT_FROM, INDIRECT_TO)
+            rules[data] = Rule(0, 0, 255)
+        first += block.count
+    return layout, listed, rules
+
+
+def indirect_blocks(layout: ControlTable) -> tuple[IndirectBlock, ...]:
+    """Where a model's indirect registers lie: two blocks of 28, on the 330 models one."""
+    first, data = layout["Indirect Address 1"].address, layout["Indirect Data 1"].address
+    near = IndirectBlock(first, data, (data - first) // 2)
+    small = facts_of(layout.model).pwm_slope is not None
+    return (near,) if small else (near, IndirectBlock(578, 634, 28))
+
+
+def _rules(model: str) -> dict[str, Rule]:
+    """Register rules of a model by the SDK's register names."""
+    facts = facts_of(model)
+    low, high = facts.volts
+    gains = facts.gains
+    own = {
+        "Model Number": Rule(load_control_table(model).model_number),
+        "Baud Rate": Rule(1, 0, facts.bauds - 1),
+        "Moving Threshold": Rule(facts.moving_threshold, 0, 1_023),
+        "Temperature Limit": Rule(facts.temperature_limit_c, 0, 100),
+        "Max Voltage Limit": Rule(high, low, high),
+        "Min Voltage Limit": Rule(facts.min_volts or low, low, high),
+        "Velocity Limit": Rule(facts.velocity_limit, 0, facts.velocity_range),
+        "Shutdown": Rule(facts.shutdown, 0, 255),
+        "Velocity I Gain": Rule(gains.velocity_i, *_GAIN),
+        "Velocity P Gain": Rule(gains.velocity_p, *_GAIN),
+        "Position D Gain": Rule(gains.position_d, *_GAIN),
+        "Position I Gain": Rule(gains.position_i, *_GAIN),
+        "Position P Gain": Rule(gains.position_p, *_GAIN),
+        "Goal Velocity": Rule(facts.velocity_limit, -facts.velocity_range, facts.velocity_range),
+    }
+    if facts.current_limit is not None:
+        limit = facts.current_limit
+        own["Current Limit"] = Rule(limit, 0, limit)
+        own["Goal Current"] = Rule(limit, -limit, limit)
+    if facts.pwm_slope is not None:
+        own["PWM Slope"] = Rule(facts.pwm_slope, 1, 255)
+    return {**_X_SERIES, **own}

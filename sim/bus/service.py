@@ -5,8 +5,6 @@ The two packets of a control cycle have a vectorised way in ``sim.bus.group`` wi
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from drivers.protocol.packet import (
     BROADCAST_ID,
     Instruction,
@@ -18,9 +16,15 @@ from drivers.protocol.packet import (
 from sim.bus.fast_answer import encode_fast
 from sim.bus.firmware import Firmware
 from sim.bus.orders import Orders, word
+from sim.bus.overlay import overlay
+from sim.bus.roll import Roll
 
+LONGEST = 0xFFFF
+"""What the length field of a packet ends at."""
 RETURN_DELAY_UNIT_S = 2e-6
 """Return Delay Time(9), e-manual."""
+BITS_PER_BYTE = 10
+"""Start bit, eight data bits, stop bit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +42,17 @@ class Service:
         self.firmware = firmware
         self.bank = firmware.bank
         self.baud = baud
+        self.roll = Roll(self.bank)
         self.version = 0
         """Grows whenever registers were written, so that others know what to look up again."""
+        self.collisions = 0
+        """Answers that were garbled because servos spoke at once."""
         self.retune()
         self._orders = Orders(firmware)
 
     def retune(self) -> None:
         """Look up again who listens at the line's baud rate, under which ID."""
-        self.rows = self.bank.rows_at(self.baud)
+        self.roll.call(self.baud, self.firmware.powered)
         self.version += 1
 
     def delay_s(self, row: int) -> float:
@@ -54,10 +61,12 @@ class Service:
 
     def execute(self, packet: InstructionPacket, now_s: float) -> list[Answer]:
         """Carry out a valid packet that ended at ``now_s``; the firmware is already there."""
+        if not self.roll.present():
+            return []
         self.firmware.heard(now_s)
-        code, params = packet.instruction, packet.params
+        code, params, servo_id = packet.instruction, packet.params, packet.servo_id
         if code == Instruction.PING:
-            return self._ping(packet.servo_id)
+            return self._ping(servo_id)
         if code in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
             return self._sync_read(params, fast=code == Instruction.FAST_SYNC_READ)
         if code in (Instruction.BULK_READ, Instruction.FAST_BULK_READ):
@@ -66,33 +75,42 @@ class Service:
             return self._sync_write(params)
         if code == Instruction.BULK_WRITE:
             return self._bulk_write(params)
-        if packet.servo_id == BROADCAST_ID:
-            for row in np.unique(self.rows[self.rows >= 0]):
-                self._one(int(row), code, params)
-            return []
-        row = int(self.rows[packet.servo_id])
-        if row < 0:
+        if servo_id == BROADCAST_ID:
+            whole = code == Instruction.FACTORY_RESET and params == b"\xff"
+            for row in [] if whole else self.roll.present():  # refused since firmware 42
+                self._one(row, code, params)
             return []
         if code == Instruction.READ:
-            return self._read(row, packet.servo_id, params)
-        level, delay_s = int(self.bank["Status Return Level"][row]), self.delay_s(row)
-        error = self._one(row, code, params)
-        if level < 2:
+            return self._read(servo_id, params)
+        voices = []
+        for row in self.roll.primary(servo_id):
+            level, delay_s = int(self.bank["Status Return Level"][row]), self.delay_s(row)
+            error = self._one(row, code, params)
+            if level == 2 and not self.roll.mute[row]:
+                voices.append((delay_s, self._status(row, servo_id, error, b"")))
+        for row in self.roll.secondary(servo_id):
+            self._one(row, code, params, ram_only=True)
+        return self._speak(voices)
+
+    def _speak(self, voices: list[tuple[float, bytes]]) -> list[Answer]:
+        if not voices:
             return []
-        return [Answer(delay_s, self._status(row, packet.servo_id, error, b""))]
+        delay_s, data, garbled = overlay(voices, BITS_PER_BYTE / self.baud)
+        self.collisions += garbled
+        return [Answer(delay_s, data)]
 
     def _status(self, row: int, servo_id: int, error: int, data: bytes) -> bytes:
         return encode_status(StatusPacket(servo_id, error | int(self.bank.alert(row)), data))
 
     def _ping(self, servo_id: int) -> list[Answer]:
-        ids = range(253) if servo_id == BROADCAST_ID else (servo_id,)
         answers = []
-        for each in ids:
-            row = int(self.rows[each])
-            if row >= 0:
+        for each in self.roll.ids() if servo_id == BROADCAST_ID else (servo_id,):
+            voices = []
+            for row in self.roll.speaking(each):
                 model, firmware = self.bank["Model Number"][row], self.bank["Firmware Version"][row]
                 data = int(model).to_bytes(2, "little") + bytes((int(firmware),))
-                answers.append(Answer(self.delay_s(row), self._status(row, each, 0, data)))
+                voices.append((self.delay_s(row), self._status(row, each, 0, data)))
+            answers += self._speak(voices)
         return answers
 
     def _block(self, row: int, address: int, length: int) -> tuple[int, bytes]:
@@ -100,14 +118,17 @@ class Service:
             return ResultError.ACCESS, b""
         return 0, self.bank.table[row, address : address + length].tobytes()
 
-    def _read(self, row: int, servo_id: int, params: bytes) -> list[Answer]:
-        if self.bank["Status Return Level"][row] < 1:
-            return []
+    def _read(self, servo_id: int, params: bytes) -> list[Answer]:
         self.firmware.refresh()
-        error, data = ResultError.DATA_LENGTH.value, b""
-        if len(params) == 4:
-            error, data = self._block(row, word(params, 0), word(params, 2))
-        return [Answer(self.delay_s(row), self._status(row, servo_id, error, data))]
+        voices = []
+        for row in self.roll.speaking(servo_id):
+            if self.bank["Status Return Level"][row] < 1:
+                continue
+            error, data = ResultError.DATA_LENGTH.value, b""
+            if len(params) == 4:
+                error, data = self._block(row, word(params, 0), word(params, 2))
+            voices.append((self.delay_s(row), self._status(row, servo_id, error, data)))
+        return self._speak(voices)
 
     def _sync_read(self, params: bytes, *, fast: bool) -> list[Answer]:
         asked = [(each, word(params, 0), word(params, 2)) for each in params[4:]]
@@ -125,52 +146,69 @@ class Service:
 
         So after one that is silent, the rest is silent too (ROBOTIS on the SDK's issue tracker).
         """
+        if fast and sum(length + 4 for _, _, length in asked) + 1 > LONGEST:
+            return []  # no length field could announce the common answer
         self.firmware.refresh()
         answers: list[Answer] = []
         parts: list[tuple[int, int, bytes]] = []
+        first_s, garbled = 0.0, False
         for servo_id, address, length in asked:
-            row = int(self.rows[servo_id])
-            if row < 0 or self.bank["Status Return Level"][row] < 1:
+            rows = [
+                row
+                for row in self.roll.speaking(servo_id)
+                if self.bank["Status Return Level"][row] >= 1
+            ]
+            if not rows:
                 break
-            error, data = self._block(row, address, length)
+            blocks = [self._block(row, address, length) for row in rows]
             if fast:
-                shown = error | int(self.bank.alert(row))
-                parts.append((shown, servo_id, data.ljust(length, b"\0")))
+                first_s = first_s if parts else min(self.delay_s(row) for row in rows)
+                said = [
+                    (error | int(self.bank.alert(row)), servo_id, data.ljust(length, b"\0"))
+                    for row, (error, data) in zip(rows, blocks, strict=True)
+                ]
+                garbled |= any(part != said[0] for part in said)
+                parts.append(said[0])
             else:
-                status = self._status(row, servo_id, error, data)
-                answers.append(Answer(self.delay_s(row), status))
+                answers += self._speak(
+                    [
+                        (self.delay_s(row), self._status(row, servo_id, error, data))
+                        for row, (error, data) in zip(rows, blocks, strict=True)
+                    ]
+                )
         if parts:
-            first = int(self.rows[parts[0][1]])
             whole = sum(length + 4 for _, _, length in asked)
-            answers.append(Answer(self.delay_s(first), encode_fast(parts, whole)))
+            data = encode_fast(parts, whole)
+            self.collisions += garbled
+            answers.append(Answer(first_s, data[:-2] + b"\0\0" if garbled else data))
         return answers
 
     def _sync_write(self, params: bytes) -> list[Answer]:
         address, length = word(params, 0), word(params, 2)
         for at in range(4, len(params) - length, length + 1):
-            row = int(self.rows[params[at]])
-            if row >= 0:
-                self.bank.write(row, address, params[at + 1 : at + 1 + length])
+            self._write(params[at], address, params[at + 1 : at + 1 + length])
         self._written()
         return []
 
     def _bulk_write(self, params: bytes) -> list[Answer]:
         at = 0
         while at + 5 <= len(params):
-            row, address, length = (
-                int(self.rows[params[at]]),
-                word(params, at + 1),
-                word(params, at + 3),
-            )
+            length = word(params, at + 3)
             data = params[at + 5 : at + 5 + length]
-            if row >= 0 and len(data) == length:
-                self.bank.write(row, address, data)
+            if len(data) == length:
+                self._write(params[at], word(params, at + 1), data)
             at += 5 + length
         self._written()
         return []
 
-    def _one(self, row: int, code: int, params: bytes) -> int:
-        error = self._orders.carry_out(row, code, params)
+    def _write(self, servo_id: int, address: int, data: bytes) -> None:
+        for row in self.roll.primary(servo_id):
+            self._orders.write(row, address, data)
+        for row in self.roll.secondary(servo_id):
+            self._orders.write(row, address, data, ram_only=True)
+
+    def _one(self, row: int, code: int, params: bytes, *, ram_only: bool = False) -> int:
+        error = self._orders.carry_out(row, code, params, ram_only=ram_only)
         self._written()
         return int(error)
 

@@ -20,8 +20,7 @@ REG_WRITE = "FF FF FD 00 01 09 00 04 68 00 C8 00 00 00 AE 8E"
 
 @pytest.fixture
 def line() -> SimLine:
-    bank = ServoBank([1, 2])
-    bank["Model Number"][:] = 1030
+    bank = ServoBank([1, 2], "XM430-W210")
     bank["Firmware Version"][:] = 38
     line = SimLine(bank, BenchPlant(2, start_rad=[rad(166), rad(2079)]))
     line.bank["Operating Mode"][:] = 3
@@ -47,6 +46,7 @@ def hexed(data: bytes) -> str:
         pytest.param("FF FF FD 00 01 04 00 06 01 A1 E6", OK_1, id="factory reset"),
         pytest.param("FF FF FD 00 01 03 00 08 2F 4E", OK_1, id="reboot"),
         pytest.param("FF FF FD 00 01 08 00 10 01 44 58 4C 22 B1 DC", OK_1, id="clear"),
+        pytest.param("FF FF FD 00 01 08 00 20 01 43 54 52 4C 16 F5", OK_1, id="backup"),
         pytest.param(
             "FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA",
             POSITION_1 + " FF FF FD 00 02 08 00 55 00 1F 08 00 00 BA BE",
@@ -56,6 +56,11 @@ def hexed(data: bytes) -> str:
             "FF FF FD 00 FE 11 00 83 74 00 04 00 01 96 00 00 00 02 AA 00 00 00 82 87",
             "",
             id="sync write",
+        ),
+        pytest.param(
+            "FF FF FD 00 FE 10 00 93 01 20 00 02 00 A0 00 02 1F 00 01 00 50 B7 68",
+            "",
+            id="bulk write",
         ),
     ],
 )
@@ -73,7 +78,7 @@ def test_sync_write_reaches_both_goals(line: SimLine) -> None:
 
 def test_action_carries_out_the_registered_write(line: SimLine) -> None:
     exchange(line, bytes.fromhex(REG_WRITE))
-    assert line.bank["Goal Velocity"][0] == 350
+    assert line.bank["Goal Velocity"][0] == 330
     assert line.bank["Registered Instruction"][0] == 1
     assert hexed(exchange(line, bytes.fromhex("FF FF FD 00 01 03 00 05 02 CE"))) == OK_1
     assert line.bank["Goal Velocity"][0] == 200

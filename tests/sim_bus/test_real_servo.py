@@ -1,68 +1,99 @@
 """The servo model against recordings of a real XL330 that swings a pendulum (Rhoban, bam)."""
 
+import importlib.util
 import json
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
-from sim.bus.bench import BenchPlant
-from sim.bus.motor import MOTORS, PWM_FULL, make_drive, p_gain_per_rad
+from sim.bus.gearbox import GEARBOXES
+from sim.bus.motor import MOTORS, PWM_FULL, p_gain_per_rad
 
 XL330 = MOTORS["XL330-M288"]
-MASS_KG, ARM_M = 0.49, 0.10
+GEAR = GEARBOXES["XL330-M288"]
+LOGS = (
+    *("kp200_lift_and_drop", "kp200_sin_sin", "kp400_lift_and_drop"),
+    *("kp800_sin_sin", "kp800_up_and_down"),
+)
 
 
-def recording(folder: Path, name: str) -> tuple[int, dict[str, np.ndarray]]:
-    log = json.loads((folder / "xl330-logs" / f"{name}.json").read_text())
-    keys = (
-        "timestamp",
-        "goal_position",
-        "position",
-        "speed",
-        "load",
-        "input_volts",
-        "torque_enable",
-    )
-    columns = {key: np.array([entry[key] for entry in log["entries"]], float) for key in keys}
-    columns["load"][columns["load"] > 32_767] -= 65_536
-    return int(log["kp"]), columns
+@pytest.fixture(scope="module")
+def pendulum() -> ModuleType:
+    """The benchmark of the same name, which also prints each term's share."""
+    path = Path(__file__).resolve().parents[2] / "benchmarks" / "pendulum.py"
+    spec = importlib.util.spec_from_file_location("pendulum", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def log_path(folder: Path, name: str) -> Path:
+    return folder / "xl330-logs" / f"{name}.json"
 
 
 @pytest.mark.parametrize(
     "name", ["kp200_lift_and_drop", "kp400_lift_and_drop", "kp800_up_and_down"]
 )
 def test_output_register_follows_the_error_at_the_models_gain(shared_data: Path, name: str) -> None:
-    gain, log = recording(shared_data, name)
-    error_rad = log["goal_position"] - log["position"]
-    fit = (log["torque_enable"] > 0) & (np.abs(log["load"]) < 800)
-    slope = (error_rad[fit] @ log["load"][fit]) / (error_rad[fit] @ error_rad[fit])
-    assert slope == pytest.approx(p_gain_per_rad(gain, XL330) * PWM_FULL, rel=0.02)
-    assert np.abs(log["load"]).max() <= PWM_FULL
+    log = json.loads(log_path(shared_data, name).read_text())
+    keys = ("goal_position", "position", "load", "torque_enable")
+    column = {key: np.array([entry[key] for entry in log["entries"]], float) for key in keys}
+    load = np.where(column["load"] > 32_767, column["load"] - 65_536, column["load"])
+    error_rad = column["goal_position"] - column["position"]
+    fit = (column["torque_enable"] > 0) & (np.abs(load) < 800)
+    slope = (error_rad[fit] @ load[fit]) / (error_rad[fit] @ error_rad[fit])
+    assert slope == pytest.approx(p_gain_per_rad(int(log["kp"]), XL330) * PWM_FULL, rel=0.02)
+    assert np.abs(load).max() <= PWM_FULL
+
+
+def test_the_pendulum_is_followed_at_every_gain_and_twice_as_well_as_without_friction(
+    shared_data: Path, pendulum: ModuleType
+) -> None:
+    """Within 0.1 rad RMS on each log with torque on, one set of constants."""
+    paths = [log_path(shared_data, name) for name in LOGS]
+    shipped = [pendulum.errors(path, GEAR)[0] for path in paths]
+    plain = [pendulum.errors(path, None)[0] for path in paths]
+    assert max(shipped) < 0.08
+    assert np.mean(shipped) < 0.5 * np.mean(plain)
+
+
+@pytest.mark.parametrize("name", ["kp200_lift_and_drop", "kp400_lift_and_drop"])
+def test_it_swings_freely_once_torque_is_off(
+    shared_data: Path, pendulum: ModuleType, name: str
+) -> None:
+    gain, log = pendulum.recording(log_path(shared_data, name))
+    simulated = pendulum.simulate(gain, log, GEAR)
+    free = log["torque_enable"] == 0
+    swing, real = np.ptp(simulated[free]), np.ptp(log["position"][free])
+    assert swing == pytest.approx(real, rel=0.3)
+    assert abs(simulated[-1] - log["position"][-1]) < 0.2
+
+
+def test_friction_and_data_sheet_agree_on_the_speed_without_load() -> None:
+    """What is left of 5 V at the specified 103 rev/min drives the gears."""
+    speed = XL330.no_load_rad_s
+    w = np.linspace(0.1, 2.0 * speed, 4_000)
+    volts = 5.0 - XL330.back_emf_v_s * w
+    motor = XL330.torque_constant_n_m_a * volts / XL330.resistance_ohm
+    left = motor - GEAR.friction_n_m(w, motor, np.zeros_like(w)) - GEAR.viscous_n_m_s * w
+    reached = w[np.flatnonzero(left > 0.0)[-1]]
+    assert reached == pytest.approx(speed, rel=0.1)
 
 
 @pytest.mark.parametrize(
-    ("name", "rms_rad"), [("kp200_lift_and_drop", 0.10), ("kp200_sin_sin", 0.12)]
+    ("volts", "stall_n_m", "stall_a", "rpm"),
+    [(11.1, 3.8, 2.1, 43.0), (12.0, 4.1, 2.3, 46.0), (14.8, 4.8, 2.7, 57.0)],
 )
-def test_bench_follows_the_recorded_pendulum(shared_data: Path, name: str, rms_rad: float) -> None:
-    gain, log = recording(shared_data, name)
-    plant = BenchPlant(
-        1,
-        inertia_kg_m2=MASS_KG * ARM_M**2 + 1.8e-3,
-        load_n_m=lambda q: -MASS_KG * 9.81 * ARM_M * np.sin(q),
-        start_rad=log["position"][0],
-    )
-    drive = make_drive([XL330], 7.4)
-    drive.p_gain_per_rad[:] = p_gain_per_rad(gain, XL330)
-    time_s = log["timestamp"] - log["timestamp"][0]
-    simulated = np.empty_like(time_s)
-    for k, until_s in enumerate(np.append(time_s[1:], time_s[-1])):
-        simulated[k] = plant.position_rad[0]
-        drive.torque_on[:] = log["torque_enable"][k]
-        drive.goal_rad[:] = log["goal_position"][k]
-        drive.supply_v[:] = log["input_volts"][k]
-        plant.advance(until_s, drive)
-    driven = log["torque_enable"] > 0
-    off = (simulated - log["position"])[driven]
-    lag = (log["goal_position"] - log["position"])[driven]
-    assert np.sqrt(np.mean(off**2)) < rms_rad < 0.25 * np.sqrt(np.mean(lag**2))
+def test_one_set_of_xm430_constants_gives_its_data_sheet_at_every_voltage(
+    volts: float, stall_n_m: float, stall_a: float, rpm: float
+) -> None:
+    """E-manual XM430-W350, Specifications: torque, current and speed at three supplies."""
+    motor = MOTORS["XM430-W350"]
+    amps = volts / motor.resistance_ohm
+    assert amps == pytest.approx(stall_a, rel=0.06)
+    assert motor.torque_constant_n_m_a * amps == pytest.approx(stall_n_m, rel=0.06)
+    assert volts / motor.back_emf_v_s * 60.0 / (2.0 * np.pi) == pytest.approx(rpm, rel=0.02)

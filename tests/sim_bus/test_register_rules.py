@@ -13,7 +13,7 @@ from .bus_helpers import ALL, a_line, ask, read, write
 def test_a_new_servo_has_the_manuals_initial_values() -> None:
     line = SimLine(ServoBank([7]), a_line(1).firmware.plant)
     manual = {(0, 2): 1020, (8, 1): 3, (9, 1): 250, (11, 1): 3, (24, 4): 10, (31, 1): 80}
-    manual |= {(32, 2): 160, (34, 2): 95, (36, 2): 885, (38, 2): 1193, (44, 4): 350}
+    manual |= {(32, 2): 160, (34, 2): 95, (36, 2): 885, (38, 2): 1193, (44, 4): 200}
     manual |= {(48, 4): 4095, (52, 4): 0, (63, 1): 52, (64, 1): 0, (68, 1): 2, (84, 2): 800}
     manual |= {(76, 2): 1920, (78, 2): 100, (98, 1): 0, (100, 2): 885, (108, 4): 0}
     for (address, size), value in manual.items():
@@ -29,7 +29,7 @@ def test_a_new_servo_has_the_manuals_initial_values() -> None:
         (116, 4096, 4, ResultError.DATA_LIMIT),  # above Max Position Limit
         (116, -1, 4, ResultError.DATA_LIMIT),
         (116, 4095, 4, ResultError.NONE),
-        (104, 351, 4, ResultError.DATA_LIMIT),  # above Velocity Limit
+        (104, 201, 4, ResultError.DATA_LIMIT),  # above Velocity Limit
         (100, 886, 2, ResultError.DATA_RANGE),
         (7, 253, 1, ResultError.DATA_RANGE),
         (7, 252, 1, ResultError.NONE),
@@ -123,10 +123,16 @@ def test_factory_reset_keeps_what_was_asked() -> None:
     assert line.bank["Return Delay Time"][1] == 250
 
 
-def test_a_bank_refuses_shared_ids_and_unknown_rates() -> None:
-    with pytest.raises(ValueError, match="share an ID"):
-        ServoBank([1, 1])
-    with pytest.raises(ControlTableError, match="XH540-V270: not simulated"):
-        ServoBank([1], "XH540-V270")
-    with pytest.raises(ValueError, match="123 baud"):
-        ServoBank([1], baud=123)
+@pytest.mark.parametrize(
+    ("ids", "model", "baud", "said"),
+    [
+        ([1, 1], "XM430-W350", 57_600, "share an ID"),
+        ([1, 253], "XM430-W350", 57_600, "ID 253: a servo has 0 to 252"),
+        ([1], "XL-320", 57_600, "XL-320: not simulated"),
+        ([1], "XM430-W350", 123, "123 baud"),
+        ([1], "XL330-M288", 4_500_000, "4500000 baud: XL330-M288 has"),
+    ],
+)
+def test_a_bank_refuses_what_no_chain_has(ids: list[int], model: str, baud: int, said: str) -> None:
+    with pytest.raises(ControlTableError, match=said):
+        ServoBank(ids, model, baud)

@@ -10,7 +10,6 @@ from drivers.protocol.parser import PacketReader
 from sim.bus.bank import ServoBank
 from sim.bus.bench import BenchPlant
 from sim.bus.clock import SimClock
-from sim.bus.faults import Noise
 from sim.bus.line import SimLine
 
 from .bus_helpers import ALL, a_line, ask, exchange, group_params, rad, send, write
@@ -206,22 +205,6 @@ def test_tampering_loses_doubles_and_changes_answers() -> None:
     packets = PacketReader().feed(answers)
     assert packets == [second, second]
     assert answers.endswith(b"x")
-
-
-def test_noise_is_seeded_and_as_frequent_as_asked() -> None:
-    def run(seed: int) -> tuple[bytes, int, int]:
-        line = a_line(4)
-        noise = line.tamper = Noise(lost=0.1, damaged=0.2, seed=seed)
-        heard = b"".join(exchange(line, sync_read(PLAIN, 4)) for _ in range(100))
-        return heard, noise.lost, noise.damaged
-
-    first = run(1)
-    assert first == run(1)
-    assert first[0] != run(2)[0]
-    assert 20 <= first[1] <= 60
-    assert 50 <= first[2] <= 110
-    assert len(first[0]) == (400 - first[1]) * 21
-    assert len(PacketReader().feed(first[0])) <= 400 - first[1] - first[2] + 5
 
 
 def test_two_runs_are_the_same_bit_for_bit() -> None:

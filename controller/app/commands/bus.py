@@ -1,0 +1,231 @@
+"""``snakewalk bus serve`` and ``bus sniff``: simulated servos for any client; bytes in words."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from config.errors import InputError
+from controller.app.commands.common import Json
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+    from sim.bus.chain_spec import ChainSpec
+    from sim.bus.line import SimLine
+    from sim.bus.pty import PtyServer
+    from sim.bus.traffic import Traffic
+    from sim.bus.wire import Wire
+
+LOOK_S = 0.25
+"""How often the live table is drawn."""
+
+
+def serve(
+    servos: Annotated[
+        str | None, typer.Option(help="IDS[:MODEL] on a bench: 1-16, or 1,2,5-8:XL330-M288")
+    ] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="shipped robot or a TOML file, in MuJoCo on flat ground")
+    ] = None,
+    baud: Annotated[int | None, typer.Option(help="of the servos, bit/s")] = None,
+    pace: Annotated[float, typer.Option(help="simulated seconds a second")] = 1.0,
+    faults: Annotated[Path | None, typer.Option(help="TOML file of what goes wrong")] = None,
+    latency: Annotated[float, typer.Option(help="of the USB adapter, ms")] = 0.0,
+    link: Annotated[Path | None, typer.Option(help="symbolic link that leads to the port")] = None,
+    record: Annotated[Path | None, typer.Option(help="write the exchange here, JSON lines")] = None,
+    for_s: Annotated[float | None, typer.Option("--for", help="seconds; default: until ^C")] = None,
+    as_json: Json = False,
+) -> None:
+    """Serve simulated servos at a serial device, in real time, with a live table."""
+    from drivers.clock import WallClock  # noqa: PLC0415  --help stays quick
+    from sim.bus.pty import PtyServer  # noqa: PLC0415
+    from sim.bus.trace import TraceWriter  # noqa: PLC0415
+
+    if servos is not None and robot is not None:
+        raise InputError("give --servos or --robot, not both")
+    if latency < 0.0:
+        raise InputError(f"--latency {latency:g}: must not be negative")
+    what, line, traffic = _simulated(servos, robot, baud, faults)
+    line.usb_latency_s = latency * 1e-3
+    line.taps.append(traffic)
+    clock = WallClock()
+    with PtyServer(line, clock, pace=pace, link=link) as server:
+        out = record.open("w", encoding="utf-8") if record is not None else None
+        if out is not None:
+            line.taps.append(TraceWriter(out))
+        _announce(server, what, line, as_json)
+        try:
+            _run(server, traffic, lambda: for_s is not None and clock.now_s() >= for_s, as_json)
+        except KeyboardInterrupt:
+            print(file=sys.stderr)
+        finally:
+            if out is not None:
+                out.close()
+    if as_json:
+        done = {"questions": traffic.questions, "answers": traffic.answers, "bytes": traffic.bytes}
+        print(json.dumps(done | {"servos": traffic.registers()}), flush=True)
+
+
+def sniff(
+    source: Annotated[
+        Path, typer.Argument(help="a recording (JSON lines, hex text, raw), or a serial device")
+    ],
+    baud: Annotated[int, typer.Option(help="of the device, bit/s")] = 1_000_000,
+    model: Annotated[
+        str, typer.Option(help="model of servos that no ping has told about")
+    ] = "XM430-W350",
+    through: Annotated[
+        bool, typer.Option("--through", help="stand between a client and the device")
+    ] = False,
+    for_s: Annotated[float | None, typer.Option("--for", help="seconds; default: until ^C")] = None,
+    as_json: Json = False,
+) -> None:
+    """Decode a live or recorded exchange packet by packet."""
+    from controller.app.sniffing import listen, stand_between  # noqa: PLC0415  --help stays quick
+    from sim.bus.decode import Decoder  # noqa: PLC0415
+    from sim.bus.trace import read_trace  # noqa: PLC0415
+
+    if not source.exists():
+        raise InputError(f"{source}: no such file or device")
+    decoder = Decoder(model)
+    live = source.is_char_device()
+    if through and not live:
+        raise InputError(f"{source}: --through needs a serial device")
+    if not live:
+        pieces = read_trace(source)
+    elif through:
+        pieces = stand_between(str(source), baud, for_s)
+    else:
+        pieces = listen(str(source), baud, for_s)
+    try:
+        for time_s, data in pieces:
+            for line in decoder.feed(time_s, data):
+                print(json.dumps(line.as_dict()) if as_json else line.text(), flush=live)
+    except KeyboardInterrupt:
+        print(file=sys.stderr)
+
+
+def _simulated(
+    servos: str | None, robot: str | None, baud: int | None, faults: Path | None
+) -> tuple["ChainSpec", "Wire", "Traffic"]:
+    """What is served, its line, and who looks at it."""
+    from config.faults import FaultPlan  # noqa: PLC0415
+    from config.loader import load  # noqa: PLC0415
+    from sim.bus.ax12 import MODEL  # noqa: PLC0415
+    from sim.bus.chain_spec import ChainSpec, parse_chain  # noqa: PLC0415
+    from sim.bus.decode import Decoder  # noqa: PLC0415
+    from sim.bus.fault_player import FaultPlayer  # noqa: PLC0415
+    from sim.bus.traffic import Traffic, look_at  # noqa: PLC0415
+
+    spec = parse_chain(servos or "1-4")
+    if robot is None and spec.model == MODEL:
+        if faults is not None:
+            raise InputError(f"{faults}: fault files are for servos of Protocol 2.0, not {MODEL}")
+        return _ax12(spec, baud)
+    line = _robot_line(robot, baud) if robot is not None else _bench_line(spec, baud)
+    if faults is not None:
+        FaultPlayer(line, load(faults, FaultPlan), str(faults))
+    what = ChainSpec(line.bank.ids, line.bank.model)
+    return what, line, Traffic(lambda: look_at(line), Decoder(line.bank.model))
+
+
+def _ax12(spec: "ChainSpec", baud: int | None) -> tuple["ChainSpec", "Wire", "Traffic"]:
+    from sim.bus.ax12 import Ax12Servos  # noqa: PLC0415
+    from sim.bus.ax12_line import BAUD_CLOCK, Ax12Line  # noqa: PLC0415
+    from sim.bus.bench import BenchPlant  # noqa: PLC0415
+    from sim.bus.traffic import Traffic, look_at_ax12  # noqa: PLC0415
+
+    rate = baud or 1_000_000
+    if not BAUD_CLOCK / 255 <= rate <= BAUD_CLOCK / 2:
+        raise InputError(f"{rate} baud: an {spec.model} has 7843 to 1000000")
+    servos = Ax12Servos(spec.ids, BenchPlant(len(spec.ids)))
+    servos["Baud Rate"][:] = round(BAUD_CLOCK / rate) - 1
+    return spec, Ax12Line(servos, baud=rate), Traffic(lambda: look_at_ax12(servos), None)
+
+
+def _bench_line(spec: "ChainSpec", baud: int | None) -> "SimLine":
+    from sim.bus.bank import ServoBank  # noqa: PLC0415
+    from sim.bus.bench import BenchPlant  # noqa: PLC0415
+    from sim.bus.gearbox import GEARBOXES  # noqa: PLC0415
+    from sim.bus.line import SimLine  # noqa: PLC0415
+
+    rate = baud or 1_000_000
+    bank = ServoBank(spec.ids, spec.model, rate)
+    return SimLine(bank, BenchPlant(len(bank), gear=GEARBOXES.get(bank.model)), baud=rate)
+
+
+def _robot_line(name: str, baud: int | None) -> "SimLine":
+    from config.loader import load_robot, load_world  # noqa: PLC0415
+    from sim.bus.bank import ServoBank  # noqa: PLC0415
+    from sim.bus.line import SimLine  # noqa: PLC0415
+    from sim.physics.plant import MujocoPlant  # noqa: PLC0415
+
+    robot = load_robot(name)
+    rate = baud or robot.servo.baud
+    bank = ServoBank(robot.servo_ids, robot.servo.model, rate)
+    return SimLine(bank, MujocoPlant(robot, load_world("flat")), baud=rate)
+
+
+def _announce(server: "PtyServer", what: "ChainSpec", line: "Wire", as_json: bool) -> None:
+    ids = ", ".join(map(str, what.ids))
+    if as_json:
+        print(
+            json.dumps(
+                {
+                    "port": server.path,
+                    "model": what.model,
+                    "ids": list(what.ids),
+                    "baud": line.getBaudRate(),
+                }
+            ),
+            flush=True,
+        )
+    else:
+        print(f"port {server.path}", flush=True)
+        print(f"{what.model}: {ids} at {line.getBaudRate()} baud; ^C ends", flush=True)
+
+
+def _run(server: "PtyServer", traffic: "Traffic", stopped: "Stop", as_json: bool) -> None:
+    """Serve; draw the table on a terminal, nothing elsewhere."""
+    from rich.console import Console  # noqa: PLC0415
+    from rich.live import Live  # noqa: PLC0415
+
+    console = Console(stderr=True)
+    if as_json or not console.is_terminal:
+        server.serve(stopped)
+        return
+    with Live(console=console, auto_refresh=False, transient=False) as live:
+        look = 0
+        while not stopped():
+            server.step(0.02)
+            look += 1
+            if look * 0.02 >= LOOK_S or not look:
+                look = 0
+                live.update(_view(server, traffic), refresh=True)
+
+
+def _view(server: "PtyServer", traffic: "Traffic") -> "Group":
+    from rich.console import Group  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    rows = traffic.registers()
+    table = Table(*rows[0], box=None, header_style="bold")
+    for row in rows:
+        style = "red" if row["error"] or not row["power"] else "" if row["torque"] else "dim"
+        table.add_row(*(str(value) for value in row.values()), style=style)
+    counts = (
+        f"{server.path or 'port gone'}   {traffic.questions} questions, "
+        f"{traffic.answers} answers, {traffic.bytes} bytes"
+    )
+    recent = "\n".join(line.text()[:120] for line in traffic.recent)
+    return Group(Text(counts, style="bold"), table, Text(recent, style="dim"))
+
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    Stop = Callable[[], bool]

@@ -1,0 +1,76 @@
+"""What the live view of a simulated bus shows: registers of all servos, and recent packets."""
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from sim.bus.ax12 import CELLS, Ax12Servos
+from sim.bus.decode import Decoder, Line
+from sim.bus.line import SimLine
+
+Rows = list[dict[str, object]]
+SHOWN = 8
+"""Packets kept."""
+
+
+class Traffic:
+    """A ``Tap`` that counts and remembers; ``registers`` reads those worth looking at."""
+
+    def __init__(self, look: Callable[[], Rows], decoder: Decoder | None) -> None:
+        self.registers = look
+        self._decoder = decoder
+        self.questions = self.answers = self.bytes = 0
+        self.recent: deque[Line] = deque(maxlen=SHOWN)
+
+    def __call__(self, time_s: float, from_host: bool, data: bytes) -> None:
+        """Take note of one packet."""
+        self.questions += from_host
+        self.answers += not from_host
+        self.bytes += len(data)
+        if self._decoder is not None:
+            self.recent.extend(self._decoder.feed(time_s, data))
+            return
+        kind, who = "question" if from_host else "answer", data[2] if len(data) > 2 else -1
+        self.recent.append(Line(time_s, kind, who, "", {}, data.hex(" ")))
+
+
+def look_at(line: SimLine) -> Rows:
+    """One row a servo of Protocol 2.0: what it is, where it is, how it fares."""
+    bank, firmware = line.bank, line.firmware
+    firmware.refresh()
+    drawn = "Present Current" if bank.measures_current else "Present Load"
+    names = {
+        "id": "ID",
+        "mode": "Operating Mode",
+        "torque": "Torque Enable",
+        "goal": "Goal Position",
+        "position": "Present Position",
+        "velocity": "Present Velocity",
+        drawn.split()[1].lower(): drawn,
+        "volts": "Present Input Voltage",
+        "celsius": "Present Temperature",
+        "error": "Hardware Error Status",
+    }
+    columns = {key: np.asarray(bank[name]) for key, name in names.items()}
+    rows: Rows = []
+    for row in range(len(bank)):
+        shown: dict[str, object] = {key: int(values[row]) for key, values in columns.items()}
+        shown["volts"] = columns["volts"][row] / 10.0
+        shown["power"] = bool(firmware.powered[row])
+        rows.append(shown)
+    return rows
+
+
+def look_at_ax12(servos: Ax12Servos) -> Rows:
+    """One row an AX-12A."""
+    servos.refresh()
+    shown = ("ID", "Goal Position", *(name for name in CELLS if name.startswith("Present")))
+    rows: Rows = []
+    for row in range(len(servos)):
+        seen: dict[str, object] = {
+            name.lower().removeprefix("present "): int(servos[name][row]) for name in shown
+        }
+        alarms = {"torque": int(servos["Torque Enable"][row]), "error": int(servos.errors[row])}
+        rows.append(seen | alarms | {"power": True})
+    return rows

@@ -1,0 +1,1 @@
+"""The fault campaign: every kind of fault and every pair, from fixed seeds."""

@@ -1,0 +1,50 @@
+"""``python -m tests.campaign``: all of it; writes the table in ``docs/campaign.md``."""
+
+import argparse
+from itertools import count
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from .campaign import campaign
+from .report import BEGIN, END, table
+from .scenarios import SCENARIOS
+
+DOC = Path(__file__).resolve().parents[2] / "docs" / "campaign.md"
+
+
+def main() -> None:
+    """Run until the number of cycles is reached, then write the table."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--cycles", type=int, default=100_000, help="at least so many in all")
+    options.add_argument("--each", type=int, default=240, help="cycles a scenario")
+    options.add_argument("--doc", type=Path, default=DOC, help="file with the table")
+    given = options.parse_args()
+    rounds = -(-given.cycles // (given.each * len(SCENARIOS)))
+    jobs = [(kinds, seed) for seed in range(rounds) for kinds in SCENARIOS]
+    with Progress(console=Console(stderr=True)) as progress:
+        bar = progress.add_task("fault campaign", total=len(jobs))
+        whole, by_kind = campaign(jobs, given.each, lambda: progress.advance(bar))
+    # scenarios that end early are made up for
+    for seed in count(rounds):
+        if whole.cycles >= given.cycles:
+            break
+        more, by_more = campaign([(kinds, seed) for kinds in SCENARIOS], given.each)
+        whole.add(more)
+        for kind, tally in by_more.items():
+            by_kind[kind].add(tally)
+    shown = table(whole, by_kind)
+    print(shown)
+    for line in whole.complaints[:40]:
+        print(line)
+    if given.doc.is_file():
+        text = given.doc.read_text(encoding="utf-8")
+        head, tail = text.split(BEGIN)[0], text.split(END)[-1]
+        given.doc.write_text(f"{head}{BEGIN}\n{shown}\n{END}{tail}", encoding="utf-8")
+    if whole.sins:
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main()

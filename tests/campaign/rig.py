@@ -1,0 +1,178 @@
+"""A chain of simulated servos under faults, and a witness who knows what is true.
+
+The witness stamps every reading: during cycle k the servo of row j reports a current that encodes
+(k, j), so a value from another cycle or another servo is known at sight. And it reads every packet
+on the wire, so a goal beyond a limit is seen where it counts.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from config.faults import FaultPlan
+from config.robot import RobotConfig
+from config.run import SafetyConfig
+from drivers.bus import DynamixelBus
+from drivers.chain import ServoChain
+from drivers.protocol.packet import Instruction, InstructionPacket
+from drivers.protocol.parser import PacketReader
+from drivers.recovery import Policy, Recovery
+from drivers.safe_link import SafeLink
+from drivers.safety import SafetyLimits
+from drivers.types import JointState
+from drivers.units import ServoUnits
+from sim.bus.bank import ServoBank
+from sim.bus.bench import BenchPlant
+from sim.bus.fault_player import FaultPlayer
+from sim.bus.line import SimLine
+
+ROBOT = RobotConfig(name="campaign", joint_axes="ypypyp")
+SAFETY = SafetyConfig()
+PATIENCE_S = 1.0
+JOINTS = ROBOT.joint_count
+TICK_RAD = 2 * np.pi / 4096
+_STAMPS = 60
+_GOALS = (116).to_bytes(2, "little") + (4).to_bytes(2, "little")
+
+
+@dataclass
+class Witness:
+    """What must not happen, counted."""
+
+    beyond_limit: int = 0
+    """Goals on the wire beyond a joint limit, or farther ahead of the joint than allowed."""
+    too_fast: int = 0
+    """Goals on the wire that move faster than allowed, and not back towards the joint."""
+    old: int = 0
+    """Values taken for new that are of another cycle."""
+    foreign: int = 0
+    """Values taken for one servo's that are another's."""
+    not_held: int = 0
+    """Values that changed, or grew younger, without having been read."""
+    complaints: list[str] = field(default_factory=list)
+
+    @property
+    def sins(self) -> int:
+        """All of them."""
+        return self.beyond_limit + self.too_fast + self.old + self.foreign + self.not_held
+
+
+class Rig:
+    """Line, chain and safe link, with faults and a witness."""
+
+    def __init__(self, plan: FaultPlan, policy: Policy) -> None:
+        self.line = SimLine(
+            ServoBank(ROBOT.servo_ids, baud=1_000_000), BenchPlant(JOINTS), usb_latency_s=1e-3
+        )
+        self.bus = DynamixelBus(self.line, latency_s=0.003)
+        self.chain = ServoChain(self.bus, ROBOT, watchdog_s=SAFETY.watchdog_s)
+        self.witness = Witness()
+        self.limits = SafetyLimits.from_config(ROBOT, SAFETY)
+        recovery = Recovery(
+            self.chain, self.line, policy=policy, patience_s=PATIENCE_S, limit=10**6
+        )
+        self.link = SafeLink(self.chain, self.limits, self.line.clock, recovery)
+        self.player = FaultPlayer(self.line, plan)
+        self.clashing = any(fault.kind == "clash" for fault in plan.fault)
+        self._units = ServoUnits.of(self.bus.table)
+        self._low, self._high = self._raw_limits()
+        self._cycle = 0
+        self._seen: JointState | None = None
+        self._sent: np.ndarray | None = None
+        self._sent_at_s = 0.0
+        self._steady = False
+        self._stamp_readings()
+        self.line.taps.append(self._overhear)
+
+    def read(self) -> JointState:
+        """One read under the witness's eyes."""
+        self._cycle += 1
+        before, brought_back = self._seen, self.link.recoveries
+        state = self.link.read()
+        self._seen = state
+        self._steady = self._steady and self.link.recoveries == brought_back
+        self._check_values(state, before if self._steady else None)
+        self._steady = True
+        return state
+
+    def restart(self) -> None:
+        """Forget what was held: the chain has been enabled anew."""
+        self._seen, self._sent, self._steady = None, None, False
+
+    def cool_down(self) -> None:
+        """Let half an hour pass, for the motors alone."""
+        self.line.firmware.protection.heat(np.arange(JOINTS), 30.0)
+
+    @property
+    def safe(self) -> bool:
+        """Whether every motor is off, or held by a watchdog that has run out."""
+        self.line.settle()
+        off = (self.line.bank["Torque Enable"] == 0) | ~self.line.firmware.powered
+        held = self.line.bank["Bus Watchdog"] == 0xFF
+        return bool((off | held).all())
+
+    def _raw_limits(self) -> tuple[np.ndarray, np.ndarray]:
+        half = np.array(ROBOT.limit_rad)
+        return self._units.position_raw(-half), self._units.position_raw(half)
+
+    def _stamp_readings(self) -> None:
+        firmware, bank = self.line.firmware, self.line.bank
+        plain = firmware.refresh_motion
+        rows = np.arange(JOINTS)
+
+        def stamped() -> None:
+            plain()
+            bank["Present Current"][:] = self._cycle % _STAMPS * 8 + rows + 1
+
+        firmware.refresh_motion = stamped  # type: ignore[method-assign]
+
+    def _check_values(self, state: JointState, before: JointState | None) -> None:
+        stamp = np.rint(state.current_a / self._units.a_per_current).astype(int)
+        ok = state.valid
+        old = ok & ((stamp - 1) // 8 != self._cycle % _STAMPS)
+        foreign = ok & ~old & ((stamp - 1) % 8 != np.arange(JOINTS)) & (not self.clashing)
+        self._sin("old", old)
+        self._sin("foreign", foreign)
+        if before is not None:
+            held = (
+                (state.position_rad == before.position_rad)
+                & (state.current_a == before.current_a)
+                & (state.age_s > before.age_s)
+            )
+            self._sin("not_held", ~ok & ~held)
+
+    def _overhear(self, time_s: float, from_host: bool, data: bytes) -> None:
+        if not from_host:
+            return
+        for packet in PacketReader().feed(data):
+            if (
+                isinstance(packet, InstructionPacket)
+                and packet.instruction == Instruction.SYNC_WRITE
+                and packet.params[:4] == _GOALS
+            ):
+                block = np.frombuffer(packet.params, np.uint8, offset=4).reshape(-1, 5)
+                self._check_goals(time_s, block[:, 1:].copy().view("<i4")[:, 0])
+
+    def _check_goals(self, time_s: float, raw: np.ndarray) -> None:
+        goal = self._units.position_rad(raw)
+        self._sin("beyond_limit", (raw < self._low) | (raw > self._high))
+        here = self.line.firmware.plant.position_rad
+        known = here if self._seen is None else self._seen.position_rad
+        ahead = np.minimum(np.abs(goal - known), np.abs(goal - here))
+        self._sin("beyond_limit", ahead > self.limits.goal_lead_rad + TICK_RAD)
+        last = self._sent
+        if last is not None and self._steady:
+            dt_s = min(time_s - self._sent_at_s, self.limits.stale_limit_s) + 2e-3
+            fast = np.abs(goal - last) > self.limits.goal_rate_rad_s * dt_s + TICK_RAD
+            nearer = np.abs(goal - known) < np.abs(last - known)
+            self._sin("too_fast", fast & ~nearer)
+        self._sent, self._sent_at_s = goal, time_s
+
+    def _sin(self, kind: str, bad: np.ndarray) -> None:
+        if bad.any():
+            count = int(bad.sum())
+            setattr(self.witness, kind, getattr(self.witness, kind) + count)
+            joints = np.flatnonzero(bad).tolist()
+            self.witness.complaints.append(
+                f"{kind}: joints {joints}, cycle {self._cycle}, {self.line.clock.now_s():.4f} s"
+            )

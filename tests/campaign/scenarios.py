@@ -1,0 +1,58 @@
+"""Fault files for every kind of fault and every pair of kinds, from fixed seeds."""
+
+import random
+from itertools import combinations
+
+from config.faults import FaultPlan
+
+from .rig import ROBOT
+
+NOISE = ("drop", "corrupt", "truncate", "duplicate", "delay", "late")
+SERVO = ("mute", "stuck", "brown_out")
+TRIPS = ("reboot", "overload", "overheating", "voltage", "encoder", "shock")
+KINDS = (*NOISE, *SERVO, "clash", *TRIPS, "heat", "supply", "unplug", "stall", "port")
+SCENARIOS = ((), *((kind,) for kind in KINDS), *combinations(KINDS, 2))
+"""None, each alone, each pair."""
+_EVERY_S = 2.5
+
+
+def plan(kinds: tuple[str, ...], seed: int, duration_s: float) -> FaultPlan:
+    """Faults of these kinds, each every few seconds, overlapping now and then."""
+    rng = random.Random(f"{kinds} {seed}")
+    faults = []
+    for kind in kinds:
+        at_s = rng.uniform(0.3, 1.0)
+        while at_s < duration_s:
+            faults.append({"kind": kind, "at_s": at_s, **_how(kind, rng)})
+            at_s += rng.uniform(0.6, 1.4) * _EVERY_S
+    return FaultPlan.model_validate({"seed": seed, "fault": faults})
+
+
+def _how(kind: str, rng: random.Random) -> dict[str, object]:
+    ids = rng.sample(ROBOT.servo_ids, rng.randint(1, 2))
+    for_s = rng.choice((0.01, 0.03, 0.1, 0.3, 0.8))
+    if kind in NOISE:
+        found: dict[str, object] = {"for_s": for_s, "chance": rng.choice((0.05, 0.3, 1.0))}
+        if kind in ("delay", "late"):
+            found["by_s"] = rng.choice(
+                (1e-3, 3e-3, 6e-3) if kind == "delay" else (0.01, 0.02, 0.035, 0.05, 0.12)
+            )
+        elif rng.random() < 0.5:
+            found["of"] = rng.choice(("questions", "both"))
+        if "of" not in found and rng.random() < 0.3:
+            found["ids"] = ids
+        return found
+    if kind in SERVO:
+        return {"ids": ids, "for_s": for_s}
+    if kind == "clash":
+        mine, other = rng.sample(ROBOT.servo_ids, 2)
+        return {"id": mine, "takes": other, "for_s": for_s}
+    if kind in TRIPS:
+        return {"ids": ids}
+    if kind == "heat":
+        return {"ids": ids, "celsius": rng.choice((50.0, 68.0, 75.0, 95.0))}
+    if kind == "supply":
+        return {"volts": rng.choice((0.0, 9.0, 10.5, 15.5)), "for_s": for_s}
+    if kind == "unplug":
+        return {"behind": rng.choice(ROBOT.servo_ids[:-1]), "for_s": for_s}
+    return {"for_s": for_s}

@@ -1,0 +1,82 @@
+"""A short fault campaign; the whole one is ``make campaign``."""
+
+import numpy as np
+import pytest
+
+from config.faults import FaultPlan
+from drivers.types import JointState
+
+from .campaign import Tally, campaign, run_scenario
+from .report import table
+from .rig import JOINTS, Rig
+from .scenarios import KINDS, SCENARIOS
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_of_fault(kind: str) -> None:
+    whole, _ = campaign([((kind,), KINDS.index(kind))], cycles=80)
+    assert whole.complaints == []
+    assert whole.sins == 0
+
+
+def test_some_pairs_of_faults() -> None:
+    pairs = [kinds for kinds in SCENARIOS if len(kinds) == 2][::14]
+    whole, by_kind = campaign([(kinds, k) for k, kinds in enumerate(pairs)], cycles=60)
+    assert whole.complaints == []
+    assert whole.sins == 0
+    assert whole.trips + whole.brought_back > 5
+    assert whole.missing > 20
+    assert len(by_kind) > 15
+
+
+def test_all_kinds_and_all_pairs_are_in_the_campaign() -> None:
+    assert len(SCENARIOS) == 1 + len(KINDS) + len(KINDS) * (len(KINDS) - 1) // 2
+    known = str(FaultPlan.model_json_schema())
+    assert all(f"'{kind}'" in known for kind in KINDS)
+
+
+def test_the_same_seed_gives_the_same_campaign() -> None:
+    first, second = (run_scenario(("drop", "reboot"), 3, 60) for _ in range(2))
+    assert first == second
+
+
+def test_the_witness_sees_old_foreign_and_changed_values() -> None:
+    rig = Rig(FaultPlan(), "stop")
+    rig.link.enable()
+    rig.restart()
+    rig.line.clock.advance(0.02)
+    good = rig.read()
+    assert rig.witness.sins == 0
+    rig._cycle += 1
+    rig._check_values(good, None)
+    assert rig.witness.old == JOINTS
+    rig._cycle -= 1
+    swapped = np.roll(good.current_a, 1)
+    rig._check_values(_with(good, current_a=swapped), None)
+    assert rig.witness.foreign == JOINTS
+    lost = np.zeros(JOINTS, np.bool_)
+    rig._check_values(_with(good, valid=lost, position_rad=np.zeros(JOINTS) + 0.1), good)
+    assert rig.witness.not_held == JOINTS
+
+
+@pytest.mark.parametrize("goal", [1.6, -1.6, 0.9, -0.9])
+def test_the_witness_sees_goals_that_should_not_be_sent(goal: float) -> None:
+    rig = Rig(FaultPlan(), "stop")
+    rig.link.enable()
+    rig.read()
+    rig.chain._cycle.write_goals(rig._units.position_raw(np.full(JOINTS, goal)))
+    rig.line.drain_until_quiet(1e-3)
+    assert rig.witness.beyond_limit >= JOINTS
+    assert rig.witness.too_fast == JOINTS
+
+
+def test_the_table_has_a_line_for_each_kind() -> None:
+    text = table(Tally(cycles=1_234), {"brown_out": Tally(old=7)})
+    assert text.splitlines()[2].startswith("| brown out | 0 |")
+    assert "| **all** | 1,234 |" in text
+
+
+def _with(state: JointState, **changes: object) -> JointState:
+    from dataclasses import replace
+
+    return replace(state, **changes)  # type: ignore[arg-type]
