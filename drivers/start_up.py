@@ -137,7 +137,8 @@ def configure(
         bus.write_verified(servo_id, "Operating Mode", mode)  # before the rest: it resets gains
         bus.write_verified(servo_id, "Min Position Limit", int(limits[joint, 0]))
         bus.write_verified(servo_id, "Max Position Limit", int(limits[joint, 1]))
-        bus.write_verified(servo_id, "Position P Gain", robot.servo.position_p_gain)
+        gain = robot.servo.pitch_p_gain if pitch else robot.servo.position_p_gain
+        bus.write_verified(servo_id, "Position P Gain", gain)
         bus.write_verified(servo_id, "Profile Acceleration", 0)
         bus.write_verified(servo_id, "Profile Velocity", 0)
         if pitch:

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 LOOK_S = 0.25
 """How often the live table is drawn."""
+STEP_S = 0.02
+WIDTH = 120
+"""Characters of a packet that the live view shows."""
 
 
 def serve(
@@ -197,32 +201,47 @@ def _run(server: "PtyServer", traffic: "Traffic", stopped: "Stop", as_json: bool
     if as_json or not console.is_terminal:
         server.serve(stopped)
         return
-    with Live(console=console, auto_refresh=False, transient=False) as live:
-        look = 0
+    seen = _Seen(server.path, [], "")
+
+    def view() -> "Group":
+        return _view(seen)
+
+    # Drawing takes longer than a servo may take to answer: it has a thread of its own, which sees
+    # only what the serving one has copied for it.
+    with Live(console=console, get_renderable=view, refresh_per_second=1.0 / LOOK_S):
+        look = 0.0
         while not stopped():
-            server.step(0.02)
-            look += 1
-            if look * 0.02 >= LOOK_S or not look:
-                look = 0
-                live.update(_view(server, traffic), refresh=True)
+            server.step(STEP_S)
+            look += STEP_S
+            if look >= LOOK_S:
+                look = 0.0
+                counts = (
+                    f"{server.path or 'port gone'}   {traffic.questions} questions, "
+                    f"{traffic.answers} answers, {traffic.bytes} bytes"
+                )
+                recent = "\n".join(line.text()[:WIDTH] for line in traffic.recent)
+                seen = _Seen(counts, traffic.registers(), recent)
 
 
-def _view(server: "PtyServer", traffic: "Traffic") -> "Group":
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What the live view shows."""
+
+    counts: str
+    rows: list[dict[str, object]]
+    recent: str
+
+
+def _view(seen: _Seen) -> "Group":
     from rich.console import Group  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
-    rows = traffic.registers()
-    table = Table(*rows[0], box=None, header_style="bold")
-    for row in rows:
+    table = Table(*(seen.rows[0] if seen.rows else ()), box=None, header_style="bold")
+    for row in seen.rows:
         style = "red" if row["error"] or not row["power"] else "" if row["torque"] else "dim"
         table.add_row(*(str(value) for value in row.values()), style=style)
-    counts = (
-        f"{server.path or 'port gone'}   {traffic.questions} questions, "
-        f"{traffic.answers} answers, {traffic.bytes} bytes"
-    )
-    recent = "\n".join(line.text()[:120] for line in traffic.recent)
-    return Group(Text(counts, style="bold"), table, Text(recent, style="dim"))
+    return Group(Text(seen.counts, style="bold"), table, Text(seen.recent, style="dim"))
 
 
 if TYPE_CHECKING:
