@@ -136,8 +136,8 @@ class Drive:
                 ramp_rad=d.ramp_rad,
                 candidates=d.candidates,
             )
-        heading = float(np.mean(view.headings_rad))
-        if self._watch.update(pilot.pulse_m_s * period_s, view.centre_m, heading):
+        way_m = view.way_since_m(self._last) if self._last is not None else 0.0
+        if self._watch.update(pilot.pulse_m_s * period_s, way_m):
             self._alarms += 1
             share = self._watch.window.share if self._watch.window else float("nan")
             text = f"the body makes {share:.0%} of its predicted way: is the ground too slippery?"
@@ -188,6 +188,6 @@ class Drive:
         """Forward speed of the links along themselves, mean over the body, smoothed over 0.5 s."""
         if self._last is None:
             return
-        way = np.einsum("ij,ij->i", view.link_m - self._last.link_m, view.forward).mean()
+        way = view.way_since_m(self._last)
         share = 1.0 / (0.5 * self._run.cycle_hz)
         self._speed_m_s += min(share, 1.0) * (way * self._run.cycle_hz - self._speed_m_s)

@@ -2,18 +2,13 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True)
 class Advance:
     """One window of a body length of pulse."""
 
     measured_m: float
-    """Way of the centre of mass along the body's mean heading."""
+    """Way of the links along themselves, mean over the body."""
     predicted_m: float
 
     @property
@@ -39,16 +34,12 @@ class AdvanceWatch:
         self._fraction = fraction
         self._pulse_m = 0.0
         self._way_m = 0.0
-        self._last: Floats | None = None
         self.window: Advance | None = None
         """The last full window."""
 
-    def update(self, pulse_m: float, centre_m: Floats, heading_rad: float) -> bool:
+    def update(self, pulse_m: float, way_m: float) -> bool:
         """Add one cycle; true when a window has just closed below the wanted share."""
-        if self._last is not None:
-            step = centre_m[:2] - self._last
-            self._way_m += float(step @ np.array([np.cos(heading_rad), np.sin(heading_rad)]))
-        self._last = np.array(centre_m[:2], dtype=float)
+        self._way_m += way_m
         self._pulse_m += pulse_m
         if self._pulse_m < self._length_m:
             return False

@@ -35,6 +35,10 @@ class BodyView:
         """(3,) centre of mass of equal links; [PT] 2.6.2 calls it S_k."""
         return np.asarray(self.link_m.sum(axis=0) / len(self.link_m))
 
+    def way_since_m(self, before: "BodyView") -> float:
+        """How far the links have gone along themselves since ``before``, mean over the body."""
+        return float(((self.link_m - before.link_m) * self.forward).sum() / len(self.link_m))
+
 
 def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> BodyView:
     """Forward kinematics from the head pose and joint angles (J,).
