@@ -18,10 +18,10 @@ class ServoConfig(Strict):
     supply_v: float = Field(12.0, ge=3.0, le=26.0)
     position_p_gain: int = Field(800, ge=0, le=16383, description="register 84")
     pitch_p_gain: int = Field(
-        800, ge=0, le=16383, description="register 84 of the pitch joints: softer follows ground"
+        120, ge=0, le=16383, description="register 84 of the pitch joints: softer follows ground"
     )
     pitch_current_limit_a: float = Field(
-        0.6, gt=0.0, description="goal current of the pitch joints: current-based position mode"
+        0.2, gt=0.0, description="goal current of the pitch joints: current-based position mode"
     )
 
 

@@ -20,6 +20,7 @@ import dynamixel_sdk as sdk
 
 from drivers.control_table import ControlTable, load_control_table
 from drivers.cycle import GroupCycle
+from drivers.debts import Debts
 from drivers.errors import BusError, NoAnswerError
 from drivers.exchange import check_accepted, read_register, write_register
 from drivers.port import BytePort
@@ -33,6 +34,8 @@ from drivers.protocol.packet import (
 )
 
 T = TypeVar("T")
+_PING_BYTES = 3
+"""Model number and firmware."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +66,7 @@ class DynamixelBus:
         self.latency_s = latency_s
         """How long adapter and driver may hold bytes back (FTDI: its latency timer)."""
         self._tries = max(1, tries)
+        self._debts = Debts(port.clock)
         self._sdk = sdk.PacketHandler(2.0)
 
     def ping(self, servo_id: int) -> Found:
@@ -75,6 +79,8 @@ class DynamixelBus:
 
         def once() -> Found:
             number, result, error = self._sdk.ping(self.port, servo_id)
+            if result != sdk.COMM_SUCCESS:
+                self._debts.owe([servo_id], _PING_BYTES, fast=False)
             self._came(result, servo_id, "ping")
             return Found(servo_id, number, None, bool(error & ALERT))
 
@@ -112,7 +118,9 @@ class DynamixelBus:
 
         """
         register = self.table.register(name)
-        data = self._retry(lambda: read_register(self.port, servo_id, register, self.latency_s))
+        data = self._retry(
+            lambda: read_register(self.port, servo_id, register, self.latency_s, self._debts)
+        )
         return register.decode(data)
 
     def write(self, servo_id: int, name: str, value: int) -> None:
@@ -126,7 +134,9 @@ class DynamixelBus:
         """
         register = self.table.register(name)
         data = register.encode(value)
-        self._retry(lambda: write_register(self.port, servo_id, register, data, self.latency_s))
+        self._retry(
+            lambda: write_register(self.port, servo_id, register, data, self.latency_s, self._debts)
+        )
 
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
         """Write one value to all at once; nobody confirms it.
@@ -202,6 +212,7 @@ class DynamixelBus:
             read_bytes=end - start,
             fast=fast,
             latency_s=self.latency_s,
+            debts=self._debts,
         )
 
     def _retry(self, once: Callable[[], T]) -> T:

@@ -62,7 +62,7 @@ class ServoChain:
         self._watchdog_s = watchdog_s
         self._slow_every = slow_every
         self._fast = fast
-        self._goal_limits = goal_limits_raw(robot, self._units)
+        self._low, self._high = np.ascontiguousarray(goal_limits_raw(robot, self._units).T)
         self._readings = Readings(robot.joint_count, bus.table, self._units)
         self._cycle: GroupCycle = bus.cycle(robot.servo_ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(robot.servo_ids, fast=fast)
@@ -253,7 +253,7 @@ class ServoChain:
 
     def _send_goals(self, goal_rad: Floats) -> NDArray[np.int32]:
         raw = self._units.position_raw(goal_rad)
-        goals = np.clip(raw, self._goal_limits[:, 0], self._goal_limits[:, 1]).astype(np.int32)
+        goals: NDArray[np.int32] = np.minimum(np.maximum(raw, self._low), self._high)
         self._cycle.write_goals(goals)
         return goals
 

@@ -6,8 +6,8 @@ Rules, each against something that happens on real buses:
   silent as well: it is asked last from then on, and costs its own value only.
 - After anything but a complete clean answer the line is drained until quiet.
 - An answer older than its question is never taken for new. Draining alone cannot promise that (an
-  adapter may stall for longer), so after every failure the block asked for changes its length: what
-  comes late has the wrong one and is thrown away.
+  adapter may stall for longer), so after a failure the block asked for has another length, one of
+  which no answer is open (``drivers.debts``): what comes late has the wrong one and is thrown away.
 - Fast reads that keep failing are given up for plain ones, where damage ends with its packet.
 """
 
@@ -17,12 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.debts import Debts
 from drivers.group_answer import GroupAnswer, GroupQuestion
 from drivers.group_write import GroupWrite
 from drivers.port import BytePort
 
-_PADS = 3
-"""Block lengths in turn: length, + 1, + 2."""
+_PATIENCE = 3
+"""Reads in a row after which a silent servo no longer has a say in the length."""
 _KEPT_QUESTIONS = 64
 
 
@@ -55,6 +56,7 @@ class GroupCycle:
         return_delay_s: float = 0.0,
         fast_failures: int = 3,
         clean_reads: int = 50,
+        debts: Debts | None = None,
     ) -> None:
         """Prepare the packets.
 
@@ -68,7 +70,8 @@ class GroupCycle:
             latency_s: how long adapter and driver may hold bytes back, at most.
             return_delay_s: of each servo.
             fast_failures: fast reads failing in a row until plain ones are used.
-            clean_reads: clean reads in a row until order and length are the usual ones again.
+            clean_reads: clean reads in a row until the order is the usual one again.
+            debts: answers still open on this port, shared by all who ask on it; None: nobody else.
 
         """
         self._port = port
@@ -86,7 +89,8 @@ class GroupCycle:
         self._clean_reads = clean_reads
         self._failed_in_a_row = 0
         self._clean_in_a_row = 0
-        self._pad = 0
+        self._debts = debts if debts is not None else Debts(port.clock)
+        self._missed = np.zeros(len(ids), np.intp)
         self._sent_until_s = port.clock.now_s()
         self.fast = fast
         """Whether the next read is a fast one."""
@@ -108,10 +112,13 @@ class GroupCycle:
         self._port.clearPort()
         self._send(question.request)
         raw, answer = self._collect(question)
-        if answer.clean and answer.answered.all():
+        heard = answer.answered
+        if not self._debts.none:
+            answer = self._believed(question, answer)
+        if answer.clean and answer.complete:
             self._succeeded()
         else:
-            self._failed(answer, timed_out=len(raw) < question.answer_bytes)
+            self._failed(question, answer, heard, timed_out=len(raw) < question.answer_bytes)
         if order == self._natural and self._length == answer.data.shape[1]:
             return answer
         back = np.argsort(order)
@@ -123,14 +130,29 @@ class GroupCycle:
             answer.clean,
         )
 
+    def _believed(self, question: GroupQuestion, answer: GroupAnswer) -> GroupAnswer:
+        """The answer without what may be that to an older question."""
+        known = np.array(
+            [not self._debts.open(i, question.length, fast=question.fast) for i in question.ids]
+        )
+        if known.all():
+            return answer
+        error = np.where(known, answer.error, 0).astype(np.uint8)
+        return GroupAnswer(
+            answer.data, answer.valid & known, error, answer.answered & known, clean=False
+        )
+
     def _question(self) -> GroupQuestion:
-        key = (self.fast, self._pad, self._order)
+        length = self._length
+        if not self._debts.none:
+            listening = [self._ids[k] for k in np.flatnonzero(self._missed < _PATIENCE)]
+            length = self._debts.free_length(listening, length, fast=self.fast)
+        key = (self.fast, length, self._order)
         question = self._questions.get(key)
         if question is None:
             if len(self._questions) >= _KEPT_QUESTIONS:
                 self._questions.clear()
             ids = [self._ids[k] for k in self._order]
-            length = self._length + self._pad
             question = GroupQuestion(ids, self._read_address, length, fast=self.fast)
             self._questions[key] = question
         return question
@@ -149,7 +171,7 @@ class GroupCycle:
         deadline_s = self._sent_until_s + wait_s + self._latency_s
         raw = port.read_until(question.answer_bytes, deadline_s)
         answer = question.parse(raw)
-        while len(raw) >= question.answer_bytes and not answer.answered.all():
+        while len(raw) >= question.answer_bytes and not answer.complete:
             more = question.missing_bytes(raw)  # stuffed bytes come on top
             got = port.read_until(more, deadline_s + self._wire_s(more)) if more else b""
             if not got:
@@ -164,10 +186,20 @@ class GroupCycle:
     def _succeeded(self) -> None:
         self._failed_in_a_row = 0
         self._clean_in_a_row += 1
+        if self._clean_in_a_row == 1:
+            self._missed[:] = 0
         if self._clean_in_a_row >= self._clean_reads:
-            self._pad, self._order = 0, self._natural
+            self._order = self._natural
 
-    def _failed(self, answer: GroupAnswer, *, timed_out: bool) -> None:
+    def _failed(
+        self,
+        question: GroupQuestion,
+        answer: GroupAnswer,
+        heard: NDArray[np.bool_],
+        *,
+        timed_out: bool,
+    ) -> None:
+        """Count, and prepare for what may still come; ``heard`` is who said anything at all."""
         self.counters.timeouts += timed_out
         self.counters.unclean += not timed_out
         self._clean_in_a_row = 0
@@ -175,9 +207,12 @@ class GroupCycle:
         if self.fast and self._failed_in_a_row >= self._fast_failures:
             self.fast = False
             self.counters.fast_given_up += 1
-        self._pad = (self._pad + 1) % _PADS
-        if not answer.answered.all():
-            first = int(np.argmin(answer.answered))  # those behind it had no chance
-            order = self._order
+        order = self._order
+        asked = list(order)
+        self._missed[asked] = np.where(heard, 0, self._missed[asked] + 1)
+        missing = np.flatnonzero(~answer.answered)
+        self._debts.owe([question.ids[k] for k in missing], question.length, fast=question.fast)
+        if not heard.all():
+            first = int(np.argmin(heard))  # those behind it had no chance
             self._order = (*order[:first], *order[first + 1 :], order[first])
         self.counters.drained_bytes += self._port.drain_until_quiet(self._latency_s)

@@ -2,6 +2,7 @@
 
 from drivers.budget import BITS_PER_BYTE, STATUS_BYTES
 from drivers.control_table import Register
+from drivers.debts import Debts
 from drivers.errors import BusError, NoAnswerError, ServoError
 from drivers.port import BytePort
 from drivers.protocol.packet import (
@@ -18,8 +19,12 @@ _ANSWER_S = 0.034
 """What the SDK, too, grants a servo for thinking and the adapter for passing on."""
 
 
-def read_register(port: BytePort, servo_id: int, register: Register, latency_s: float) -> bytes:
+def read_register(
+    port: BytePort, servo_id: int, register: Register, latency_s: float, debts: Debts | None = None
+) -> bytes:
     """Bytes of a register.
+
+    Asks for more bytes than the register has while an answer of its length is open.
 
     Raises:
         NoAnswerError: nobody answered.
@@ -28,18 +33,29 @@ def read_register(port: BytePort, servo_id: int, register: Register, latency_s: 
 
     """
     what = f"read {register.name}"
-    span = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
+    debts = debts if debts is not None else Debts(port.clock)
+    length = register.size
+    if not debts.none:
+        length = debts.free_length([servo_id], length, fast=False)
+    span = register.address.to_bytes(2, "little") + length.to_bytes(2, "little")
     packet = InstructionPacket(servo_id, Instruction.READ, span)
-    status = _exchange(port, packet, what, register.size, latency_s)
-    if len(status.params) != register.size:
-        raise BusError(
-            f"servo {servo_id}: {what}: {len(status.params)} bytes came, not {register.size}"
-        )
-    return status.params
+    try:
+        status = _exchange(port, packet, what, length, latency_s, debts)
+    except NoAnswerError:
+        debts.owe([servo_id], length, fast=False)
+        raise
+    if len(status.params) != length:
+        raise BusError(f"servo {servo_id}: {what}: {len(status.params)} bytes came, not {length}")
+    return status.params[: register.size]
 
 
 def write_register(
-    port: BytePort, servo_id: int, register: Register, data: bytes, latency_s: float
+    port: BytePort,
+    servo_id: int,
+    register: Register,
+    data: bytes,
+    latency_s: float,
+    debts: Debts | None = None,
 ) -> None:
     """Write ``data`` to a register.
 
@@ -48,9 +64,10 @@ def write_register(
         ServoError: the servo refused.
 
     """
+    debts = debts if debts is not None else Debts(port.clock)
     params = register.address.to_bytes(2, "little") + data
     packet = InstructionPacket(servo_id, Instruction.WRITE, params)
-    _exchange(port, packet, f"write {register.name}", 0, latency_s)
+    _exchange(port, packet, f"write {register.name}", 0, latency_s, debts)
 
 
 def check_accepted(servo_id: int, what: str, error: int) -> None:
@@ -63,7 +80,12 @@ def check_accepted(servo_id: int, what: str, error: int) -> None:
 
 
 def _exchange(
-    port: BytePort, packet: InstructionPacket, what: str, data_bytes: int, latency_s: float
+    port: BytePort,
+    packet: InstructionPacket,
+    what: str,
+    data_bytes: int,
+    latency_s: float,
+    debts: Debts,
 ) -> StatusPacket:
     reader = PacketReader()
     raw, expected = encode_instruction(packet), STATUS_BYTES + data_bytes
@@ -74,8 +96,20 @@ def _exchange(
     missing = expected
     while data := port.read_until(missing, deadline_s):
         for answer in reader.feed(data):
-            if isinstance(answer, StatusPacket) and answer.servo_id == packet.servo_id:
+            if (
+                isinstance(answer, StatusPacket)
+                and answer.servo_id == packet.servo_id
+                and not _old(answer, data_bytes, debts)
+            ):
                 check_accepted(packet.servo_id, what, answer.error)
                 return answer
         missing = max(1, expected - reader.pending)  # stuffing or noise made it longer
     raise NoAnswerError(f"servo {packet.servo_id}: {what}: no answer at {port.getBaudRate()} baud")
+
+
+def _old(answer: StatusPacket, data_bytes: int, debts: Debts) -> bool:
+    """Whether an answer is known to be that to another question."""
+    length = len(answer.params)
+    if length == data_bytes or answer.result:
+        return False
+    return length == 0 or data_bytes == 0 or debts.open(answer.servo_id, length, fast=False)

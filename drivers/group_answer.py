@@ -6,11 +6,12 @@ the slow way and yields what can be proved to belong to the question, servo by s
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.protocol.crc import crc16, crc16_rows
+from drivers.protocol.crc import crc16, crc16_long, crc16_rows
 from drivers.protocol.packet import (
     BROADCAST_ID,
     HEADER,
@@ -23,6 +24,7 @@ from drivers.protocol.packet import (
 from drivers.protocol.parser import PacketReader
 
 Bytes = NDArray[np.uint8]
+S = TypeVar("S", bound=np.generic)
 _RESULT = 0x7F
 
 
@@ -41,6 +43,11 @@ class GroupAnswer:
     clean: bool
     """Nothing but the expected bytes was on the line."""
 
+    @property
+    def complete(self) -> bool:
+        """Whether all have answered."""
+        return int(np.count_nonzero(self.answered)) == len(self.answered)
+
 
 class GroupQuestion:
     """One sync read of ``length`` bytes at ``address`` from ``ids``, fast or plain."""
@@ -52,10 +59,11 @@ class GroupQuestion:
         self.fast = fast
         self.frame_bytes = length + (4 if fast else 11)
         """Of one servo's share of the answer, without stuffing."""
-        self._ids = tuple(ids)
-        self._length = length
+        self.ids = tuple(ids)
+        self.length = length
+        """Of the block asked for."""
         self._index = {servo_id: k for k, servo_id in enumerate(ids)}
-        count = len(self._ids)
+        count = len(self.ids)
         share = (count * self.frame_bytes + 1).to_bytes(2, "little")
         self._fast_head = HEADER + bytes([BROADCAST_ID]) + share + bytes([STATUS])
         heads = b"".join(
@@ -63,13 +71,11 @@ class GroupQuestion:
             for servo_id in ids
         )
         self._heads = np.frombuffer(heads, np.uint8).reshape(count, 8)
-        self._id_column = np.array(ids, np.uint8)
-
-    @property
-    def answer_bytes(self) -> int:
+        self._id_bytes = bytes(ids)
+        self._all_there = _constant(np.ones(count, np.bool_))
+        self._no_error = _constant(np.zeros(count, np.uint8))
+        self.answer_bytes = (len(self._fast_head) if fast else 0) + count * self.frame_bytes
         """Length of the whole answer when nothing is stuffed."""
-        head = len(self._fast_head) if self.fast else 0
-        return head + len(self._ids) * self.frame_bytes
 
     def parse(self, raw: bytes) -> GroupAnswer:
         """Find each servo's result in all that came between the question and its deadline."""
@@ -84,23 +90,23 @@ class GroupQuestion:
             return 0
         reader = PacketReader()
         seen = {p.servo_id for p in reader.feed(raw)}
-        missing = sum(servo_id not in seen for servo_id in self._ids)
+        missing = sum(servo_id not in seen for servo_id in self.ids)
         return max(1, missing * self.frame_bytes - reader.pending) if missing else 0
 
     def _parse_fast(self, raw: bytes) -> GroupAnswer | None:
         if len(raw) != self.answer_bytes or not raw.startswith(self._fast_head):
             return None
-        if crc16_rows(np.frombuffer(raw, np.uint8)[None, :-2])[0] != raw[-2] | raw[-1] << 8:
+        if raw[len(self._fast_head) + 1 :: self.frame_bytes] != self._id_bytes:
+            return None
+        if crc16_long(raw[:-2]) != raw[-2] | raw[-1] << 8:
             return None
         body = np.frombuffer(raw, np.uint8, offset=len(self._fast_head))
         rows = body.reshape(-1, self.frame_bytes)
-        if not np.array_equal(rows[:, 1], self._id_column):
-            return None
         return self._all(rows[:, 2:-2], rows[:, 0])
 
     def _parse_plain(self, raw: bytes) -> GroupAnswer | None:
         # FF FF FD anywhere but in the headers: stuffed data, or a CRC that looks so; the slow way
-        if len(raw) != self.answer_bytes or raw.count(HEADER[:3]) != len(self._ids):
+        if len(raw) != self.answer_bytes or raw.count(HEADER[:3]) != len(self.ids):
             return None
         rows = np.frombuffer(raw, np.uint8).reshape(-1, self.frame_bytes)
         if not np.array_equal(rows[:, :8], self._heads):
@@ -110,10 +116,11 @@ class GroupQuestion:
             return None
         return self._all(rows[:, 9:-2], rows[:, 8])
 
-    @staticmethod
-    def _all(data: Bytes, error: Bytes) -> GroupAnswer:
-        answered = np.ones(len(data), np.bool_)
-        return GroupAnswer(data, (error & _RESULT) == 0, error, answered, clean=True)
+    def _all(self, data: Bytes, error: Bytes) -> GroupAnswer:
+        there = self._all_there
+        if not np.count_nonzero(error):
+            return GroupAnswer(data, there, self._no_error, there, clean=True)
+        return GroupAnswer(data, (error & _RESULT) == 0, error, there, clean=True)
 
     def _salvage_plain(self, raw: bytes) -> GroupAnswer:
         reader = PacketReader()
@@ -124,7 +131,7 @@ class GroupQuestion:
         for packet in packets:
             if not isinstance(packet, StatusPacket) or packet.servo_id not in self._index:
                 strange += 1
-            elif len(packet.params) not in (self._length, 0):
+            elif len(packet.params) not in (self.length, 0):
                 strange += 1  # the answer to another question: an older one
             elif packet.servo_id in found:
                 twice.add(packet.servo_id)
@@ -142,7 +149,7 @@ class GroupQuestion:
             return self._partial(found, clean=not raw)
         at = start + len(self._fast_head)
         crc = crc16(raw[start:at])
-        for servo_id in self._ids:
+        for servo_id in self.ids:
             share = raw[at : at + self.frame_bytes]
             if len(share) < self.frame_bytes or share[1] != servo_id:
                 break
@@ -155,15 +162,20 @@ class GroupQuestion:
         return self._partial(found, clean=start == 0 and at == len(raw))
 
     def _partial(self, found: dict[int, StatusPacket], *, clean: bool) -> GroupAnswer:
-        count = len(self._ids)
-        data = np.zeros((count, self._length), np.uint8)
+        count = len(self.ids)
+        data = np.zeros((count, self.length), np.uint8)
         valid, answered = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
         error = np.zeros(count, np.uint8)
         for servo_id, packet in found.items():
             k = self._index[servo_id]
             answered[k], error[k] = True, packet.error
             # an error status may come without data: an answer, but no value
-            if packet.result == 0 and len(packet.params) == self._length:
+            if packet.result == 0 and len(packet.params) == self.length:
                 data[k] = np.frombuffer(packet.params, np.uint8)
                 valid[k] = True
         return GroupAnswer(data, valid, error, answered, clean)
+
+
+def _constant(array: NDArray[S]) -> NDArray[S]:
+    array.setflags(write=False)
+    return array

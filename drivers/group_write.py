@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.protocol.crc import crc16_rows
+from drivers.protocol.crc import crc16_long
 from drivers.protocol.packet import (
     BROADCAST_ID,
     Instruction,
@@ -25,13 +25,13 @@ class GroupWrite:
         entries = b"".join(bytes([servo_id]) + bytes(4) for servo_id in ids)
         packet = InstructionPacket(BROADCAST_ID, Instruction.SYNC_WRITE, head + entries)
         self._frame = np.frombuffer(encode_instruction(packet), np.uint8).copy()
-        entry_bytes = self._frame[_VALUES_AT:-2].reshape(len(ids), 5)
-        self._values = entry_bytes[:, 1:]
+        shares = self._frame[_VALUES_AT:-2].reshape(len(ids), 5)
+        self._values = shares[:, 1:].view("<i4")[:, 0]
 
     def encode(self, values: NDArray[np.int32]) -> bytes:
         """Packet that writes ``values`` (N,); stuffed where the values need it."""
-        self._values[:] = values.astype("<i4").view(np.uint8).reshape(-1, 4)
-        crc = int(crc16_rows(self._frame[None, :-2])[0])
+        self._values[:] = values
+        crc = crc16_long(self._frame[:-2])
         self._frame[-2:] = crc & 0xFF, crc >> 8
         raw = self._frame.tobytes()
         if raw.find(b"\xff\xff\xfd", _PARAMS_AT, -2) < 0:

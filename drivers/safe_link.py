@@ -2,7 +2,6 @@
 
 import signal
 import threading
-from dataclasses import replace
 from types import FrameType, TracebackType
 
 from drivers.clock import Clock
@@ -156,7 +155,10 @@ class SafeLink:
         except DriverError as fault:
             self._bring_back(str(fault), fault)
         else:  # if the program stood still in between, the next step counts from here
-            self._memory = replace(verdict.memory, time_s=self._clock.now_s())
+            memory = verdict.memory
+            self._memory = SafetyMemory(
+                self._clock.now_s(), memory.goal_rad, memory.over_current_since_s
+            )
 
     def request_stop(self, reason: str) -> None:
         """Latch at the next read or write; may be called from another thread (a stop button)."""

@@ -5,6 +5,7 @@ torque). What no healthy run shows is vetoed: numbers that are none, a joint for
 limit, an alarm, lasting over-current, heat, supply voltage, a state that is too old.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -107,10 +108,10 @@ def vet(
     # After a pause the allowance does not pile up: never more than that of one stale limit
     dt_s = min(max(now_s - last.time_s, 0.0), limits.stale_limit_s)
     step = limits.goal_rate_rad_s * dt_s
-    goal = np.clip(command.goal_rad, last.goal_rad - step, last.goal_rad + step)
     lead = limits.goal_lead_rad
-    goal = np.clip(goal, state.position_rad - lead, state.position_rad + lead)
-    goal = np.clip(goal, -limits.limit_rad, limits.limit_rad)
+    goal = _within(command.goal_rad, last.goal_rad - step, last.goal_rad + step)
+    goal = _within(goal, state.position_rad - lead, state.position_rad + lead)
+    goal = _within(goal, -limits.limit_rad, limits.limit_rad)
     goal.setflags(write=False)
     memory = SafetyMemory(now_s, goal, over_since_s)
     return Verdict(goal, None, goal != command.goal_rad, memory)
@@ -120,6 +121,8 @@ def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLi
     """(J,) since when each current is above the limit; a joint not read keeps its time."""
     since = last.over_current_since_s
     over = np.abs(state.current_a) > limits.current_limit_a
+    if not np.count_nonzero(over) and not np.count_nonzero(np.isfinite(since)):
+        return since  # all NaN, and so it stays
     started = np.where(np.isnan(since), state.time_s, since)
     return np.where(state.valid, np.where(over, started, np.nan), since)
 
@@ -127,10 +130,10 @@ def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLi
 def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | None:
     """First joint that was not read for too long; None if there is none."""
     age_s = state.age_s + (now_s - state.time_s)
-    stale = ~(age_s <= limits.stale_limit_s)  # also a NaN
-    if not stale.any():
+    fresh = age_s <= limits.stale_limit_s  # of a NaN, too, not
+    if np.count_nonzero(fresh) == len(fresh):
         return None
-    joint = int(np.argmax(stale))
+    joint = int(np.argmin(fresh))
     return f"joint {joint}: not read for {age_s[joint]:.3f} s"
 
 
@@ -144,6 +147,8 @@ def state_fault(
     stale = stale_fault(state, limits, now_s)
     if stale is not None:
         return stale
+    if _plainly_well(state, over_since_s, limits):
+        return None
     over_s = state.time_s - over_since_s
     alarm = (state.hardware_error != 0) | ((state.error & ALERT) != 0)
     numbers = np.stack([state.position_rad, state.velocity_rad_s, state.current_a])
@@ -174,12 +179,39 @@ def state_fault(
     return None
 
 
+def _plainly_well(state: JointState, over_since_s: Floats, limits: SafetyLimits) -> bool:
+    """Whether no check of ``state_fault`` can find anything, at a fifth of their cost.
+
+    Stricter than they: what is not plain is left to them. A sum of squares is finite only if all
+    numbers are, and a comparison with a NaN counts as none.
+    """
+    count, position, amps = np.count_nonzero, state.position_rad, state.current_a
+    speed = state.velocity_rad_s
+    return (
+        math.isfinite(position.dot(position) + speed.dot(speed) + amps.dot(amps))
+        and not count(state.error)
+        and not count(state.hardware_error)
+        and count(np.abs(position) <= limits.limit_rad + limits.limit_slack_rad) == len(position)
+        and not count(np.isfinite(over_since_s))
+        and not count(state.temperature_c > limits.temperature_limit_c)
+        and not count(state.voltage_v < limits.voltage_min_v)
+        and not count(state.voltage_v > limits.voltage_max_v)
+    )
+
+
+def _within(values: Floats, low: Floats, high: Floats) -> Floats:
+    """``np.clip``, which takes four times longer for so few."""
+    return np.minimum(np.maximum(values, low), high)
+
+
 def _command_fault(command: JointCommand, limits: SafetyLimits) -> str | None:
     goal = np.asarray(command.goal_rad)
     if goal.shape != limits.limit_rad.shape:
         return f"command of shape {goal.shape} for {len(limits.limit_rad)} joints"
-    bad = ~np.isfinite(goal)
-    if bad.any():
+    if not math.isfinite(goal.dot(goal)):
+        bad = ~np.isfinite(goal)
+        if not bad.any():
+            return None
         joint = int(np.argmax(bad))
         return f"joint {joint}: commanded {goal[joint]}: not a number"
     return None

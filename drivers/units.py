@@ -67,7 +67,7 @@ class ServoUnits:
 
     def position_rad(self, raw: Ints) -> Floats:
         """Angles, rad; 0 is straight."""
-        return (np.asarray(raw, float) - self.zero_position) * self.rad_per_position
+        return np.asarray((raw - float(self.zero_position)) * self.rad_per_position)
 
     def position_raw(self, angle_rad: Floats) -> NDArray[np.int32]:
         """Nearest raw positions.
@@ -76,17 +76,17 @@ class ServoUnits:
             ValueError: an angle is not finite.
 
         """
-        if not np.isfinite(angle_rad).all():
+        if np.count_nonzero(np.isfinite(angle_rad)) < angle_rad.size:
             raise ValueError("an angle is not finite")
         return np.rint(angle_rad / self.rad_per_position + self.zero_position).astype(np.int32)
 
     def velocity_rad_s(self, raw: Ints) -> Floats:
         """Velocities, rad/s."""
-        return np.asarray(raw, float) * self.rad_s_per_velocity
+        return np.asarray(raw * self.rad_s_per_velocity)
 
     def current_a(self, raw: Ints) -> Floats:
         """Currents, A."""
-        return np.asarray(raw, float) * self.a_per_current
+        return np.asarray(raw * self.a_per_current)
 
     def current_raw(self, current_a: float) -> int:
         """Nearest raw current."""

@@ -17,6 +17,7 @@ from drivers.bus import DynamixelBus
 from drivers.chain import ServoChain
 from drivers.clock import Clock
 from drivers.serial_port import SerialPort
+from drivers.telemetry.record import Laid
 from drivers.types import BodyPose
 
 Floats = NDArray[np.float64]
@@ -42,9 +43,8 @@ def simulated(
     robot: RobotConfig,
     world: WorldConfig,
     ground: HeightField | None,
+    laid: Laid,
     *,
-    heading_rad: float,
-    joint_rad: Floats | None = None,
     compiled: bool | None = None,
 ) -> Backend:
     """Servos on a simulated line that turn a MuJoCo body with its head at the start.
@@ -54,8 +54,7 @@ def simulated(
         robot: the body and its servos.
         world: friction and ground.
         ground: the world's height field, where it has one.
-        heading_rad: of the body.
-        joint_rad: (J,) to begin with; None is straight.
+        laid: heading of the head link, and joint angles to begin with.
         compiled: None takes numba where it is installed.
 
     """
@@ -65,8 +64,7 @@ def simulated(
     from sim.physics.plant import MujocoPlant  # noqa: PLC0415
 
     plant = MujocoPlant(robot, world, ground, run.physics_step_s, compiled=compiled)
-    bent = np.zeros(robot.joint_count) if joint_rad is None else joint_rad
-    plant.reset(run.start_m, heading_rad, bent)
+    plant.reset(run.start_m, laid.heading_rad, laid.joint_rad)
     servo = robot.servo
     line = SimLine(ServoBank(robot.servo_ids, servo.model, servo.baud), plant, baud=servo.baud)
     chain = ServoChain(DynamixelBus(line, servo.model), robot, watchdog_s=run.safety.watchdog_s)

@@ -17,6 +17,7 @@ from controller.app.commands.run import run
 from controller.app.commands.scan import scan
 from controller.app.commands.track import track
 from controller.app.commands.trials import trials
+from controller.app.commands.walk import walk
 from drivers.errors import DriverError
 
 app = typer.Typer(
@@ -42,6 +43,9 @@ app.command(
     epilog=_examples("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json")
 )(trials)
 app.command(epilog=_examples("track", "track MIDLINES.csv --rate 60 --picture track.png"))(track)
+app.command(
+    epilog=_examples("walk", "walk --graph er:1000:9 --rule snake --rule stack --repeats 30 --json")
+)(walk)
 
 app.command(epilog=_examples("scan", "scan --port /dev/ttyUSB0 --baud 57600 --json"))(scan)
 app.command(epilog=_examples("doctor", "doctor --port /dev/ttyUSB0 --robot alternating16"))(doctor)

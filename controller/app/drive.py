@@ -153,7 +153,7 @@ class Drive:
             self._link.write(JointCommand(self._clock.now_s(), goal))
         verdict = self._link.last_verdict
         self._wire_s = self._wire_busy_s()
-        clamped = () if verdict is None else np.flatnonzero(verdict.clamped).tolist()
+        clamped = () if verdict is None else verdict.clamped.nonzero()[0].tolist()
         self._log.cycle(
             tick.deadline_s,
             goal,

@@ -36,16 +36,17 @@ def execute(
 
     """
     ahead = prepared.forecast()
-    heading_rad = prepared.start_heading_rad
     if port is None:
+        laid = prepared.laid()
         backend = simulated(
             prepared.run,
             prepared.robot,
             prepared.world,
             prepared.ground,
-            heading_rad=heading_rad,
+            laid,
         )
     else:
+        laid = None
         backend = metal(prepared.run, prepared.robot, port)
     log_path = folder / "log.mcap"
     with RunLog(log_path) as log:
@@ -62,6 +63,7 @@ def execute(
                 states=None if prepared.run.motion == "serpenoid" else prepared.library.counts,
             ),
             ground=prepared.ground,
+            laid=laid,
             torque_constant_n_m_a=_torque_constant_n_m_a(prepared.robot.servo.model),
         )
         limits = SafetyLimits.from_config(prepared.robot, prepared.run.safety)

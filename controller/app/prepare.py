@@ -23,12 +23,13 @@ from controller.motion.serpentine import Serpentine
 from controller.motion.traction import quasi_static_gain
 from controller.motion.usable import refusals
 from controller.motion.walker import Walker
-from controller.runtime.forecast import Forecast, forecast
+from controller.runtime.forecast import Forecast, forecast, mean_heading_rad
 from controller.runtime.margins import margin_faults
 from controller.runtime.pilot import Pilot, TrackSource
 from controller.shape.library import Refuse, StateLibrary, build_library
 from controller.terrain.path import SplinePath
 from controller.terrain.planner import TerrainPlanner
+from drivers.telemetry.record import Laid
 
 Floats = NDArray[np.float64]
 POINTS = 100
@@ -100,6 +101,17 @@ class Prepared:
         given = self.run.start_heading_rad
         return self.path.heading_rad(0.05) if given is None else given
 
+    def laid(self) -> Laid:
+        """How a simulated robot is laid down.
+
+        Straight on a flat floor. On a slope a straight body, round below, rolls like a log, so
+        there it is laid in its first shape.
+        """
+        if self.ground is None:
+            return Laid(self.start_heading_rad, np.zeros(self.robot.joint_count))
+        joints = self.pilot(level=True).first_goal_rad()
+        return Laid(self.start_heading_rad - mean_heading_rad(self.robot, joints), joints)
+
     def pilot(self, *, level: bool = False) -> Pilot:
         """Make a fresh pilot; the same configuration and seed give the same one.
 
@@ -111,7 +123,7 @@ class Prepared:
         return Pilot(
             source,
             Pulse(
-                JointTrack(source.track, self.retarget.joints_rad),
+                JointTrack(source.track, self.retarget.joints_rad, robot.limit_rad),
                 wanted,
                 speed_limit_rad_s=robot.joint_speed_limit_rad_s,
                 acceleration_limit_rad_s2=robot.joint_acceleration_limit_rad_s2,

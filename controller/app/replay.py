@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
+from config.ground import build_ground
 from controller.app.backend import Backend, simulated
 from controller.app.prepare import Prepared
 from controller.app.report.compare import Comparison, compare
 from controller.runtime.body import body_in_world
-from drivers.telemetry.record import RunRecord
+from drivers.telemetry.record import Laid, RunRecord
 from drivers.telemetry.writer import RunLog, VerdictKind
 from drivers.types import BodyPose, JointCommand
 
@@ -60,6 +61,7 @@ def replay(
             plan=header.plan,
             ground=header.ground,
             torque_constant_n_m_a=header.torque_constant_n_m_a,
+            laid=header.laid,
         )
         chain.enable()
         wire_s, start_s = backend.wire_busy_s(), clock.now_s()
@@ -131,14 +133,10 @@ def _known(record: RunRecord, valid: NDArray[np.bool_]) -> RunRecord:
 
 def _backend(record: RunRecord) -> Backend:
     header = record.header
-    prepared = Prepared(header.run, header.robot, header.world)
-    first = record.cycle.measured_rad[0]
-    straight = header.backend == "sim" or not np.isfinite(first).all()
-    return simulated(
-        header.run,
-        header.robot,
-        header.world,
-        prepared.ground,
-        heading_rad=prepared.start_heading_rad,
-        joint_rad=None if straight else first,
-    )
+    laid = header.laid
+    if laid is None:
+        prepared = Prepared(header.run, header.robot, header.world)
+        first = record.cycle.measured_rad[0]
+        known = first if np.isfinite(first).all() else np.zeros(header.robot.joint_count)
+        laid = Laid(prepared.start_heading_rad, known)
+    return simulated(header.run, header.robot, header.world, build_ground(header.world), laid)

@@ -8,7 +8,7 @@ That is what lets a time law keep joint speed *and* acceleration within limits.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from controller.motion.angle_track import AngleTrack
 
@@ -18,13 +18,30 @@ Floats = NDArray[np.float64]
 class JointTrack:
     """Joint angles of a body whose head has travelled ``head`` segments along ``track``."""
 
-    def __init__(self, track: AngleTrack, joints_of: Callable[[Floats], Floats]) -> None:
-        """Follow ``track``; ``joints_of`` maps skeletons (..., N) to joints (..., J)."""
+    def __init__(
+        self,
+        track: AngleTrack,
+        joints_of: Callable[[Floats], Floats],
+        limit_rad: ArrayLike = np.inf,
+    ) -> None:
+        """Follow ``track``.
+
+        Args:
+            track: grown by others.
+            joints_of: maps skeletons (..., N) to joints (..., J).
+            limit_rad: (J,) half ranges; a window between two shapes that bends further is kept to
+                them, and the measured heading makes up for it in the next decision.
+
+        """
         self.track = track
-        self._joints_of = joints_of
+        self._limit_rad = np.asarray(limit_rad, dtype=float)
+        self._joints = joints_of
         self.first = track.points
         """The head at which the first sample of the tables stands."""
-        self._q = joints_of(track.body_rad(float(track.points)))[None]
+        self._q = self._joints_of(track.body_rad(float(track.points)))[None]
+
+    def _joints_of(self, body_rad: Floats) -> Floats:
+        return np.clip(self._joints(body_rad), -self._limit_rad, self._limit_rad)
 
     @property
     def last(self) -> int:
@@ -42,9 +59,9 @@ class JointTrack:
 
     def goal_rad(self, head: float) -> Floats:
         """(J,) joint angles; at both ends of what is known the spline runs on straight."""
-        middle = int(np.clip(round(head), self.first, self.last))
+        middle = min(max(round(head), self.first), self.last)
         t = head - middle + 0.5
-        before, at, after = (self._at(middle + step) for step in (-1, 0, 1))
+        before, at, after = self._around(middle - self.first)
         return np.asarray(
             0.5 * (1.0 - t) ** 2 * before + (0.5 + t - t * t) * at + 0.5 * t * t * after
         )
@@ -70,11 +87,11 @@ class JointTrack:
         skip = start - self.first - low
         return slope[skip:], wide[skip:]
 
-    def _at(self, head: int) -> Floats:
-        k = head - self.first
+    def _around(self, k: int) -> tuple[Floats, Floats, Floats]:
+        """Samples k - 1, k and k + 1 of the table."""
         q = self._q
-        if 0 <= k < len(q):
-            return np.asarray(q[k])
         if len(q) == 1:
-            return np.asarray(q[0])
-        return np.asarray(2.0 * q[0] - q[1] if k < 0 else 2.0 * q[-1] - q[-2])
+            return q[0], q[0], q[0]
+        before = q[k - 1] if k > 0 else 2.0 * q[0] - q[1]
+        after = q[k + 1] if k + 1 < len(q) else 2.0 * q[-1] - q[-2]
+        return before, q[k], after

@@ -6,6 +6,8 @@ quickly then asks for a jump of speed. Here half of the acceleration limit is le
 of the track that is known.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,8 +40,8 @@ class Pulse:
         self._slew = wanted_segments_s / ramp_time_s
         self._stopping = False
         self._first = joints.first
-        self._allowed = np.array([wanted_segments_s])
-        self._slope = np.zeros(1)
+        self._allowed = [wanted_segments_s]
+        self._slope = [0.0]
 
     def stop(self) -> None:
         """Slow down to rest from now on."""
@@ -56,7 +58,8 @@ class Pulse:
         else:
             soon = self.head + self.speed_segments_s * dt_s
             faster = self.speed_segments_s + thrust * dt_s
-            self.speed_segments_s = min(self._limit_at(soon), faster)
+            allowed = min(self._limit_at(self.head), self._limit_at(soon))
+            self.speed_segments_s = min(allowed, faster)
         self.head = min(self.head + self.speed_segments_s * dt_s, float(self.joints.last))
         return self.head
 
@@ -65,13 +68,13 @@ class Pulse:
         return self.joints.goal_rad(self.head)
 
     def _limit_at(self, head: float) -> float:
-        at = np.clip(head - self._first, 0.0, len(self._allowed) - 1.0)
-        low = min(int(at), len(self._allowed) - 2) if len(self._allowed) > 1 else 0
+        allowed = self._allowed
+        at = min(max(head - self._first, 0.0), len(allowed) - 1.0)
+        low = min(int(at), len(allowed) - 2) if len(allowed) > 1 else 0
         part = at - low
-        if part == 0.0 or len(self._allowed) == 1:
-            return float(self._allowed[low])
-        squared = self._allowed[low] ** 2 * (1.0 - part) + self._allowed[low + 1] ** 2 * part
-        return float(np.sqrt(squared))
+        if part == 0.0 or len(allowed) == 1:
+            return allowed[low]
+        return math.sqrt(allowed[low] ** 2 * (1.0 - part) + allowed[low + 1] ** 2 * part)
 
     def _look_ahead(self) -> None:
         """Tabulate the speed allowed from the head's place on, braking distance included."""
@@ -79,8 +82,12 @@ class Pulse:
         slope, turn = self.joints.bends(self._first)
         by_speed = self._speed_limit / np.maximum(slope, _TINY)
         by_bend = np.sqrt(self._half_acceleration / np.maximum(turn, _TINY))
-        allowed = np.minimum(np.minimum(by_speed, by_bend), self._wanted)
+        self._slope = steps = slope.tolist()
+        here = np.minimum(np.minimum(by_speed, by_bend), self._wanted)
+        # least of three neighbours: between two places no limit is missed, and none is a step
+        around = np.pad(here, 1, mode="edge")
+        allowed = np.minimum(np.minimum(around[:-2], around[2:]), here).tolist()
         for k in range(len(allowed) - 2, -1, -1):
-            brake = self._half_acceleration / max(slope[k], slope[k + 1], _TINY)
-            allowed[k] = min(allowed[k], np.sqrt(allowed[k + 1] ** 2 + 2.0 * brake))
-        self._allowed, self._slope = allowed, slope
+            brake = self._half_acceleration / max(steps[k], steps[k + 1], _TINY)
+            allowed[k] = min(allowed[k], math.sqrt(allowed[k + 1] ** 2 + 2.0 * brake))
+        self._allowed = allowed

@@ -24,6 +24,10 @@ class Path(Protocol):
         """Arc length of the closest point in ``[from_s_m, from_s_m + window_m]``."""
         ...
 
+    def first_pass(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
+        """Arc length at which the path first comes nearest to a point that it leads through."""
+        ...
+
 
 def wrap(angle_rad: ArrayLike) -> Floats:
     """Angles in [-pi, pi)."""

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from config.run import WalkConfig
 from controller.motion.angle_track import AngleTrack
 from controller.motion.steering import wrap
+from controller.shape.star import star_order
 
 Floats = NDArray[np.float64]
-Order = Callable[[Floats], NDArray[np.intp]]
 Accept = Callable[[Floats], bool]
+_SPARE = 60
+"""Shapes, nearest in heading first, that are tried when no candidate of the walk fits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +66,7 @@ class Walker:
         size[self._current] = np.inf  # a walk leaves its state
         near = np.flatnonzero(size <= walk.heading_tolerance_rad)
         pool = near if len(near) else np.argsort(size, kind="stable")[: walk.nearest_count]
-        ordered = pool[self._order(pool, size[pool])]
-        state = next((int(k) for k in ordered if self._fits(self._piece(placed[k], error[k]))), -1)
-        state = int(ordered[0]) if state < 0 else state
+        state = self._choose(pool, placed, error)
         track.append(self._piece(placed[state], error[state]))
         if self._visits[state]:
             self._failures[self._current] += 1  # left for a state already visited (corrected F)
@@ -76,12 +76,15 @@ class Walker:
         ramp = self._ramp(error[state])
         return Decision(state, float(error[state]), ramp, len(near), visited)
 
-    def _order(self, pool: NDArray[np.intp], size: Floats) -> NDArray[np.intp]:
-        """Positions in ``pool``, best first: W of [PT] Eq. 7 on a star, where every degree is 1."""
-        m, f = self._visits[pool], self._failures[pool]
-        group = np.where(m == 0, 0, np.where(f == 0, 1, 2))
-        load = np.where(m == 0, 0.0, np.log2(np.maximum(m, 1)) + f)  # log2 of M 2^F: no overflow
-        return np.lexsort((size, load, group))
+    def _choose(self, pool: NDArray[np.intp], placed_rad: Floats, error_rad: Floats) -> int:
+        """First of ``pool`` in the order of W whose body is acceptable; the very first if none."""
+        first = -1
+        for k in star_order(self._visits[pool], self._failures[pool], error_rad[pool]):
+            state = int(pool[k])
+            if self._fits(self._piece(placed_rad[state], error_rad[state])):
+                return state
+            first = state if first < 0 else first
+        return first
 
     def _ramp(self, error_rad: float) -> float:
         return float(np.clip(-error_rad, -self._walk.ramp_limit_rad, self._walk.ramp_limit_rad))

@@ -19,6 +19,8 @@ class BodyView:
     """(L, 3) centres of the links, head first."""
     forward: Floats
     """(L, 3) unit vectors along the links, in the direction of travel."""
+    centre_m: Floats
+    """(3,) centre of mass of equal links; [PT] 2.6.2 calls it S_k."""
 
     @property
     def headings_rad(self) -> Floats:
@@ -29,11 +31,6 @@ class BodyView:
         )  # np.unwrap takes 4 times longer
         angles[1:] -= 2.0 * np.pi * turns.cumsum()
         return np.asarray(angles)
-
-    @property
-    def centre_m(self) -> Floats:
-        """(3,) centre of mass of equal links; [PT] 2.6.2 calls it S_k."""
-        return np.asarray(self.link_m.sum(axis=0) / len(self.link_m))
 
     def way_since_m(self, before: "BodyView") -> float:
         """How far the links have gone along themselves since ``before``, mean over the body."""
@@ -46,15 +43,12 @@ def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> Body
     Yaw turns the link behind by ``-q`` about the up axis, pitch by ``+q`` about the left axis, so a
     positive joint bends the head side to the left, or lifts it.
     """
-    # In plain floats: seventeen steps in a row, on vectors of three, in every control cycle
-    half = 0.5 * robot.link_length_m
+    # The axes in plain floats: seventeen steps in a row, in every control cycle
     rows = np.asarray(pose.rotation, dtype=float).T.tolist()
     (fx, fy, fz), (lx, ly, lz), (ux, uy, uz) = rows
-    x, y, z = np.asarray(pose.head_in_world_m, dtype=float).tolist()
-    centres, forward = [(x, y, z)], [(fx, fy, fz)]
+    axes = [fx, fy, fz]
     turns = zip(np.cos(joint_rad).tolist(), np.sin(joint_rad).tolist(), strict=True)
     for axis, (c, s) in zip(robot.joint_axes, turns, strict=True):
-        x, y, z = x - half * fx, y - half * fy, z - half * fz
         if axis == "y":
             fx, lx = c * fx - s * lx, s * fx + c * lx
             fy, ly = c * fy - s * ly, s * fy + c * ly
@@ -63,7 +57,11 @@ def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> Body
             fx, ux = c * fx - s * ux, s * fx + c * ux
             fy, uy = c * fy - s * uy, s * fy + c * uy
             fz, uz = c * fz - s * uz, s * fz + c * uz
-        x, y, z = x - half * fx, y - half * fy, z - half * fz
-        centres.append((x, y, z))
-        forward.append((fx, fy, fz))
-    return BodyView(np.array(centres), np.array(forward))
+        axes += (fx, fy, fz)
+    forward = np.array(axes).reshape(-1, 3)
+    link_m = np.empty_like(forward)
+    link_m[0] = 0.0
+    (forward[:-1] + forward[1:]).cumsum(axis=0, out=link_m[1:])
+    link_m *= -0.5 * robot.link_length_m
+    link_m += pose.head_in_world_m
+    return BodyView(link_m, forward, link_m.sum(axis=0) / len(link_m))

@@ -9,6 +9,9 @@ _HEADROOM = 1.05
 """A piece that is appended may ask for a brake that is a little late."""
 
 
+_ROUNDING = 1e-9
+
+
 def margin_faults(plan: Forecast, robot: RobotConfig) -> list[str]:
     """One line per joint and limit that ``plan`` breaks: reach, speed, acceleration, torque."""
     joints = robot.joint_count
@@ -33,5 +36,5 @@ def margin_faults(plan: Forecast, robot: RobotConfig) -> list[str]:
     return [
         f"plan: joint {j + 1} would {verb} {asked[j]:.2f} {unit}; its limit is {limit[j]:.2f}"
         for verb, unit, asked, limit, headroom in checks
-        for j in np.flatnonzero(asked > headroom * limit)
+        for j in np.flatnonzero(asked > headroom * limit + _ROUNDING)
     ]

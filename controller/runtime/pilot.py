@@ -4,6 +4,7 @@ With ``feedback`` off it believes that the body goes where the track goes, witho
 method, kept to show what a body with friction makes of it.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Protocol
@@ -22,8 +23,9 @@ from controller.runtime.body import BodyView
 Floats = NDArray[np.float64]
 
 
+_ASTRAY_BODIES = 0.5
 # Segments of track left when the next piece is decided: the time law must see beyond the head.
-_FORESIGHT = 3.0
+_FORESIGHT = 6.0
 _LIFT_S = 0.1
 # Body lengths of track before another path may be laid: turning back takes about as much.
 _PATIENCE_BODIES = 2.0
@@ -67,6 +69,7 @@ class Pilot:
         self._pitch_rad: Floats | None = None
         self._waypoints_m = np.asarray(waypoints_m, float)
         self._along_m = self._head_along_m = 0.0
+        self._length_m = length_m
         self._lay_path(np.asarray(start_m, float), 0)
         self._segment_m = length_m / source.track.points
         self._carrot_m = carrot_m
@@ -141,28 +144,36 @@ class Pilot:
         """Count a waypoint when the centre is near it; when it was passed by, go back for it."""
         if self.done:
             return
-        if np.hypot(*(self._waypoints_m[self.reached] - centre_m)) <= self._radius_m:
+        if math.dist(self._waypoints_m[self.reached], centre_m) <= self._radius_m:
             self.reached += 1
-        elif (
-            self._feedback
-            and self._along_m > self._passed_m[self.reached] + self._radius_m
-            and self.head >= self._patience
-        ):
+        elif self._feedback and self.head >= self._patience and self._astray(centre_m):
             self.missed += 1
             self._patience = self.head + _PATIENCE_BODIES * self._source.track.points
             with suppress(InputError):  # from here no safe way leads back: the old path stays
                 self._lay_path(head_m, self.reached)
+
+    def _astray(self, centre_m: Floats) -> bool:
+        """Whether the next waypoint has been passed by, or the path been left by half a body."""
+        path, end_m = self.path, self.path.length_m
+        along_m = self._along_m
+        if along_m >= end_m - 1e-6:  # how far beyond the end, the way that the path led there
+            last = path.position([end_m - 0.05, end_m])
+            ahead = (last[1] - last[0]) / 0.05
+            along_m += float((centre_m - last[1]) @ ahead)
+        gap_m = math.dist(path.position(self._along_m), centre_m)
+        return bool(
+            along_m > self._passed_m[self.reached] + self._radius_m
+            or gap_m > _ASTRAY_BODIES * self._length_m
+        )
 
     def _lay_path(self, from_m: Floats, first: int) -> None:
         """Plan from a point through the waypoints from ``first`` on."""
         self.path = self._plan(np.vstack([from_m, self._waypoints_m[first:]]))
         self._along_m = self._head_along_m = 0.0
         self._passed_m = np.zeros(len(self._waypoints_m))
-        at, last = 0.0, from_m
+        at = 0.0
         for k in range(first, len(self._waypoints_m)):
-            chord_m = float(np.hypot(*(self._waypoints_m[k] - last)))
-            at = self.path.nearest(self._waypoints_m[k], at, window_m=1.6 * chord_m + 0.1)
-            self._passed_m[k], last = at, self._waypoints_m[k]
+            at = self._passed_m[k] = self.path.first_pass(self._waypoints_m[k], at)
 
     def _aim(self, view: BodyView) -> tuple[float, float]:
         """Offset from track to world, and the direction wanted there."""

@@ -1,15 +1,13 @@
 """How fast a walk covers a graph, and how soon it comes back: rule x graph x repeats (Fig. 9)."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
-from controller.shape.graphs import check_spec, random_graph
-from controller.shape.walks import RULES, Walk, walk
+from controller.shape.graph_spec import graph_source
+from controller.shape.walks import Walk, check_rule, walk
 
 Floats = NDArray[np.float64]
 SHORT_RETURN = 0.05
@@ -33,6 +31,8 @@ class StudyResult:
     """(R,) steps until all states were seen, over |V|; NaN where V^2 steps were not enough."""
     short_returns: Floats
     """(R,) share of returns to a state after less than 0.05 |V| steps, until cover."""
+    short_steps: Floats
+    """(R,) such returns as a share of all steps."""
     grid: Floats
     """(G,) steps over |V|."""
     visited: Floats
@@ -52,33 +52,37 @@ class StudyResult:
             "cover_mean": round(float(covered.mean()), 4) if len(covered) else None,
             "cover_std": round(float(covered.std()), 4) if len(covered) else None,
             "cover_worst": round(float(covered.max()), 4) if len(covered) else None,
+            "seen_at_v": round(float(np.interp(1.0, self.grid, self.visited)), 4),
+            "cover_each": [round(float(x), 4) if np.isfinite(x) else None for x in self.cover],
             "short_returns": round(float(self.short_returns.mean()), 4),
+            "short_steps": round(float(self.short_steps.mean()), 4),
             "curve_steps": [round(float(x), 3) for x in self.grid],
             "curve_visited": [round(float(x), 4) for x in self.visited],
         }
 
 
 def run_study(graph: str, rule: str, repeats: int, seed: int = 0) -> StudyResult:
-    """Run ``rule`` on ``repeats`` fresh graphs of the spec ``graph`` (``graphs.random_graph``).
+    """Run ``rule`` on ``repeats`` fresh graphs of the spec ``graph`` (``graph_spec.graph_source``).
 
     Raises:
         InputError: unknown spec or rule, or no repeats.
 
     """
-    check_spec(graph)
-    if rule not in RULES:
-        raise InputError(f"rule {rule!r}: expected one of {', '.join(RULES)}")
+    draw = graph_source(graph)
+    check_rule(rule)
     if repeats < 1:
         raise InputError(f"repeats: expected 1 or more, not {repeats}")
-    states, degrees, cover, short = np.empty((4, repeats))
+    states, degrees, cover, short, short_steps = np.empty((5, repeats))
     visited = np.zeros(len(_GRID))
     for repeat in range(repeats):
         rng = np.random.default_rng([seed, repeat])
-        drawn = random_graph(graph, rng)
+        drawn = draw(rng)
         done = walk(drawn, rule, int(rng.integers(drawn.states)), rng)
         states[repeat], degrees[repeat] = drawn.states, drawn.mean_degree
         cover[repeat] = done.steps / drawn.states if done.covered else np.nan
-        short[repeat] = short_return_share(done, drawn.states)
+        gaps = return_gaps(done)
+        sooner = np.count_nonzero(gaps < SHORT_RETURN * drawn.states)
+        short[repeat], short_steps[repeat] = sooner / max(1, len(gaps)), sooner / done.steps
         seen = np.cumsum(_first_visits(done))
         visited += np.interp(_GRID * drawn.states, np.arange(len(seen)), seen / drawn.states)
     return StudyResult(
@@ -90,6 +94,7 @@ def run_study(graph: str, rule: str, repeats: int, seed: int = 0) -> StudyResult
         mean_degree=float(degrees.mean()),
         cover=cover,
         short_returns=short,
+        short_steps=short_steps,
         grid=_GRID,
         visited=visited / repeats,
     )
@@ -100,30 +105,6 @@ def return_gaps(done: Walk) -> NDArray[np.int64]:
     order = np.argsort(done.path, kind="stable")
     same = done.path[order][1:] == done.path[order][:-1]
     return np.asarray(np.diff(order)[same])
-
-
-def short_return_share(done: Walk, states: int) -> float:
-    """Share of returns sooner than 0.05 |V| steps; 0 where there was no return."""
-    gaps = return_gaps(done)
-    return float((gaps < SHORT_RETURN * states).mean()) if len(gaps) else 0.0
-
-
-def draw_curves(results: Sequence[StudyResult], path: Path, title: str) -> None:
-    """Write Fig. 9 for results on one kind of graph: states seen over steps (needs matplotlib)."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  an extra
-
-    figure = Figure(figsize=(6.0, 3.6), layout="constrained")
-    axes = figure.subplots()
-    for result in results:
-        (line,) = axes.plot(result.grid, 100.0 * result.visited, label=result.rule)
-        if np.isfinite(result.cover).any():
-            end = float(np.nanmean(result.cover))
-            axes.plot([end], [100.0], "o", color=line.get_color(), clip_on=False)
-    axes.set(xlim=(0.0, 4.0), ylim=(0.0, 102.0), title=title)
-    axes.set(xlabel="steps / |V|  (dot: all seen, mean)", ylabel="states seen, %")
-    axes.grid(alpha=0.3)
-    axes.legend(loc="lower right")
-    figure.savefig(path, dpi=110)
 
 
 def _first_visits(done: Walk) -> NDArray[np.bool_]:

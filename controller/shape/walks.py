@@ -3,8 +3,9 @@
 ``W(q) = deg / (1 - sign M + deg (sign M + sign F) + M 2^F)``, the neighbour with the largest W is
 next. Correction: F(q) counts the times that q was left for an already *visited* state; with the
 printed "unvisited" Eq. 3 and the properties of W fail (``snake-printed`` keeps it for comparison).
-2^F overflows floats, so W is compared by class and by integers. Ties go to the least recently
-visited neighbour, then to the first in the list.
+2^F overflows floats, so W is compared by integers. Ties go to the least recently visited neighbour,
+then to the first in the list. Algorithm 2's ``until n < N`` is read as "until the target is met":
+here, until all states are seen.
 """
 
 from collections.abc import Callable
@@ -45,9 +46,8 @@ def walk(
     start: int,
     rng: np.random.Generator,
     max_steps: int | None = None,
-    go_on: bool = False,
 ) -> Walk:
-    """Walk from ``start``; O(neighbours) a step.
+    """Walk from ``start`` until all states are seen; O(neighbours) a step.
 
     Args:
         graph: connected.
@@ -55,14 +55,14 @@ def walk(
         start: first state.
         rng: used by ``random`` only.
         max_steps: default V^2, what a random walk may need.
-        go_on: do not stop when every state has been seen.
 
     Raises:
-        InputError: unknown rule.
+        InputError: unknown rule, or the start is no state.
 
     """
-    if rule not in RULES:
-        raise InputError(f"rule {rule!r}: expected one of {', '.join(RULES)}")
+    check_rule(rule)
+    if not 0 <= start < graph.states:
+        raise InputError(f"start {start}: expected a state from 0 to {graph.states - 1}")
     book = _Book(graph, start)
     choose: Callable[[list[int]], int] = {
         "snake": book.snake,
@@ -73,7 +73,7 @@ def walk(
     }[rule]
     counts_fresh = {"snake": False, "snake-printed": True}.get(rule)
     limit = graph.states**2 if max_steps is None else max_steps
-    while book.step < limit and (go_on or book.seen < graph.states):
+    while book.step < limit and book.seen < graph.states:
         book.move(choose(book.near[book.path[-1]]), counts_fresh)
     return Walk(
         path=np.array(book.path, dtype=np.int64),
@@ -83,23 +83,23 @@ def walk(
     )
 
 
-def w_exceeds(a: tuple[int, int, int], b: tuple[int, int, int]) -> int:
+def check_rule(rule: str) -> None:
+    """Raise InputError where ``rule`` is none of ``RULES``."""
+    if rule not in RULES:
+        raise InputError(f"rule {rule!r}: expected one of {', '.join(RULES)}")
+
+
+def compare_w(a: tuple[int, int, int], b: tuple[int, int, int]) -> int:
     """Sign of W(a) - W(b), exact, for (deg, M, F) each ([PT] Eq. 4-7)."""
-    class_a, class_b = _class(a), _class(b)
-    if class_a != class_b:
-        return 1 if class_a < class_b else -1
-    if class_a == 0:
-        left, right = a[0], b[0]
-    else:  # deg(a) M(b) 2^F(b) against deg(b) M(a) 2^F(a)
-        shift = b[2] - a[2]
-        left, right = a[0] * b[1] << max(shift, 0), b[0] * a[1] << max(-shift, 0)
+    (over_a, under_a), (over_b, under_b) = _one_over_w(*a), _one_over_w(*b)
+    left, right = over_b * under_a, over_a * under_b
     return (left > right) - (left < right)
 
 
-def _class(q: tuple[int, int, int]) -> int:
-    if q[1] == 0:
-        return 0
-    return 1 if q[2] == 0 else 2
+def _one_over_w(degree: int, selected: int, failures: int) -> tuple[int, int]:
+    if selected == 0:
+        return 1, degree
+    return degree * (1 + (failures > 0)) + (selected << failures), degree
 
 
 class _Book:
@@ -134,32 +134,30 @@ class _Book:
         self.last[to] = self.step
 
     def snake(self, near: list[int]) -> int:
+        fresh = self._fresh(near)
+        if fresh:  # W = deg
+            return max(fresh, key=self.degree.__getitem__)
         best = near[0]
         score = (self.degree[best], self.selected[best], self.failures[best])
         for q in near[1:]:
             other = (self.degree[q], self.selected[q], self.failures[q])
-            sign = w_exceeds(other, score)
+            sign = compare_w(other, score)
             if sign > 0 or (sign == 0 and self.last[q] < self.last[best]):
                 best, score = q, other
         return best
 
     def stack_top(self, near: list[int]) -> int:
         """Depth first: the unvisited neighbour of highest degree, else back the way it came."""
-        fresh = [q for q in near if self.selected[q] == 0]
+        fresh = self._fresh(near)
         if fresh:
-            best = max(fresh, key=self.degree.__getitem__)
-            self.stack.append(best)
-            return best
-        if len(self.stack) > 1:
-            self.stack.pop()
-            return self.stack[-1]
-        self.stack.append(near[0])  # all is seen: begin again, one step out
-        return near[0]
+            self.stack.append(max(fresh, key=self.degree.__getitem__))
+        else:
+            self.stack.pop()  # never the start: back there with nothing fresh, all has been seen
+        return self.stack[-1]
 
     def free(self, near: list[int], rng: np.random.Generator) -> int:
         """Any unvisited neighbour, else any."""
-        fresh = [q for q in near if self.selected[q] == 0]
-        pool = fresh or near
+        pool = self._fresh(near) or near
         return pool[int(rng.random() * len(pool))]
 
     def degree_over_visits(self, near: list[int]) -> int:
@@ -172,3 +170,7 @@ class _Book:
             if left > right or (left == right and self.last[q] < self.last[best]):
                 best = q
         return best
+
+    def _fresh(self, near: list[int]) -> list[int]:
+        selected = self.selected
+        return [q for q in near if not selected[q]]

@@ -1,5 +1,7 @@
 """A smooth path: a cubic spline through points in order, by arc length ([PT] 2.6.1)."""
 
+from bisect import bisect_left, bisect_right
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
@@ -29,6 +31,8 @@ class SplinePath:
         fine = spline(np.linspace(0.0, chord[-1], max(2, round(chord[-1] / _STEP_M) + 1)))
         self._s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
         self._points = fine
+        self._x, self._y = np.ascontiguousarray(fine.T)
+        self._marks: list[float] = self._s.tolist()
 
     @property
     def length_m(self) -> float:
@@ -38,8 +42,10 @@ class SplinePath:
     def position(self, s_m: ArrayLike) -> Floats:
         """(..., 2) points at arc lengths, clamped to the ends."""
         s = np.asarray(s_m, dtype=float)
-        x, y = (np.interp(s, self._s, self._points[:, k]) for k in (0, 1))
-        return np.stack([x, y], axis=-1)
+        points = np.empty((*s.shape, 2))
+        points[..., 0] = np.interp(s, self._s, self._x)
+        points[..., 1] = np.interp(s, self._s, self._y)
+        return points
 
     def heading_rad(self, s_m: float) -> float:
         """Direction of the path at an arc length."""
@@ -51,8 +57,20 @@ class SplinePath:
 
         The window keeps a follower on its own lap where a path crosses or closes on itself.
         """
-        low = int(np.searchsorted(self._s, from_s_m - 1e-9))
-        high = int(np.searchsorted(self._s, from_s_m + window_m, side="right"))
-        low = min(low, len(self._s) - 1)
-        gap = self._points[low : max(high, low + 1)] - np.asarray(point_m, dtype=float)[:2]
-        return float(self._s[low + int(np.argmin(np.hypot(gap[:, 0], gap[:, 1])))])
+        marks = self._marks
+        low = min(bisect_left(marks, from_s_m - 1e-9), len(marks) - 1)
+        high = max(bisect_right(marks, from_s_m + window_m), low + 1)
+        x, y = np.asarray(point_m, dtype=float)[:2].tolist()
+        dx, dy = self._x[low:high] - x, self._y[low:high] - y
+        return marks[low + int((dx * dx + dy * dy).argmin())]
+
+    def first_pass(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
+        """Arc length, from ``from_s_m`` on, at which the path first comes nearest to a point.
+
+        Of several passes as near as a table's step, the first counts: a lap may end where it began.
+        """
+        low = min(int(np.searchsorted(self._s, from_s_m - 1e-9)), len(self._s) - 1)
+        gap = np.hypot(*(self._points[low:] - np.asarray(point_m, dtype=float)[:2]).T)
+        close = np.flatnonzero(gap <= gap.min() + _STEP_M)
+        run = close[: int(np.argmax(np.append(np.diff(close), 2) > 1)) + 1]
+        return float(self._s[low + run[np.argmin(gap[run])]])

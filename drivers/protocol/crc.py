@@ -22,7 +22,8 @@ def _of_byte(byte: int) -> int:
 
 
 _TABLE = tuple(_of_byte(byte) for byte in range(256))
-_TABLE_ARRAY = np.array(_TABLE, dtype=np.uint16)
+TABLE = np.array(_TABLE, dtype=np.uint16)
+"""(256,) CRC of each single byte."""
 
 
 def crc16(data: bytes | bytearray, start: int = 0) -> int:
@@ -31,6 +32,13 @@ def crc16(data: bytes | bytearray, start: int = 0) -> int:
     for byte in data:
         crc = ((crc << 8) & 0xFFFF) ^ _TABLE[(crc >> 8) ^ byte]
     return crc
+
+
+def crc16_long(data: bytes | NDArray[np.uint8]) -> int:
+    """CRC of ``data`` at once, for packets of the few lengths that come in every cycle."""
+    table, offsets = _positions(len(data))
+    places = np.frombuffer(data, np.uint8) + offsets
+    return int(np.bitwise_xor.reduce(table.take(places)))
 
 
 def crc16_rows(rows: NDArray[np.uint8]) -> NDArray[np.uint16]:
@@ -47,8 +55,8 @@ def _positions(length: int) -> tuple[NDArray[np.uint16], NDArray[np.intp]]:
     One table a length; a program uses a handful of lengths.
     """
     table = np.zeros((length, 256), dtype=np.uint16)
-    column = _TABLE_ARRAY
+    column = TABLE
     for place in range(length - 1, -1, -1):
         table[place] = column
-        column = (column << 8) ^ _TABLE_ARRAY[column >> 8]
+        column = (column << 8) ^ TABLE[column >> 8]
     return table.ravel(), np.arange(length, dtype=np.intp) * 256

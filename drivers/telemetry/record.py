@@ -33,6 +33,16 @@ class PlanSummary:
 
 
 @dataclass(frozen=True, slots=True)
+class Laid:
+    """How a simulated robot was laid down."""
+
+    heading_rad: float
+    """Of the head link."""
+    joint_rad: Floats
+    """(J,)"""
+
+
+@dataclass(frozen=True, slots=True)
 class Header:
     """What ran, with what."""
 
@@ -47,6 +57,8 @@ class Header:
     ground: HeightField | None
     """Thinned; None on a flat floor."""
     torque_constant_n_m_a: float
+    laid: Laid | None
+    """None on metal."""
 
 
 @dataclass(frozen=True, slots=True)

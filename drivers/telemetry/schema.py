@@ -37,6 +37,7 @@ TOPICS: Final[dict[str, Json]] = {
         "robot": _of("object", "RobotConfig"),
         "world": _of("object", "WorldConfig"),
         "torque_constant_n_m_a": _maybe("at the output shaft"),
+        "laid": {"type": ["object", "null"], "description": "heading_rad of the head, joint_rad"},
         "plan": _of("object", "path_m, waypoints_m, waypoint_radius_m, predicted_speed_m_s, ..."),
         "ground": {"type": ["object", "null"], "description": "thinned height field; null: flat"},
     },

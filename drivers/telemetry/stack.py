@@ -15,6 +15,7 @@ from drivers.telemetry.record import (
     Floats,
     Header,
     Ints,
+    Laid,
     PlanSummary,
     PoseTable,
     QposTable,
@@ -77,6 +78,9 @@ def _header(row: Row) -> Header:
             _array(ground["z_m"]), ground["spacing_m"], ground["x0_m"], ground["y0_m"]
         ),
         torque_constant_n_m_a=float(_array(row["torque_constant_n_m_a"])),
+        laid=None
+        if row.get("laid") is None
+        else Laid(row["laid"]["heading_rad"], _array(row["laid"]["joint_rad"])),
     )
 
 

@@ -16,7 +16,7 @@ from config.robot import RobotConfig
 from config.run import RunConfig
 from config.world import WorldConfig
 from drivers.telemetry.encode import encode, exact, floats, number, thinned
-from drivers.telemetry.record import PlanSummary
+from drivers.telemetry.record import Laid, PlanSummary
 from drivers.telemetry.schema import FORMAT, TOPICS, schema_json, schema_name
 from drivers.types import JointState
 
@@ -76,6 +76,7 @@ class RunLog:
         plan: PlanSummary,
         ground: HeightField | None = None,
         torque_constant_n_m_a: float = float("nan"),
+        laid: Laid | None = None,
     ) -> None:
         """Say once, first, what runs; the ground is thinned, so that a report can draw it."""
         row = {
@@ -88,6 +89,9 @@ class RunLog:
             "robot": robot.model_dump(mode="json"),
             "world": world.model_dump(mode="json"),
             "torque_constant_n_m_a": number(torque_constant_n_m_a),
+            "laid": None
+            if laid is None
+            else {"heading_rad": float(laid.heading_rad), "joint_rad": exact(laid.joint_rad)},
             "plan": {
                 "path_m": floats(plan.path_m),
                 "waypoints_m": floats(plan.waypoints_m),

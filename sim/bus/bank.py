@@ -101,7 +101,9 @@ class ServoBank:
 
     def alert(self, rows: Rows | slice | int) -> NDArray[np.uint8]:
         """Bit 7 of the error field: set while Hardware Error Status(70) is not 0."""
-        return np.where(self["Hardware Error Status"][rows] != 0, ALERT, 0).astype(np.uint8)
+        wrong = self["Hardware Error Status"][rows] != 0
+        alert: NDArray[np.uint8] = np.multiply(wrong, ALERT, dtype=np.uint8)
+        return alert
 
     def shut_down(self, row: int) -> bool:
         """Whether a hardware error of Shutdown(63) holds the torque off until a reboot."""

@@ -4,12 +4,15 @@ Order of one look: physics is stepped to the time of the look (cut where a watch
 protection is due), and only then registers are read or written.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.bus.agenda import Agenda
-from sim.bus.bank import ServoBank
+from sim.bus.bank import TABLE_BYTES, ServoBank
 from sim.bus.jam import Jam
+from sim.bus.kernel import show_motion, take_goals
 from sim.bus.loops import CONTROL_S, Loops
 from sim.bus.motor import MOTORS, PWM_FULL, TICKS_PER_RAD, TICKS_PER_REV, make_drive
 from sim.bus.profile import VELOCITY_UNIT_RAD_S
@@ -41,6 +44,8 @@ HOMING_LIMIT_TICKS = 1_024
 """Homing Offset(20) beyond this is ignored in position control mode (e-manual)."""
 IN_POSITION_TICKS, FOLLOWING_TICKS = 20, 100
 """Deviations behind the flags of Moving Status(123), "predefined" in the e-manual: ours."""
+PRESENT, SUPPLY = range(120, 147), range(144, 147)
+"""Addresses of all present values, and of voltage and temperature among them; e-manual."""
 IN_POSITION, PROFILE_ONGOING, FOLLOWING_ERROR = 0x01, 0x02, 0x08
 
 
@@ -73,6 +78,19 @@ class Firmware:
         self.loops = Loops(bank, self.drive, self.motor)
         self._goal = self.drive.goal_rad.copy()
         self._control_s = self._time_s + CONTROL_S
+        self._goal_address = bank.register("Goal Position").address
+        # Without a sensor load is "inferred from the internal output": in tenths of a per cent
+        effort = "Present Current" if bank.measures_current else "Present Load"
+        self._shown_at = (
+            bank.register(effort).address,
+            bank.register("Present Velocity").address,
+            bank.register("Present Position").address,
+        )
+        ampere, most = self.motor.current_unit_a, math.inf
+        if not bank.measures_current:
+            ampere, most = self.motor.stall_current_a / 1e3, 1e3
+        self._shown_units = (ampere, most, VELOCITY_UNIT_RAD_S, TICKS_PER_RAD)
+        self._taken = np.zeros(joints, bool)
         self.changed()
         self.power_up(np.arange(joints))
 
@@ -123,10 +141,12 @@ class Firmware:
         offset = bank["Homing Offset"].astype(np.int64)
         offset[(mode == POSITION_MODE) & (np.abs(offset) > HOMING_LIMIT_TICKS)] = 0
         self._zero = CENTRE_TICKS + offset - TICKS_PER_REV * self._turns
+        self._frame = np.stack([self._sign, self._zero])
         self._was_on, self._was_mode = on, mode.copy()
         self._woken_by_goals = bool((bank["Drive Mode"] & TORQUE_ON_BY_GOAL).any())
         tripped = bank["Bus Watchdog"] == WATCHDOG_TRIPPED
         self._held &= tripped
+        self._holding = bool(self._held.any())
         drive.torque_on[:] = on
         self._was_active = self.loops.active
         self.loops.take_over(on, self.plant.position_rad)
@@ -146,20 +166,28 @@ class Firmware:
         single = mode == POSITION_MODE
         low = np.where(single, bank["Min Position Limit"].astype(int), -EXTENDED_RANGE_TICKS)
         high = np.where(single, bank["Max Position Limit"].astype(int), EXTENDED_RANGE_TICKS)
-        self._low = np.where(tripped, EXTENDED_RANGE_TICKS + 1, low)
-        self._high = np.where(tripped, -EXTENDED_RANGE_TICKS - 1, high)
+        never = EXTENDED_RANGE_TICKS + 1
+        self._limits = np.where(tripped, [[never], [-never]], [low, high])
         self._aim()
         self._arm_watchdog()
         self.jam.hold()
 
-    def write_goals(self, rows: NDArray[np.intp] | slice, ticks: NDArray[np.int32]) -> None:
-        """Goal Position(116) of many servos at once; values out of limits are refused."""
-        goal = self.bank["Goal Position"]
-        taken = (ticks >= self._low[rows]) & (ticks <= self._high[rows])
-        goal[rows] = ticks if taken.all() else np.where(taken, ticks, goal[rows])
+    def write_goals(self, rows: NDArray[np.intp], raw: NDArray[np.uint8], at: int) -> None:
+        """Goal Position(116) of many servos: entries of ``raw`` from ``at`` on, ID and 4 bytes.
+
+        Values out of limits are refused.
+        """
+        plain = not (self._holding or self._pushed or self.loops.active or self.jam.any)
+        goal_rad = self.drive.goal_rad if plain else np.empty(len(self.bank))
+        places = (at, self._goal_address)
+        limits, frame, taken = self._limits, self._frame, self._taken
+        take_goals(
+            raw, rows, self.bank.table, places, limits, frame, TICKS_PER_RAD, goal_rad, taken
+        )
         if self._woken_by_goals:
-            self.wake(np.asarray(np.arange(len(self.bank))[rows])[taken])
-        self._aim()
+            self.wake(np.flatnonzero(taken))
+        if not plain:
+            self._aim()
 
     def wake(self, rows: NDArray[np.intp]) -> None:
         """Torque on by goal update (Drive Mode(10), bit 3), unless an error holds it off."""
@@ -238,31 +266,25 @@ class Firmware:
     # shafts to registers
 
     def refresh_motion(self) -> None:
-        """Present Current, Velocity and Position(126, 128, 132)."""
-        bank, sign = self.bank, self._sign
-        if bank.measures_current:
-            scale = sign / self.motor.current_unit_a
-            bank["Present Current"][:] = np.rint(self.jam.current_a() * scale)
-        else:  # "inferred from the internal output": torque in tenths of a per cent of stall
-            scale = sign * (1e3 / self.motor.stall_current_a)
-            bank["Present Load"][:] = np.clip(np.rint(self.jam.current_a() * scale), -1e3, 1e3)
-        bank["Present Velocity"][:] = np.rint(
-            self.plant.velocity_rad_s * (sign / VELOCITY_UNIT_RAD_S)
-        )
-        bank["Present Position"][:] = np.rint(
-            self.plant.position_rad * (sign * TICKS_PER_RAD) + self._zero
-        )
+        """Present Current (else Load), Velocity and Position(126, 128, 132)."""
+        shafts = (self.jam.current_a(), self.plant.velocity_rad_s, self.plant.position_rad)
+        show_motion(self.bank.table, self._shown_at, shafts, self._frame, self._shown_units)
 
-    def refresh(self) -> None:
-        """All present values."""
+    def refresh(self, address: int = 0, length: int = TABLE_BYTES) -> None:
+        """Present values, those at least that a read of this block shows."""
         bank = self.bank
-        self.refresh_motion()
-        bank["Present PWM"][:] = np.rint(self.jam.pwm() * self._sign * PWM_FULL)
-        self._refresh_trajectory()
-        bank["Present Input Voltage"][:] = np.rint(self.drive.supply_v * 10.0)
-        bank["Present Temperature"][:] = np.clip(np.rint(self.protection.temperature_c), 0, 255)
-        bank["Realtime Tick"][:] = int((self._time_s - self._start_s) * 1e3) % 32_768
-        if bank.indirect.used:
+        gather = bank.indirect.shown(address, length)
+        stop = address + length
+        if gather or (address < SUPPLY.start and stop > PRESENT.start):
+            self.refresh_motion()
+            bank["Present PWM"][:] = np.rint(self.jam.pwm() * self._sign * PWM_FULL)
+            self._refresh_trajectory()
+            bank["Realtime Tick"][:] = int((self._time_s - self._start_s) * 1e3) % 32_768
+        if gather or (address < SUPPLY.stop and stop > SUPPLY.start):
+            bank["Present Input Voltage"][:] = np.rint(self.drive.supply_v * 10.0)
+            celsius = np.rint(self.protection.temperature_c)
+            bank["Present Temperature"][:] = np.minimum(np.maximum(celsius, 0.0), 255.0)
+        if gather:
             bank.indirect.gather()
 
     # inside
@@ -293,7 +315,7 @@ class Firmware:
 
     def _aim(self) -> None:
         goal = (self.bank["Goal Position"] - self._zero) * (self._sign / TICKS_PER_RAD)
-        if self._held.any():
+        if self._holding:
             goal = np.where(self._held, self._goal, goal)
         self._goal = goal
         drive_goal = np.where(self._push != 0.0, self._push, goal) if self._pushed else goal

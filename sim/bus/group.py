@@ -8,9 +8,10 @@ silent servo, goes the general way.
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.protocol.crc import crc16
+from drivers.protocol.crc import TABLE
 from drivers.protocol.packet import HEADER, Instruction
 from sim.bus.group_read import FastRead, GroupRead, PlainRead
+from sim.bus.kernel import crc_of
 from sim.bus.service import RETURN_DELAY_UNIT_S, Answer, Service
 
 _PREFIX = HEADER + b"\xfe"
@@ -25,9 +26,10 @@ class GroupPath:
         self._service = service
         self._firmware = service.firmware
         self._bank = service.bank
+        self._status_address = self._bank.register("Hardware Error Status").address
         self._version = -1
         self._reads: dict[bytes, GroupRead] = {}
-        self._goal_rows: tuple[bytes, NDArray[np.intp] | slice] | None = None
+        self._goal_rows: tuple[bytes, NDArray[np.intp]] | None = None
 
     def execute(self, raw: bytes, now_s: float, whole: bool) -> list[Answer] | None:
         """Carry out ``raw`` if it is plain, else return None and leave all as it was.
@@ -52,22 +54,20 @@ class GroupPath:
         if read.motion:
             self._firmware.refresh_motion()
         else:
-            self._firmware.refresh()
-        return read.answers(self._bank.table, self._bank.alert(read.rows), whole)
+            self._firmware.refresh(read.address, read.length)
+        return read.answers(self._bank.table, whole)
 
     def _write_goals(self, raw: bytes, now_s: float) -> list[Answer] | None:
-        values = np.frombuffer(raw, np.uint8, len(raw) - 14, 12)
-        if len(values) % 5 or not _intact(raw):
+        if (len(raw) - 14) % 5 or not _intact(raw):
             return None
-        block = values.reshape(-1, 5)
-        ids = block[:, 0].tobytes()
+        ids = raw[12:-2:5]
         if self._goal_rows is None or self._goal_rows[0] != ids:
-            rows = self._service.roll.rows[block[:, 0]]
+            rows = self._service.roll.rows[np.frombuffer(ids, np.uint8)]
             if (rows < 0).any() or len(np.unique(rows)) != len(rows):
                 return None
-            self._goal_rows = (ids, _as_slice(rows))
+            self._goal_rows = (ids, rows)
         self._firmware.heard(now_s)
-        self._firmware.write_goals(self._goal_rows[1], block[:, 1:].copy().view("<i4")[:, 0])
+        self._firmware.write_goals(self._goal_rows[1], np.frombuffer(raw, np.uint8), 12)
         return []
 
     def _plan(self, raw: bytes) -> GroupRead | None:
@@ -85,18 +85,13 @@ class GroupPath:
         )
         fast = raw[7] == Instruction.FAST_SYNC_READ
         kind = FastRead if fast else PlainRead
-        return kind(address, length, ids, _as_slice(rows), delays_s)
+        return kind(address, length, ids, rows, self._status_address, delays_s)
 
 
 def _intact(raw: bytes) -> bool:
     return (
         int.from_bytes(raw[5:7], "little") == len(raw) - 7
         and HEADER[:3] not in raw[8:-2]
-        and crc16(raw[:-2]) == int.from_bytes(raw[-2:], "little")
+        and crc_of(np.frombuffer(raw, np.uint8), 0, len(raw) - 2, 0, TABLE)
+        == int.from_bytes(raw[-2:], "little")
     )
-
-
-def _as_slice(rows: NDArray[np.intp]) -> NDArray[np.intp] | slice:
-    first = int(rows[0])
-    ordered = np.array_equal(rows, np.arange(first, first + len(rows)))
-    return slice(first, first + len(rows)) if ordered else rows

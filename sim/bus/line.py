@@ -86,7 +86,8 @@ class SimLine(Wire):
     def _must_be_open(self) -> None:
         if self._script is not None:
             self.settle()
-        super()._must_be_open()
+        if not self.is_open:
+            super()._must_be_open()
 
     def _obey(self, data: bytes, end_s: float) -> list[Answer]:
         """Let the servos hear what the host has sent."""

@@ -4,6 +4,7 @@ Detected faults go to Hardware Error Status(70); those in the mask of Shutdown(6
 off until a reboot (e-manual, Shutdown).
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from sim.bus.bank import ServoBank
 from sim.bus.jam import Jam
+from sim.bus.kernel import add_loss
 from sim.bus.motor import MotorModel
 from sim.plant import Plant, ServoDrive
 
@@ -52,6 +54,7 @@ class Protection:
         self._jam = jam
         self.temperature_c = np.full(len(bank), around.ambient_c)
         """(S,) at the sensor: first order in the winding's loss."""
+        self._ohm = motor.resistance_ohm
         self._heat_j = np.zeros(len(bank))
         self._blocked_s = np.zeros(len(bank))
 
@@ -78,31 +81,34 @@ class Protection:
 
     def pass_time(self, seconds: float) -> None:
         """Add up the windings' loss at the present currents."""
-        amps = self._jam.current_a()
-        self._heat_j += amps * amps * (seconds * self._motor.resistance_ohm)
+        add_loss(self._heat_j, self._jam.current_a(), seconds * self._ohm)
 
     def look(self, plant: Plant) -> bool:
         """Judge one slice of ``SLICE_S``; whether registers have changed."""
         self._warm_up()
         volts = self._sag()
         bank, drive = self._bank, self._drive
-        drive_on = drive.torque_on > 0
         pwm = self._jam.pwm()
         full = np.abs(pwm) >= 0.98 * np.minimum(drive.pwm_limit, 1.0)
-        along_rad_s = np.sign(pwm) * plant.velocity_rad_s
-        held = full & (along_rad_s < 0.05 * self._motor.no_load_rad_s) & drive_on
-        self._blocked_s = np.where(held, self._blocked_s + SLICE_S, 0.0)
-        tenths = round(volts * 10.0)
-        outside = (tenths < bank["Min Voltage Limit"]) | (tenths > bank["Max Voltage Limit"])
-        errors = (
-            VOLTAGE_ERROR * outside
-            | OVERHEATING_ERROR * (np.rint(self.temperature_c) > bank["Temperature Limit"])
-            | OVERLOAD_ERROR * (self._blocked_s >= OVERLOAD_S)
-            | SHOCK_ERROR * ((volts < STARVED * bank["Min Voltage Limit"] * 0.1) & drive_on)
-        )
-        if not errors.any():
+        if np.count_nonzero(full):
+            along_rad_s = np.sign(pwm) * plant.velocity_rad_s
+            held = full & (along_rad_s < 0.05 * self._motor.no_load_rad_s) & (drive.torque_on > 0)
+            self._blocked_s = np.where(held, self._blocked_s + SLICE_S, 0.0)
+        else:
+            self._blocked_s[:] = 0.0
+        low, tenths = bank["Min Voltage Limit"], round(volts * 10.0)
+        outside = (tenths < low) | (tenths > bank["Max Voltage Limit"])
+        hot = np.rint(self.temperature_c) > bank["Temperature Limit"]
+        overload = self._blocked_s >= OVERLOAD_S
+        if not any(map(np.count_nonzero, (outside, hot, overload))):  # starved is outside, too
             return False
-        self._note(errors)
+        starved = (volts < STARVED * low * 0.1) & (drive.torque_on > 0)
+        self._note(
+            VOLTAGE_ERROR * outside
+            | OVERHEATING_ERROR * hot
+            | OVERLOAD_ERROR * overload
+            | SHOCK_ERROR * starved
+        )
         return True
 
     def _note(self, errors: NDArray[np.integer]) -> None:
@@ -114,13 +120,13 @@ class Protection:
         motor = self._motor
         watts = self._heat_j / SLICE_S
         target_c = self._around.ambient_c + motor.winding_k_per_w * watts
-        share = 1.0 - np.exp(-SLICE_S / motor.thermal_time_s)
+        share = 1.0 - math.exp(-SLICE_S / motor.thermal_time_s)
         self.temperature_c += (target_c - self.temperature_c) * share
         self._heat_j[:] = 0.0
 
     def _sag(self) -> float:
         drive = self._drive
-        servos_a = float(np.abs(drive.pwm * drive.current_a).sum())
+        servos_a = float(np.add.reduce(np.abs(drive.pwm * drive.current_a)))
         drawn_a = servos_a + self._motor.standby_a * len(self._bank)
         volts = self._around.supply_v - self._around.supply_ohm * drawn_a
         drive.supply_v[:] = volts

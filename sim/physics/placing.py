@@ -10,8 +10,9 @@ from sim.physics.mechanics import Mechanics
 
 Floats = NDArray[np.float64]
 
-LIMP_ARMATURE_KG_M2 = 1e-3
-"""Of pitch joints while the body is laid down: a hand turns the rotors."""
+DRAPE_ROUNDS = 8
+DRAPE_STIFF_M_RAD = 0.01
+"""Height that is given up rather than bend a joint, or lean the head, by a radian."""
 CALM_PER_S = 15.0
 """Rate at which motion dies while the body is laid down."""
 STILL_M_S, STILL_RAD_S = 1e-3, 1e-2
@@ -28,9 +29,9 @@ def place(
 ) -> None:
     """Lay the body down with its head above ``start_m``; ends at rest, with its contact forces.
 
-    It is lowered until it first touches, then settles, strongly damped, the head free to sink and
-    lean but not to slide or turn. Yaw joints are held; pitch joints are held on a plane and limp on
-    a height field, where they drape the body over the ground.
+    On a height field the pitch joints are bent so that the links follow the ground, as hands would
+    lay it. Then it is lowered until it first touches and settles, strongly damped, the joints held,
+    the head free to sink and lean but not to slide or turn.
 
     Raises:
         ValueError: ``joint_rad`` is not (J,).
@@ -44,35 +45,63 @@ def place(
     data.qpos[:2] = start_m
     data.qpos[3:7] = np.cos(heading_rad / 2), 0.0, 0.0, np.sin(heading_rad / 2)
     data.qpos[7:] = q
+    if ground is not None:
+        _drape(m, robot, ground)
     mujoco.mj_kinematics(model, data)
     centre = np.asarray(data.xipos[1:])
-    data.qpos[2] = float((_rest_height_m(ground, centre, robot.body_radius_m) - centre[:, 2]).max())
-    limp = () if ground is None else robot.pitch_joints
-    _settle(m, np.array(limp, dtype=int))
+    data.qpos[2] += float(
+        (_rest_height_m(ground, centre, robot.body_radius_m) - centre[:, 2]).max()
+    )
+    _settle(m)
     data.qvel[:] = 0.0
     mujoco.mj_forward(model, data)
     m.rest()
 
 
-def _settle(m: Mechanics, limp: NDArray[np.int_]) -> None:
+def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField) -> None:
+    """Fit height, lean and pitch joints to the ground under the links: Gauss-Newton on heights."""
     model, data = m.model, m.data
-    firm = np.setdiff1d(np.arange(m.joint_count), limp)
-    held = data.qpos[7 + firm].copy()
-    start = data.qpos[:2].copy()
-    armature = model.dof_armature.copy()
-    model.dof_armature[6 + limp] = LIMP_ARMATURE_KG_M2
+    free = np.array([2, 3, 4, *(6 + j for j in robot.pitch_joints)])
+    limit = np.array([robot.limit_rad[j] for j in robot.pitch_joints])
+    pitch = 7 + np.array(robot.pitch_joints, dtype=int)
+    stiff = np.full(len(free), DRAPE_STIFF_M_RAD)
+    stiff[0] = 0.0
+
+    def above_m() -> Floats:
+        mujoco.mj_kinematics(model, data)
+        x, y, z = np.asarray(data.xipos[1:]).T
+        return np.asarray(z - ground.elevation_m(x, y) - robot.body_radius_m)
+
+    for _ in range(DRAPE_ROUNDS):
+        here, qpos = above_m(), data.qpos.copy()
+        slopes = np.empty((len(here), len(free)))
+        for column, dof in enumerate(free):
+            step = np.zeros(model.nv)
+            step[dof] = 1e-4
+            mujoco.mj_integratePos(model, data.qpos, step, 1.0)
+            slopes[:, column] = (above_m() - here) / 1e-4
+            data.qpos[:] = qpos
+        rows = np.vstack([slopes, np.diag(stiff)])
+        change = np.zeros(model.nv)
+        change[free] = np.linalg.lstsq(rows, np.append(-here, 0.0 * stiff), rcond=None)[0]
+        change[3:] = np.clip(change[3:], -0.3, 0.3)
+        mujoco.mj_integratePos(model, data.qpos, change, 1.0)
+        data.qpos[pitch] = np.clip(data.qpos[pitch], -limit, limit)
+
+
+def _settle(m: Mechanics) -> None:
+    model, data = m.model, m.data
+    held, start = data.qpos[7:].copy(), data.qpos[:2].copy()
     for _ in range(int(LONGEST_S / m.step_s)):
         mujoco.mj_step(model, data)
         data.qvel[:] *= np.exp(-CALM_PER_S * m.step_s)
         data.qvel[:2] = 0.0
-        data.qvel[5] = 0.0
-        data.qvel[6 + firm] = 0.0
-        data.qpos[7 + firm] = held
+        data.qvel[5:] = 0.0
+        data.qpos[7:] = held
         data.qpos[:2] = start
         fall, turn = np.abs(data.qvel[2]), np.abs(data.qvel[3:]).max()
         if data.time > SHORTEST_S and fall < STILL_M_S and turn < STILL_RAD_S:
             break
-    model.dof_armature[:] = armature
 
 
 def _rest_height_m(ground: HeightField | None, centre: Floats, radius_m: float) -> Floats:

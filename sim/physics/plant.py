@@ -1,5 +1,6 @@
 """The plant of ``sim.plant`` in MuJoCo: stepped, placed, and looked at."""
 
+import math
 from importlib.util import find_spec
 from typing import Protocol
 
@@ -71,6 +72,9 @@ class MujocoPlant:
         )
         self.mechanics = Mechanics.of(model, robot, world, gear_drag_n_m_s)
         self._data = self.mechanics.data
+        self._place: Floats = self._data.qpos[:7]
+        self._position_rad: Floats = self._data.qpos[7:]
+        self._velocity_rad_s: Floats = self._data.qvel[6:]
         self._count = 0
         self.reset((0.0, 0.0), 0.0, np.zeros(robot.joint_count))
         self._steps = _steps(self.mechanics, compiled)
@@ -88,14 +92,12 @@ class MujocoPlant:
     @property
     def position_rad(self) -> Floats:
         """(J,) live view of the shaft angles."""
-        view: Floats = self._data.qpos[7:]
-        return view
+        return self._position_rad
 
     @property
     def velocity_rad_s(self) -> Floats:
         """(J,) live view, rad/s."""
-        view: Floats = self._data.qvel[6:]
-        return view
+        return self._velocity_rad_s
 
     def advance(self, until_s: float, drive: ServoDrive) -> None:
         """Step to the last whole step at or before ``until_s``.
@@ -104,7 +106,7 @@ class MujocoPlant:
             PhysicsError: the state has diverged.
 
         """
-        steps = int(np.floor(until_s / self.step_s + 1e-6)) - self._count
+        steps = math.floor(until_s / self.step_s + 1e-6) - self._count
         if steps <= 0:
             return
         self._steps.run(steps, drive)
@@ -133,8 +135,8 @@ class MujocoPlant:
     def head_pose(self) -> BodyPose:
         """Head link's centre and axes."""
         matrix = np.empty(9)
-        mujoco.mju_quat2Mat(matrix, self._data.qpos[3:7])
-        return BodyPose(self.time_s, self._data.qpos[:3].copy(), matrix.reshape(3, 3))
+        mujoco.mju_quat2Mat(matrix, self._place[3:])
+        return BodyPose(self.time_s, self._place[:3].copy(), matrix.reshape(3, 3))
 
     @property
     def link_positions_m(self) -> Floats:

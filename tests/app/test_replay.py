@@ -81,7 +81,9 @@ def test_metal_begins_where_its_joints_were(record: RunRecord, tmp_path: Path) -
     still = np.tile(bent, (50, 1))
     rows = {name: getattr(record.cycle, name)[:50] for name in record.cycle.__dataclass_fields__}
     cycle = replace(record.cycle, **rows | {"sent_rad": still, "measured_rad": still})
-    metal = replace(record, cycle=cycle, header=replace(record.header, backend="/dev/ttyUSB0"))
+    metal = replace(
+        record, cycle=cycle, header=replace(record.header, backend="/dev/ttyUSB0", laid=None)
+    )
     again = read_log(replay(metal, tmp_path / "log.mcap"))
     np.testing.assert_allclose(again.cycle.measured_rad, still, atol=0.01)
     found = differences(metal, again, 0.01, 0.0)

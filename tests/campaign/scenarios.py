@@ -35,7 +35,9 @@ def _how(kind: str, rng: random.Random) -> dict[str, object]:
         found: dict[str, object] = {"for_s": for_s, "chance": rng.choice((0.05, 0.3, 1.0))}
         if kind in ("delay", "late"):
             found["by_s"] = rng.choice(
-                (1e-3, 3e-3, 6e-3) if kind == "delay" else (0.01, 0.02, 0.035, 0.05, 0.12)
+                (1e-3, 3e-3, 6e-3)
+                if kind == "delay"
+                else (0.01, 0.02, 0.035, 0.04, 0.05, 0.06, 0.08, 0.12)
             )
         elif rng.random() < 0.5:
             found["of"] = rng.choice(("questions", "both"))

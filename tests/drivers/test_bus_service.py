@@ -28,7 +28,8 @@ def one_servo(answer: StatusPacket | bytes, asked: list[InstructionPacket]) -> S
 
     def script(data: bytes) -> list[tuple[float, bytes]]:
         asked.extend(PacketReader().feed(data))  # type: ignore[arg-type]
-        return [(1e-3, raw)]
+        written = asked[-1].instruction == Instruction.WRITE
+        return [(1e-3, encode_status(StatusPacket(1, 0)) if written else raw)]
 
     return ScriptedPort(script)
 
@@ -131,3 +132,27 @@ def test_reboot_switches_torque_off(bus: DynamixelBus, line: SimLine) -> None:
     bus.write(2, "Torque Enable", 1)
     bus.reboot(2)
     assert line.bank["Torque Enable"].tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize("lag_s", [0.03, 0.045, 0.08, 0.12, 0.2])
+def test_a_late_answer_is_not_that_to_another_register(lag_s: float) -> None:
+    """All answers late by the same time: what is read is right, or nothing."""
+
+    def script(raw: bytes) -> list[tuple[float, bytes]]:
+        (packet,) = PacketReader().feed(raw)
+        assert isinstance(packet, InstructionPacket)
+        if packet.instruction == Instruction.WRITE:
+            return [(lag_s, encode_status(StatusPacket(1, 0)))]
+        address, length = packet.params[0], packet.params[2]
+        return [(lag_s, encode_status(StatusPacket(1, 0, bytes([address]) * length)))]
+
+    bus = DynamixelBus(ScriptedPort(script))
+    right = 0
+    for name in ("Torque Enable", "LED", "Bus Watchdog", "Drive Mode") * 3:
+        try:
+            value = bus.read(1, name)
+        except NoAnswerError:
+            continue
+        assert value == bus.table[name].address
+        right += 1
+    assert right == (12 if lag_s < 0.035 else 0)

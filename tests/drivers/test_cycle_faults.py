@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from drivers.cycle import GroupCycle
+from drivers.debts import Debts
 from drivers.group_write import GroupWrite
 from drivers.protocol.packet import Instruction, InstructionPacket, StatusPacket, encode_status
 from drivers.protocol.parser import PacketReader
@@ -83,11 +84,65 @@ def test_a_late_answer_is_never_taken_for_a_new_one(
 
 def test_the_block_has_its_own_length_again_after_clean_reads(servos: Servos) -> None:
     servos.late_s = {2: 0.1}
-    cycle = GroupCycle(ScriptedPort(servos), IDS, fast=False, clean_reads=5)
-    for _ in range(20):
+    port = ScriptedPort(servos)
+    cycle = GroupCycle(port, IDS, fast=False)
+    for _ in range(40):
         cycle.read()
-    assert servos.lengths[:3] == [10, 10, 11]
+        port.clock.advance(0.02)
+    assert servos.lengths[:4] == [10, 10, 11, 11]
     assert servos.lengths[-1] == 10
+
+
+@pytest.mark.parametrize("is_fast", [False, True])
+@pytest.mark.parametrize("period_s", [0.0, 0.005, 0.02, 0.03])
+def test_an_adapter_that_is_late_for_good_never_gives_an_old_value(
+    servos: Servos, is_fast: bool, period_s: float
+) -> None:
+    for lag_s in np.arange(0.0035, 0.4, 0.0035):
+        servos = Servos()
+        servos.late_s = dict.fromkeys(range(5, 200), float(lag_s))
+        port = ScriptedPort(servos)
+        cycle = GroupCycle(port, IDS, fast=is_fast)
+        for k in range(40):
+            port.clock.sleep_until_s(k * period_s)
+            answer = cycle.read()
+            assert set(answer.data[answer.valid].ravel()) <= {servos.asked & 0x7F}
+
+
+def test_a_servo_that_comes_back_is_believed_after_one_cycle(servos: Servos) -> None:
+    port = ScriptedPort(servos)
+    cycle = GroupCycle(port, IDS, fast=False)
+    servos.silent = {3}
+    for _ in range(40):
+        cycle.read()
+        port.clock.advance(0.02)
+    assert servos.lengths[-1] == 10  # who is silent for long has no say in the length
+    servos.silent = set()
+    assert cycle.read().valid.tolist() == [True, True, False, True]  # it may be an old answer
+    assert cycle.read().valid.all()
+
+
+def test_two_blocks_of_one_port_do_not_take_each_others_answers() -> None:
+    """A late answer to a one-byte block has the length of the next one-byte block's."""
+    asked: list[int] = []
+
+    def script(raw: bytes) -> list[tuple[float, bytes]]:
+        (packet,) = PacketReader().feed(raw)
+        address, length = packet.params[0], packet.params[2]
+        asked.append(address)
+        late_s = 0.03 if len(asked) == 1 else 1e-3
+        return [(late_s, encode_status(StatusPacket(1, 0, bytes([address]) * length)))]
+
+    port = ScriptedPort(script)
+    debts = Debts(port.clock)
+    first, second = (
+        GroupCycle(port, [1], read_address=address, read_bytes=1, fast=False, debts=debts)
+        for address in (64, 98)
+    )
+    assert not first.read().answered.any()
+    while port.clock.now_s() < 0.06:
+        answer = second.read()
+        assert set(answer.data[answer.valid, 0]) <= {98}
 
 
 @pytest.mark.parametrize("silent", [{1}, {3}, {4}, {1, 3}])
@@ -124,10 +179,12 @@ def test_each_value_is_its_servos_in_any_order(servos: Servos) -> None:
 
 
 def test_now_and_then_a_lost_fast_answer_does_not_end_fast_reads(servos: Servos) -> None:
-    cycle = GroupCycle(ScriptedPort(servos), IDS, fast=True, fast_failures=3)
+    port = ScriptedPort(servos)
+    cycle = GroupCycle(port, IDS, fast=True, fast_failures=3)
     servos.late_s = dict.fromkeys(range(3, 200, 3), 1.0)
     for _ in range(60):
         cycle.read()
+        port.clock.advance(0.02)
     assert cycle.fast
     assert cycle.counters.timeouts > 5
 

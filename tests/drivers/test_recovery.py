@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from config.robot import RobotConfig
+from config.robot import RobotConfig, ServoConfig
 from config.run import SafetyConfig
 from drivers.bus import DynamixelBus
 from drivers.chain import ServoChain
@@ -18,7 +18,11 @@ from sim.bus.bank import ServoBank
 from sim.bus.bench import BenchPlant
 from sim.bus.line import SimLine
 
-ROBOT = RobotConfig(name="four", joint_axes="ypyp")
+ROBOT = RobotConfig(
+    name="four",
+    joint_axes="ypyp",
+    servo=ServoConfig(pitch_p_gain=800, pitch_current_limit_a=0.6),
+)
 PERIOD_S = 0.02
 WATCHDOG_S = 0.2
 

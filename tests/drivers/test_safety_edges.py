@@ -7,7 +7,15 @@ from config.loader import load_robot
 from config.run import SafetyConfig
 from drivers.safety import SafetyLimits
 
-from .test_safety_vet import LIMITS, J, judge, memory, one, state
+from .test_safety_vet import (
+    LIMITS,
+    J,
+    TestVetoesAtTheirBoundary,
+    judge,
+    memory,
+    one,
+    state,
+)
 
 
 def test_a_joint_may_be_bent_a_little_beyond_its_limit() -> None:
@@ -44,3 +52,21 @@ def test_a_verdict_cannot_be_changed_afterwards() -> None:
 def test_the_joint_that_measures_no_number_is_named(joint: int, name: str, bad: float) -> None:
     verdict = judge(now=state(**{name: one(bad, joint)}))
     assert verdict.veto == f"joint {joint}: measured {bad}: not a number"
+
+
+@pytest.fixture
+def _long_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every check by itself, without the quick look that nothing is the matter."""
+    monkeypatch.setattr("drivers.safety._plainly_well", lambda *_: False)
+
+
+@pytest.mark.usefixtures("_long_way")
+class TestVetoesTheLongWay(TestVetoesAtTheirBoundary):
+    """The same limits where the quick look has not decided."""
+
+
+def test_a_goal_far_away_is_a_number_all_the_same() -> None:
+    with np.errstate(over="ignore"):
+        verdict = judge(one(1e200, 1))
+    assert verdict.veto is None
+    assert verdict.clamped.tolist() == [False, True, False]

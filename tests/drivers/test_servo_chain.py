@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from config.robot import RobotConfig
+from config.robot import RobotConfig, ServoConfig
 from drivers.bus import DynamixelBus
 from drivers.chain import ServoChain
 from drivers.errors import BusError, ChainError
@@ -15,7 +15,11 @@ from sim.bus.bank import ServoBank
 from sim.bus.bench import BenchPlant
 from sim.bus.line import SimLine
 
-ROBOT = RobotConfig(name="four", joint_axes="ypyp")
+ROBOT = RobotConfig(
+    name="four",
+    joint_axes="ypyp",
+    servo=ServoConfig(position_p_gain=800, pitch_p_gain=640, pitch_current_limit_a=0.6),
+)
 STEP_RAD = 2 * np.pi / 4096
 START = [0.3, -0.2, 0.1, 0.0]
 
@@ -91,7 +95,7 @@ def test_what_the_servos_are_set_to(line: Recorder, chain: ServoChain) -> None:
     bank = line.bank
     assert bank["Operating Mode"].tolist() == [3, 5, 3, 5]
     assert bank["Return Delay Time"].tolist() == [0] * 4
-    assert bank["Position P Gain"].tolist() == [800] * 4
+    assert bank["Position P Gain"].tolist() == [800, 640, 800, 640]
     assert bank["Goal Current"][[1, 3]].tolist() == [round(0.6 / 2.69e-3)] * 2
     half = np.floor(np.array(ROBOT.limit_rad) / STEP_RAD)
     assert (2048 - bank["Min Position Limit"]).tolist() == half.tolist()

@@ -25,12 +25,12 @@ DOC = ROOT / "docs" / "mutation.md"
 BEGIN, END = "<!-- mutation begins -->", "<!-- mutation ends -->"
 TIME_LIMIT_S = 60
 TARGETS = {
-    "drivers.safety": ("test_safety_vet.py", "test_safety_edges.py", "test_safe_link.py"),
+    "drivers.safety": ("test_safety_edges.py", "test_safety_vet.py", "test_safe_link.py"),
     "drivers.protocol.parser": (
-        *("test_packet_reader.py", "test_reader_edges.py", "test_packets.py"),
+        *("test_reader_edges.py", "test_packet_reader.py", "test_packets.py"),
         "test_crc_and_stuffing.py",
     ),
-    "drivers.protocol.packet": ("test_packets.py", "test_reader_edges.py"),
+    "drivers.protocol.packet": ("test_reader_edges.py", "test_packets.py"),
     "drivers.protocol.stuffing": ("test_crc_and_stuffing.py",),
 }
 

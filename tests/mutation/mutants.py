@@ -27,6 +27,7 @@ _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Or: ast.And,
 }
 _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
+_AROUND = 40
 _NOT_CODE = ("annotation", "returns", "decorator_list", "args", "bases", "type_params")
 Edit = Callable[[ast.AST], None]
 
@@ -46,7 +47,7 @@ class Mutant:
     @property
     def name(self) -> str:
         """Stays the same while the line does, wherever it moves to."""
-        return f"{self.where}: {self.before} -> {self.after}"
+        return f"{self.where}: {self.before} => {self.after}"
 
 
 def mutants(source: str) -> Iterator[Mutant]:
@@ -62,9 +63,7 @@ def mutants(source: str) -> Iterator[Mutant]:
             ast.fix_missing_locations(changed)
             after = ast.unparse(_statement(changed, path))
             if before != after:
-                yield Mutant(
-                    where, _head(before), _head(after), statement.lineno, ast.unparse(changed)
-                )
+                yield Mutant(where, *_differ(before, after), statement.lineno, ast.unparse(changed))
 
 
 Path = tuple[tuple[str, int | None], ...]
@@ -111,9 +110,21 @@ def _statement(tree: ast.AST, path: Path) -> ast.stmt:
     return found
 
 
-def _head(text: str) -> str:
-    """First line of a statement, enough to know it by."""
-    return text.splitlines()[0]
+def _differ(before: str, after: str) -> tuple[str, ...]:
+    """What of a statement differs, with as much around it as tells it apart."""
+    before, after = before.splitlines()[0], after.splitlines()[0]
+    if len(before) <= 3 * _AROUND:
+        return before, after
+    start = _common(before, after)
+    end = _common(before[start:][::-1], after[start:][::-1])
+    first = max(0, start - _AROUND)
+    return tuple(text[first : len(text) - max(0, end - _AROUND)] for text in (before, after))
+
+
+def _common(one: str, other: str) -> int:
+    """Length of the common beginning."""
+    differ = (k for k, (a, b) in enumerate(zip(one, other, strict=False)) if a != b)
+    return next(differ, min(len(one), len(other)))
 
 
 def _edits(node: ast.AST) -> Iterator[Edit]:

@@ -41,13 +41,14 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
         port = sdk.PortHandler(str(link))
         port.setBaudRate(1_000_000)
         handler = sdk.PacketHandler(2.0)
-        assert handler.ping(port, 2) == (1200, 0, 0)
+        # real time on a machine that may be busy: an answer may come after the client's patience
+        assert (1200, 0, 0) in (handler.ping(port, 2) for _ in range(10))
         port.setBaudRate(57_600)
         assert handler.ping(port, 2)[1] == sdk.COMM_RX_TIMEOUT  # servos at 1 Mbaud are silent
         port.closePort()
         out, _ = process.communicate(timeout=30)
     done = json.loads(out)
-    assert done["answers"] == 1
+    assert done["answers"] >= 1
     assert not link.exists()
     sniffed = subprocess.run(
         [

@@ -43,3 +43,14 @@ def test_arc_length_is_arc_length() -> None:
 def test_a_path_of_one_point_is_refused() -> None:
     with pytest.raises(InputError, match="two different points"):
         SplinePath([(1, 1), (1, 1)])
+
+
+def test_a_lap_passes_its_waypoints_in_order_and_its_start_again_at_the_end() -> None:
+    path = SplinePath(SQUARE)
+    at = [path.first_pass((0, 0))]
+    for corner in SQUARE[1:]:
+        at.append(path.first_pass(corner, at[-1] + 0.1))
+    assert at[0] == 0.0
+    assert at == sorted(at)
+    assert at[-1] == pytest.approx(path.length_m)
+    np.testing.assert_allclose(path.position(at), SQUARE, atol=0.01)

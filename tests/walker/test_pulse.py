@@ -49,7 +49,7 @@ def test_joint_speed_and_acceleration_stay_within_their_limits(
     pulse = timed(JointTrack(maker.track, Retarget(load_robot(robot)).joints_rad), wanted=40.0)
     goals = [pulse.goal_rad()]
     for step in range(1500):
-        if pulse.head >= maker.track.end - 3.0:
+        if pulse.head >= maker.track.end - 6.0:
             maker.decide(0.0, 0.8 * np.sin(step / 200.0))
         pulse.advance(DT)
         goals.append(pulse.goal_rad())
@@ -114,7 +114,7 @@ def test_without_the_acceleration_limit_the_same_walk_breaks_it() -> None:
     pulse = Pulse(joints, 40.0, speed_limit_rad_s=SPEED, acceleration_limit_rad_s2=1e6)
     goals = []
     for step in range(800):
-        if pulse.head >= maker.track.end - 3.0:
+        if pulse.head >= maker.track.end - 6.0:
             maker.decide(0.0, 0.8 * np.sin(step / 200.0))
         pulse.advance(DT)
         goals.append(pulse.goal_rad())

@@ -9,7 +9,7 @@ from rich.table import Table
 
 console = Console(highlight=False)
 
-DEFAULT_RUN = "flat-square"
+DEFAULT_RUN = "jacksboro-traverse"
 RunName = Annotated[str, typer.Argument(help="shipped run, or a RUN.toml", show_default=True)]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 Seed = Annotated[int | None, typer.Option(help="of every random choice")]

@@ -1,0 +1,82 @@
+"""A step of the snake walk at 1e3, 1e5 and 1e6 states.
+
+On a graph a step looks at the neighbours only: its time must not grow with the states but for what
+the processor's caches cost, which a random walk without memory on the same neighbour lists pays,
+too. Both walk as many steps as there are states, their lists included. On the star of [PT] 2.6.2
+every state is a candidate, so a step is O(V); beside it the sum of two arrays of V integers.
+"""
+
+from itertools import pairwise
+from random import Random
+
+import numpy as np
+
+from benchmarks.rows import Row, cpu_s
+from controller.shape.graph_spec import graph_source
+from controller.shape.graphs import Graph
+from controller.shape.star import star_order
+from controller.shape.walks import walk
+
+TITLE = "A step of the snake walk"
+
+SIZES = (1_000, 100_000, 1_000_000)
+OVER_RANDOM = 25.0
+OVER_SUM = 60.0
+
+
+def wander(graph: Graph, steps: int) -> int:
+    """Walk at random and remember nothing; returns where it ended."""
+    flat = graph.indices.tolist()
+    near = [flat[a:b] for a, b in pairwise(graph.indptr.tolist())]
+    draw = Random(0).random
+    here = 0
+    for _ in range(steps):
+        around = near[here]
+        here = around[int(draw() * len(around))]
+    return here
+
+
+def on_graph(states: int) -> Row:
+    """Random graph, mean degree 9."""
+    rng = np.random.default_rng(0)
+    graph = graph_source(f"er:{states}:9")(rng)
+    tries = max(1, 100_000 // states)
+    ours_s = cpu_s(lambda: walk(graph, "snake", 0, rng, states), 1, tries)
+    random_s = cpu_s(lambda: wander(graph, states), 1, tries)
+    return Row(
+        f"graph of {states} states, mean degree 9",
+        ours_s / states * 1e6,
+        "us",
+        "a random walk",
+        ours_s / random_s,
+        OVER_RANDOM,
+    )
+
+
+def on_star(states: int, *, fresh: bool) -> Row:
+    """All states candidates; a tenth unvisited, or all visited and failed, which takes longest."""
+    rng = np.random.default_rng(0)
+    visits = rng.integers(1, 50, states)
+    if fresh:
+        visits[rng.random(states) < 0.1] = 0
+    failures = np.minimum(rng.integers(1, 50, states), visits)
+    error_rad = rng.normal(size=states)
+    times = max(1, 1_000_000 // states)
+    ours_s = cpu_s(lambda: next(star_order(visits, failures, error_rad)), times)
+    out = np.empty_like(visits)
+    sum_s = cpu_s(lambda: np.add(visits, failures, out=out), times)
+    return Row(
+        f"star of {states} states, " + ("a tenth unvisited" if fresh else "all visited, F > 0"),
+        ours_s * 1e6,
+        "us",
+        "a sum of V integers",
+        ours_s / sum_s,
+        OVER_SUM,
+    )
+
+
+def run() -> list[Row]:
+    """Measure."""
+    return [on_graph(states) for states in SIZES] + [
+        on_star(states, fresh=fresh) for states in SIZES for fresh in (True, False)
+    ]
