@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.ready
 
-.PHONY: setup run test lint types unit bench clean
+.PHONY: setup run test lint types unit bench campaign clean
 
 setup: $(STAMP)
 
@@ -32,8 +32,12 @@ types: setup
 unit: setup
 	$(BIN)/pytest -n 2
 
+# make bench     ratios to peers and limits; make campaign  100,000 cycles under faults
 bench: setup
 	$(BIN)/python -m benchmarks
+
+campaign: setup
+	$(BIN)/python -m tests.campaign
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info

@@ -53,7 +53,7 @@ def simulate(gain: int, log: dict[str, Floats], gear: Gearbox | None) -> Floats:
         drive.goal_rad[:] = log["goal_position"][k]
         drive.supply_v[:] = log["input_volts"][k]
         plant.advance(until_s, drive)
-    return simulated
+    return np.asarray(simulated)
 
 
 def errors(path: Path, gear: Gearbox | None) -> tuple[float, float]:

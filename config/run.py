@@ -21,7 +21,7 @@ class StatesConfig(Strict):
 
 
 class WalkConfig(Strict):
-    """How states follow each other and how the measured pose steers (METHOD section 12)."""
+    """How states follow each other and how the measured pose steers (docs/method.md)."""
 
     decision_fraction: float = Field(0.5, gt=0.05, le=1.0, description="of a body per decision")
     carrot_m: float = Field(0.6, gt=0.05)

@@ -88,7 +88,7 @@ class Prepared:
 
     @cached_property
     def gain(self) -> float:
-        """Predicted speed over pulse speed, 0.93 eta_q (METHOD 12), mean over the shapes used."""
+        """Predicted speed over pulse speed, 0.93 eta_q: mean over the shapes used."""
         if self.run.motion == "serpenoid":
             shape = self._source().track.body_rad(float(POINTS))
             return 0.93 * float(quasi_static_gain(shape, self.world.friction)[0])

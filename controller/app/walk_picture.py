@@ -7,21 +7,29 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from config.errors import InputError
+from controller.app.report.figures.style import AMBER, BLUE, GREEN, PURPLE, RED, style
 from controller.shape.study import StudyResult
 
 ENDINGS = (".png", ".svg", ".pdf")
-_SHOWN = 4.5
-"""Steps over |V|: what comes later is cut off, dots too."""
+_COLORS = {
+    "snake": BLUE,
+    "snake-printed": AMBER,
+    "stack": RED,
+    "random": GREEN,
+    "degree": PURPLE,
+}
+_SHOWN = 4.5  # steps over |V|; later dots are left out
+_LEAST = 40.0  # % of the states: below, all curves are one
 
 
 def check_file(file: Path) -> None:
-    """Raise InputError where ``file`` does not end as a picture does."""
+    """Raise InputError where the name is no picture's."""
     if file.suffix.lower() not in ENDINGS:
         raise InputError(f"{file}: a picture ends in {', '.join(ENDINGS)}")
 
 
 def draw(results: Sequence[StudyResult], file: Path) -> None:
-    """Write the picture in the format of the ending of ``file``.
+    """Write the picture in the format of its ending.
 
     Raises:
         InputError: an ending that is no picture's.
@@ -29,24 +37,27 @@ def draw(results: Sequence[StudyResult], file: Path) -> None:
     """
     check_file(file)
     graphs = list(dict.fromkeys(result.graph for result in results))
-    rules = list(dict.fromkeys(result.rule for result in results))
     columns = min(3, len(graphs))
     rows = -(-len(graphs) // columns)
-    figure = Figure(figsize=(1.2 + 3.0 * columns, 0.8 + 2.4 * rows), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
-    for axes in panels[len(graphs) :]:
-        axes.set_axis_off()
-    for axes, graph in zip(panels, graphs, strict=False):
-        for result in (one for one in results if one.graph == graph):
-            color = f"C{rules.index(result.rule)}"
-            axes.plot(result.grid, 100.0 * result.visited, color=color)
-            if np.isfinite(result.cover).any() and np.nanmean(result.cover) <= _SHOWN:
-                axes.plot(np.nanmean(result.cover), 100.0, "o", color=color, clip_on=False)
-        axes.set(xlim=(0.0, _SHOWN), ylim=(0.0, 100.0), title=graph)
-        axes.grid(alpha=0.3)
-    lines = [panels[0].plot([], color=f"C{k}")[0] for k in range(len(rules))]
-    figure.legend(lines, rules, loc="outside upper center", ncols=len(rules), frameon=False)
-    figure.supxlabel("steps / |V|   (dot: all states seen, mean)", fontsize="medium")
-    figure.supylabel("states seen, %", fontsize="medium")
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=100)
+    with style():
+        size = (3.2 * max(columns, 1.7), 0.7 + 2.4 * rows)
+        figure = Figure(figsize=size, layout="constrained", dpi=96)
+        panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+        for axes, graph in zip(panels.flat, graphs, strict=False):
+            for result in (one for one in results if one.graph == graph):
+                color = _COLORS[result.rule]
+                axes.plot(result.grid, 100.0 * result.visited, color=color, label=result.rule)
+                if np.isfinite(result.cover).any() and np.nanmean(result.cover) <= _SHOWN:
+                    end = float(np.nanmean(result.cover))
+                    axes.plot(end, 100.0, "o", color=color, ms=5, clip_on=False)
+            axes.set(xlim=(0.0, _SHOWN), ylim=(_LEAST, 100.0), title=graph)
+        for axes in panels.flat[len(graphs) :]:
+            axes.set_axis_off()
+        for axes in panels[:, 0]:
+            axes.set_ylabel("states seen, %")
+        for axes in panels[-1]:
+            axes.set_xlabel("steps / |V|  (dot: all seen, mean)")
+        handles, labels = panels[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+        file.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(file)

@@ -45,7 +45,7 @@ def tangent_angles(points: Floats) -> Floats:
 def body_points(angles_rad: Floats, length: float = 1.0) -> Floats:
     """Points (..., N + 1, 2) of a body with tangent angles (..., N), its head tip at the origin.
 
-    ``P(n) = P(n - 1) - r [cos Theta(n), sin Theta(n)]``, [PT] 2.6.4 with METHOD 6's base.
+    ``P(n) = P(n - 1) - r [cos Theta(n), sin Theta(n)]``, [PT] 2.6.4 with the base added once.
     """
     step = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1)
     points = np.zeros((*step.shape[:-2], step.shape[-2] + 1, 2))

@@ -1,4 +1,4 @@
-"""The ground step: a skeleton in plan is laid on the ground ([PT] 2.6.5, METHOD 7).
+"""The ground step: a skeleton in plan is laid on the ground ([PT] 2.6.5).
 
 From the tail on, each next point lies on the vertical half circle of radius r in direction Theta,
 where that meets the surface lifted by half the local body height. Correction: the text meets the

@@ -1,4 +1,4 @@
-"""What the pitch joints do on uneven ground ([PT] 2.6.5 for a chain of links, METHOD 7).
+"""What the pitch joints do on uneven ground ([PT] 2.6.5 for a chain of links).
 
 The ground step lays the links' middle line on the ground; pitch goals then bring the link centres
 as near to it as the robot can. A robot without pitch joints can only tilt as a whole, and the

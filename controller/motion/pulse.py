@@ -1,6 +1,6 @@
 """How fast the head may travel along the track: joint speed and acceleration are the limits.
 
-METHOD 12 retimes by joint speed alone, ``u = min(u0, limit / max |dq/dS|)``; a shape that bends
+Retimed by joint speed alone, ``u = min(u0, limit / max |dq/dS|)``, a shape that bends
 quickly then asks for a jump of speed. Here half of the acceleration limit is left to the bending
 (``q'' u^2``) and half to speeding up and braking (``q' du/dt``), and the brake looks ahead over all
 of the track that is known.

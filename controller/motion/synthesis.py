@@ -1,4 +1,4 @@
-"""Skeleton angles and points over time ([PT] 2.6.4, Eq. 8-13, METHOD 6).
+"""Skeleton angles and points over time ([PT] 2.6.4, Eq. 8-13).
 
 ``Theta(n, t)`` moves along the body at ``u = |v| + g(n, t)`` and slides with weight ``w_d(n, t)``.
 Corrections: the angle track stays untouched and each point keeps its *place* on it, as looking up

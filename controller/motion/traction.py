@@ -16,8 +16,8 @@ def quasi_static_gain(
     """Gain (S,) of each shape (S, N) at the moment at which the body shows it.
 
     The angles move tailwards along the body at pulse speed u; the rigid velocity that balances the
-    friction of ``links`` links carries the body forward at ``eta_q u`` (METHOD 12: r = 0.98 against
-    the simulated speed). 1 is a body that never slips, below 0 it goes backwards.
+    friction of ``links`` links carries the body forward at ``eta_q u``. 1 is a body that never
+    slips, below 0 it goes backwards.
     """
     shapes = np.atleast_2d(skeleton_rad)
     return np.array([_gain(shape, friction, links) for shape in shapes])

@@ -22,7 +22,7 @@ def refusals(
 
     No turn beyond ``states.turn_limit_rad``: a walk decides again after a part of a shape, so that
     a coil's turn is never completed as it was aimed. Joints inside the limits after retargeting, no
-    part of the body on another (METHOD 2), a quasi-static gain above the limit (METHOD 12).
+    part of the body on another, a quasi-static gain above the limit (docs/method.md).
     """
     joints_rad = Retarget(robot, points).joints_rad
     limit = np.array(robot.limit_rad)

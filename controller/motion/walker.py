@@ -1,7 +1,7 @@
 """The snake walk as a motion source: shapes appended to the angle track, steered by the pose.
 
-[PT] 2.6.2 with what a body with friction needs (METHOD 12): a decision every half state, of which
-only the tail half is appended; a carrot on the path; a linear ramp that cancels the heading error
+[PT] 2.6.2 with what a body with friction needs: a decision every half state, of which only the tail
+half is appended; a carrot on the path; a linear ramp that cancels the heading error
 of the chosen shape. ``decision_fraction = 1`` and ``ramp_limit_rad = 0`` is the printed rule.
 """
 
@@ -18,8 +18,6 @@ from controller.shape.star import star_order
 
 Floats = NDArray[np.float64]
 Accept = Callable[[Floats], bool]
-_SPARE = 60
-"""Shapes, nearest in heading first, that are tried when no candidate of the walk fits."""
 
 
 @dataclass(frozen=True, slots=True)

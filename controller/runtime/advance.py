@@ -1,4 +1,4 @@
-"""The alarm for missing advance: the shape travels, the body does not (METHOD 12)."""
+"""The alarm for missing advance: the shape travels, the body does not (docs/method.md)."""
 
 from dataclasses import dataclass
 

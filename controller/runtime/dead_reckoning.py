@@ -1,6 +1,6 @@
 """A pose from the joints alone: what friction makes of the measured shape change, integrated.
 
-It drifts: METHOD 12 found it too coarse to reach waypoints with. It is what is left where nothing
+It drifts: it is too coarse to reach waypoints with. It is what is left where nothing
 measures the pose, so that a run on metal can be watched and its log compared.
 """
 

@@ -131,8 +131,9 @@ def threshold_graph(states: NDArray[np.complex128], threshold: float | None) -> 
     except InputError as error:
         if len(states) < 2:
             raise
+        enough = np.ceil(1e4 * needed) / 1e4  # a number rounded down would not do
         raise InputError(
-            f"{error.faults[0]} (threshold {limit:.4g}; {needed:.6g} joins all)"
+            f"{error.faults[0]} (threshold {limit:.4g}; {enough:.10g} joins all)"
         ) from None
 
 

@@ -1,7 +1,7 @@
 """W on a star: the next state where every other state is a leaf ([PT] 2.6.2, Eq. 4-7).
 
 Every leaf has degree 1, so W only orders by: unvisited; then F = 0 with fewest M; then the smallest
-M 2^F. Here F counts the times that a state was left for an already *visited* one (METHOD 3). The
+M 2^F. Here F counts the times that a state was left for an already *visited* one. The
 star is rebuilt at each step, so that M may exceed deg + F and the printed value of W may fall below
 that of a state with F > 0; the classes are what the paper says of W, and they are kept.
 """

@@ -1,7 +1,7 @@
 """What the ground is to a body: elevation variance and slope over a window, and how risky that is.
 
 [PT] 2.6.1 and [KP] 4.3 call a point safe when the elevation around it varies little. A snake also
-needs a bound on slope, or it rolls over (METHOD 12); both are windowed, since a body bridges what
+needs a bound on slope, or it rolls over; both are windowed, since a body bridges what
 is smaller than itself.
 """
 

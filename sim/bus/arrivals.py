@@ -25,9 +25,12 @@ class Arrivals:
 
     def due_s(self, count: int) -> float | None:
         """When ``count`` bytes will have arrived; None if so many are not under way."""
+        due_s = 0.0
         for start_s, data in self._packets:
+            # what stands behind a slow packet cannot be taken before it
+            due_s = max(due_s, start_s + min(count, len(data)) * self.byte_s)
             if len(data) >= count:
-                return start_s + count * self.byte_s
+                return due_s
             count -= len(data)
         return None
 

@@ -5,6 +5,7 @@ import pytest
 
 from config.faults import FaultPlan
 from drivers.types import JointState
+from sim.bus.arrivals import Arrivals
 
 from .campaign import Tally, campaign, run_scenario
 from .report import table
@@ -38,6 +39,19 @@ def test_all_kinds_and_all_pairs_are_in_the_campaign() -> None:
 def test_the_same_seed_gives_the_same_campaign() -> None:
     first, second = (run_scenario(("drop", "reboot"), 3, 60) for _ in range(2))
     assert first == second
+
+
+def test_bytes_behind_a_slow_packet_are_not_due_before_it() -> None:
+    """Else a client that waits for them spins for ever in simulated time (late and clash)."""
+    arrivals = Arrivals()
+    arrivals.add(0.5, b"slow")
+    arrivals.add(0.1, b"quick")
+    for count in range(1, 10):
+        due_s = arrivals.due_s(count)
+        assert due_s is not None
+        assert arrivals.count(due_s) >= count
+    assert arrivals.take(9, 0.4) == b""
+    assert arrivals.take(9, 0.6) == b"slowquick"
 
 
 def test_the_witness_sees_old_foreign_and_changed_values() -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from sim.bus.clock import SimClock
 from sim.bus.pty import PtyServer
-from sim.bus.pytest_plugin import ServoBus
+from sim.bus.servo_bus import ServoBus
 
 from .bus_helpers import a_line
 from .test_faults import fault, scripted

@@ -14,7 +14,7 @@ from types import ModuleType
 import pytest
 
 from drivers.clock import WallClock
-from sim.bus.pytest_plugin import ServoBus
+from sim.bus.servo_bus import ServoBus
 
 Make = Callable[..., ServoBus]
 

@@ -1,5 +1,7 @@
 """Graphs: drawn with the degree asked for, connected, the same for a seed; refusals."""
 
+import re
+
 import networkx as nx
 import numpy as np
 import pytest
@@ -109,8 +111,19 @@ def test_states_of_a_recording_are_joined_up_to_the_threshold() -> None:
     states = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0j], [1.0, 0.0]])
     graph = threshold_graph(states, None)  # 2 is the smallest that joins all
     assert graph.degree.tolist() == [2, 3, 2, 3]
-    with pytest.raises(InputError, match=r"fall into 2 parts.*threshold 1.5; 2 joins all"):
-        threshold_graph(states, 1.5)
+    assert threshold_graph(states, 2.0).degree.tolist() == [2, 3, 2, 3]
+    with pytest.raises(InputError, match="fall into 2 parts"):
+        threshold_graph(states, 1.999)
+
+
+def test_the_threshold_that_is_advised_joins_all() -> None:
+    for seed in range(20):
+        states = np.random.default_rng(seed).normal(size=(30, 2)) + 0j
+        with pytest.raises(InputError, match="joins all") as refused:
+            threshold_graph(states, 0.05)
+        advised = re.search(r"threshold 0.05; ([\d.e+-]+) joins all", str(refused.value))
+        assert advised is not None
+        assert threshold_graph(states, float(advised[1])).states == 30
 
 
 @pytest.mark.parametrize(

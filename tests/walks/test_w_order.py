@@ -55,11 +55,13 @@ def order(rows: list[tuple[int, int, float]]) -> list[int]:
 def test_a_star_orders_by_unvisited_then_unfailed_then_m_2_to_the_f() -> None:
     rows = [(4, 1, 0.0), (1, 2, 0.0), (9, 0, 0.0), (0, 0, 0.3), (2, 0, 0.0), (3, 1, 0.0)]
     assert order(rows) == [3, 4, 2, 1, 5, 0]  # 1 2^2 < 3 2^1 < 4 2^1
+    assert order([(3, 0, 0.0), (2, 0, 0.5), (1, 1, 0.0)]) == [1, 0, 2]
 
 
 def test_a_tie_on_a_star_goes_to_the_smaller_heading_error_of_either_sign() -> None:
     assert order([(0, 0, 0.4), (0, 0, -0.1), (0, 0, 0.2)]) == [1, 2, 0]
     assert order([(2, 1, -0.4), (1, 2, 0.3), (4, 0, 0.9)]) == [2, 1, 0]
+    assert order([(3, 5, 0.0), (2, 5, 0.1), (4, 4, -0.1), (2, 5, 0.05)]) == [3, 1, 2, 0]
 
 
 def test_a_star_does_not_overflow() -> None:
@@ -68,13 +70,16 @@ def test_a_star_does_not_overflow() -> None:
 
 @given(
     st.lists(
-        st.tuples(st.integers(0, 9), st.integers(0, 9), st.sampled_from([-0.5, 0.0, 0.1, 0.5])),
+        st.tuples(st.integers(0, 4), st.integers(0, 3), st.sampled_from([-0.5, 0.0, 0.1, 0.5])),
         min_size=1,
         max_size=40,
-    )
+    ),
+    st.sampled_from([(0, 0), (1, 0), (1, 1)]),
 )
-def test_a_star_is_ordered_as_by_integers(rows: list[tuple[int, int, float]]) -> None:
-    rows = [(m, f if m else 0, error) for m, f, error in rows]
+def test_a_star_is_ordered_as_by_integers(
+    rows: list[tuple[int, int, float]], least: tuple[int, int]
+) -> None:
+    rows = [(m + least[0], f + least[1] if m + least[0] else 0, error) for m, f, error in rows]
 
     def key(k: int) -> tuple[int, int, float]:
         m, f, error = rows[k]
