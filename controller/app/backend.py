@@ -61,12 +61,18 @@ def simulated(
     # The simulation is an extra: a robot's small computer has none.
     from sim.bus.bank import ServoBank  # noqa: PLC0415
     from sim.bus.line import SimLine  # noqa: PLC0415
+    from sim.bus.protection import Surroundings  # noqa: PLC0415
     from sim.physics.plant import MujocoPlant  # noqa: PLC0415
 
     plant = MujocoPlant(robot, world, ground, run.physics_step_s, compiled=compiled)
     plant.reset(run.start_m, laid.heading_rad, laid.joint_rad)
     servo = robot.servo
-    line = SimLine(ServoBank(robot.servo_ids, servo.model, servo.baud), plant, baud=servo.baud)
+    line = SimLine(
+        ServoBank(robot.servo_ids, servo.model, servo.baud),
+        plant,
+        baud=servo.baud,
+        surroundings=Surroundings(supply_v=servo.supply_v),
+    )
     chain = ServoChain(DynamixelBus(line, servo.model), robot, watchdog_s=run.safety.watchdog_s)
     return Backend(
         "sim", chain, line.clock, plant.head_pose, lambda: plant.qpos, lambda: line.busy_s

@@ -1,6 +1,9 @@
 """Graphs by name: ``er:1000:9``, ``ws:1000:6:0.1``, ``kp:worm-like``."""
 
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import ParseError
 
 import numpy as np
 
@@ -8,6 +11,7 @@ from config.errors import InputError
 from controller.capture.load import load_track
 from controller.shape.graphs import (
     Graph,
+    graph_from_edges,
     largest_part,
     random_edges,
     small_world_edges,
@@ -17,9 +21,10 @@ from controller.shape.states import to_states
 
 Draw = Callable[[np.random.Generator], Graph]
 _MOST_EDGES = 20_000_000
+_READERS = {".graphml": "read_graphml", ".gml": "read_gml", ".edgelist": "read_edgelist"}
 _FORMS = (
-    "expected er:STATES:DEGREE, ws:STATES:DEGREE:REWIRED or kp:TRACK[:THRESHOLD], "
-    "as er:1000:9, ws:1000:6:0.1 or kp:worm-like"
+    "expected er:STATES:DEGREE, ws:STATES:DEGREE:REWIRED, kp:TRACK[:THRESHOLD] or a graph file "
+    "(.graphml, .gml, .edgelist), as er:1000:9, ws:1000:6:0.1, kp:worm-like or mine.graphml"
 )
 
 
@@ -29,7 +34,8 @@ def graph_source(spec: str) -> Draw:
     - ``er:1000:9``: random (Erdos-Renyi), mean degree 9;
     - ``ws:1000:6:0.1``: small world (Watts-Strogatz), 3 neighbours on either side, a tenth rewired;
     - ``kp:worm-like:40``: the states of a recording, joined where they are no further apart
-      ([KP] 4.2.1); without a threshold, the smallest that joins all. Always the same graph.
+      ([KP] 4.2.1); without a threshold, the smallest that joins all. Always the same graph;
+    - ``mine.graphml``: a graph of your own (GraphML, GML or an edge list), taken as undirected.
 
     Sparse random graphs are hardly ever connected (at mean degree 3 one state in twenty has no edge
     at all), so the largest part is what walks are run on: V is then less than asked.
@@ -38,6 +44,8 @@ def graph_source(spec: str) -> Draw:
         InputError: none of these; a recording that cannot be read, or falls apart.
 
     """
+    if Path(spec).suffix in _READERS:
+        return _file(Path(spec))
     kind, *rest = spec.split(":")
     track = rest.pop(0) if kind == "kp" and rest else ""
     try:
@@ -51,6 +59,22 @@ def graph_source(spec: str) -> Draw:
     if track and len(number) == len(rest) < 2:
         return _recorded(track, number[0] if number else None)
     raise InputError(f"graph {spec!r}: {_FORMS}")
+
+
+def _file(path: Path) -> Draw:
+    import networkx as nx  # noqa: PLC0415  half a second, for graph files only
+
+    try:
+        found = getattr(nx, _READERS[path.suffix])(path)
+    except FileNotFoundError:
+        raise InputError(f"graph {path}: no such file") from None
+    except (nx.NetworkXError, ValueError, TypeError, ParseError, UnicodeDecodeError) as error:
+        raise InputError(f"graph {path}: is no {path.suffix[1:]} file: {error}") from None
+    own: nx.Graph[Any] = nx.Graph(found)
+    number = {node: k for k, node in enumerate(own)}
+    edges = np.array([[number[a], number[b]] for a, b in own.edges], dtype=np.int64)
+    graph = graph_from_edges(len(number), edges.reshape(-1, 2))
+    return lambda _: graph
 
 
 def _random(spec: str, states: float, degree: float) -> Draw:

@@ -1,6 +1,7 @@
 """What the doctor finds on simulated buses with one thing wrong each; it writes nothing."""
 
 import pytest
+from pytest_mock import MockerFixture
 
 from config.robot import RobotConfig
 from config.run import SafetyConfig
@@ -152,9 +153,9 @@ def test_latency_timer(timer_ms: int | None, grade: str) -> None:
         assert "/usb-serial/devices/ttyUSB0/latency_timer" in finding.remedy
 
 
-def test_permission(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_permission(tmp_path: object, mocker: MockerFixture) -> None:
     assert adapter.permission("/dev/null").grade == "ok"
-    monkeypatch.setattr("os.access", lambda *_: False)
+    mocker.patch("os.access", return_value=False)
     denied = adapter.permission("/dev/null")
     assert denied.grade == "fail"
     assert denied.remedy.startswith("sudo usermod -aG ")

@@ -1,6 +1,7 @@
 """Graphs: drawn with the degree asked for, connected, the same for a seed; refusals."""
 
 import re
+from pathlib import Path
 
 import networkx as nx
 import numpy as np
@@ -148,3 +149,26 @@ def test_the_threshold_that_is_advised_joins_all() -> None:
 def test_a_bad_spec_is_refused_before_anything_is_drawn(spec: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         graph_source(spec)
+
+
+@pytest.mark.parametrize("form", ["graphml", "gml", "edgelist"])
+def test_a_graph_of_ones_own_is_read_from_a_file(tmp_path: Path, form: str) -> None:
+    ring = nx.cycle_graph(12)
+    path = tmp_path / f"ring.{form}"
+    getattr(nx, f"write_{form}")(ring, path)
+    graph = graph_source(str(path))(np.random.default_rng(0))
+    assert graph.states == 12
+    assert (graph.degree == 2).all()
+
+
+def test_a_bad_graph_file_says_what_is_wrong(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        graph_source(str(tmp_path / "none.graphml"))
+    broken = tmp_path / "broken.graphml"
+    broken.write_text("<graphml>")
+    with pytest.raises(InputError, match="is no graphml file"):
+        graph_source(str(broken))
+    apart = tmp_path / "apart.edgelist"
+    nx.write_edgelist(nx.disjoint_union(nx.cycle_graph(4), nx.cycle_graph(4)), apart)
+    with pytest.raises(InputError):
+        graph_source(str(apart))
