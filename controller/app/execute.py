@@ -1,5 +1,6 @@
 """Carry out a prepared run: folder, log, link, loop, summary."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from controller.app.drive import Drive, Outcome, PoseSource, Watcher
 from controller.app.prepare import Prepared
 from controller.app.report.build import write_summary
 from controller.runtime.dead_reckoning import DeadReckoning
+from drivers.recovery import Recovery
 from drivers.safe_link import SafeLink
 from drivers.safety import SafetyLimits
 from drivers.telemetry.reader import read_log
@@ -27,9 +29,15 @@ class Finished:
 
 
 def execute(
-    prepared: Prepared, folder: Path, port: str | None = None, watchers: tuple[Watcher, ...] = ()
+    prepared: Prepared,
+    folder: Path,
+    port: str | None = None,
+    watchers: tuple[Watcher, ...] = (),
+    confirm: Callable[[str], bool] | None = None,
 ) -> Finished:
     """Run on ``port``, or on the simulator where it is None; nothing else differs.
+
+    ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``).
 
     Raises:
         InputError: the plan breaks a limit, the port is not there, the servos are not the robot's.
@@ -66,10 +74,19 @@ def execute(
             laid=laid,
             torque_constant_n_m_a=_torque_constant_n_m_a(prepared.robot.servo.model),
         )
-        limits = SafetyLimits.from_config(prepared.robot, prepared.run.safety)
+        safety, clock = prepared.run.safety, backend.clock
+        recovery = Recovery(
+            backend.chain,
+            backend.chain.port,
+            policy=safety.recovery,
+            patience_s=safety.recovery_time_s,
+            confirm=confirm,
+            say=lambda text: log.event(clock.now_s(), "recovery", text, "warning"),
+        )
+        limits = SafetyLimits.from_config(prepared.robot, safety)
         drive = Drive(
-            link=SafeLink(backend.chain, limits, backend.clock),
-            clock=backend.clock,
+            link=SafeLink(backend.chain, limits, clock, recovery),
+            clock=clock,
             pose=_pose_source(prepared, backend),
             pilot=prepared.pilot(),
             log=log,

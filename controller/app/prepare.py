@@ -29,6 +29,7 @@ from controller.runtime.pilot import Pilot, TrackSource
 from controller.shape.library import Refuse, StateLibrary, build_library
 from controller.terrain.path import SplinePath
 from controller.terrain.planner import TerrainPlanner
+from drivers.budget import wire_budget
 from drivers.telemetry.record import Laid
 
 Floats = NDArray[np.float64]
@@ -183,7 +184,7 @@ def prepare(run: str, **changes: object) -> Prepared:
 
     Raises:
         ConfigError: every fault of a file at once.
-        InputError: what the configuration asks cannot be made.
+        InputError: what the configuration asks cannot be made, or does not fit the wire.
 
     """
     loaded = load_run(run)
@@ -191,4 +192,7 @@ def prepare(run: str, **changes: object) -> Prepared:
     wanted = {key: value for key, value in changes.items() if value is not None}
     wanted.setdefault("track", track_beside(loaded.track, beside))
     loaded = checked(RunConfig, loaded.model_dump() | wanted, "command line")
-    return Prepared(loaded, load_robot(loaded.robot, beside), load_world(loaded.world, beside))
+    robot = load_robot(loaded.robot, beside)
+    budget = wire_budget(robot.joint_count, robot.servo.baud, fast=True, slow_read_bytes=7)
+    budget.check(loaded.cycle_hz)
+    return Prepared(loaded, robot, load_world(loaded.world, beside))

@@ -180,15 +180,19 @@ class Pilot:
         offset, head_m, centre_m = self._measured(view)
         if self._start is None:
             self._start = (head_m, offset)
-        along_m = self._head_along_m
-        if not self._feedback:
-            offset = self._start[1]
-            head_m, centre_m = self._believed(self._start[0], offset)
-            along_m = self.path.nearest(head_m, self._along_m)
         if self._aim_at_waypoint:
             target = self._waypoints_m[min(self.reached, len(self._waypoints_m) - 1)]
             return offset, float(np.arctan2(*(target - centre_m)[::-1]))
-        return offset, aim_rad(self.path, head_m, along_m, self._carrot_m)
+        if not self._feedback:
+            offset = self._start[1]
+            head_m = self._believed(self._start[0], offset)
+            along_m = self.path.nearest(head_m, self._along_m)
+            return offset, aim_rad(self.path, head_m, along_m, self._carrot_m)
+        # The piece begins where the track ends now: aim from where the head will be by then.
+        lead_m = (self._source.track.end - self.head) * self._segment_m
+        heading = view.headings_rad.mean()
+        ahead_m = head_m + lead_m * np.array([np.cos(heading), np.sin(heading)])
+        return offset, aim_rad(self.path, ahead_m, self._head_along_m + lead_m, self._carrot_m)
 
     def _measured(self, view: BodyView) -> tuple[float, Floats, Floats]:
         body = self._source.track.body_rad(self.head)
@@ -197,10 +201,7 @@ class Pilot:
         believed = np.interp(at, np.arange(len(body)), body)
         return offset_rad(view.headings_rad, believed), view.link_m[0, :2], view.centre_m[:2]
 
-    def _believed(self, start_m: Floats, offset: float) -> tuple[Floats, Floats]:
-        """Head and centre of a body that never slipped since the first decision."""
+    def _believed(self, start_m: Floats, offset: float) -> Floats:
+        """Head of a body that never slipped since the first decision."""
         track = self._source.track
-        head_m = start_m + self._segment_m * track.way(track.points, round(self.head), offset)
-        body = track.body_rad(self.head) + offset
-        behind = np.cumsum(np.stack([np.cos(body), np.sin(body)], axis=1), axis=0)
-        return head_m, head_m - self._segment_m * behind.mean(axis=0)
+        return start_m + self._segment_m * track.way(track.points, round(self.head), offset)

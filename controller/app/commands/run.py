@@ -38,10 +38,13 @@ def run(
     from controller.app.report.leave import leave_report  # noqa: PLC0415
 
     prepared = prepare(run, seed=seed, motion=motion, robot=robot, world=world, track=track)
-    name = f"{prepared.run.name}-{prepared.run.motion}-seed{prepared.run.seed}"
+    changed = [Path(each).stem for each in (robot, world, track) if each is not None]
+    parts = [prepared.run.name, *changed, prepared.run.motion, f"seed{prepared.run.seed}"]
+    name = "-".join(parts)
     folder = out if out is not None else Path("runs") / name
     with PathProgress(prepared.path.length_m, len(prepared.run.waypoints_m)) as progress:
-        finished = execute(prepared, folder, port, (progress,))
+        asks = _confirm if sys.stdin.isatty() else None
+        finished = execute(prepared, folder, port, (progress,), asks)
     outcome = finished.outcome
     left = leave_report(finished.log, folder, film=film)
     for line in left.notes:
@@ -63,3 +66,8 @@ def run(
     )
     if not outcome.complete(len(prepared.run.waypoints_m)):
         raise SystemExit(1)
+
+
+def _confirm(found: str) -> bool:
+    """Ask whether an interrupted chain may go on; the servos hold meanwhile."""
+    return typer.confirm(f"{found}; go on?", err=True)
