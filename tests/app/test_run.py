@@ -10,6 +10,7 @@ import pytest
 
 from config.errors import InputError
 from config.world import FrictionConfig
+from controller.app.commands.common import DEFAULT_RUN
 from controller.app.execute import execute
 from controller.app.prepare import Prepared, prepare
 from drivers.telemetry.reader import read_log
@@ -94,3 +95,20 @@ def test_a_port_that_is_not_there_is_refused_before_anything_is_written(tmp_path
     with pytest.raises(InputError, match="/dev/nosuch"):
         execute(short(motion="serpenoid"), tmp_path / "run", port="/dev/nosuch")
     assert not (tmp_path / "run").exists()
+
+
+def test_the_default_job_starts_over_the_hills(tmp_path: Path) -> None:
+    prepared = prepare(DEFAULT_RUN, time_limit_s=4.0)
+    assert prepared.ground is not None
+    finished = execute(prepared, tmp_path)
+    assert finished.outcome.tripped is None
+    record = read_log(finished.log)
+    pitch = list(prepared.robot.pitch_joints)
+    assert np.abs(record.cycle.asked_rad[:, pitch]).max() > 0.02, "the ground step drives them"
+    assert (record.pose.rotation[:, 2, 2] > 0.9).all(), "the head stays upright"
+    way = record.pose.centre_m[-1] - record.pose.centre_m[0]
+    assert np.hypot(way[0], way[1]) > 0.2
+    above = record.pose.links_m[:, :, 2] - prepared.ground.elevation_m(
+        record.pose.links_m[:, :, 0], record.pose.links_m[:, :, 1]
+    )
+    assert 0.02 < above.min() < above.max() < 0.12
