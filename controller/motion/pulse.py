@@ -42,6 +42,7 @@ class Pulse:
         self._first = joints.first
         self._allowed = [wanted_segments_s]
         self._slope = [0.0]
+        self._least = wanted_segments_s
 
     def stop(self) -> None:
         """Slow down to rest from now on."""
@@ -53,13 +54,10 @@ class Pulse:
             self._look_ahead()
         k = min(int(self.head) - self._first, len(self._slope) - 1)
         thrust = min(self._slew, self._half_acceleration / max(self._slope[k], _TINY))
-        if self._stopping:
-            self.speed_segments_s = max(0.0, self.speed_segments_s - thrust * dt_s)
-        else:
-            soon = self.head + self.speed_segments_s * dt_s
-            faster = self.speed_segments_s + thrust * dt_s
-            allowed = min(self._limit_at(self.head), self._limit_at(soon))
-            self.speed_segments_s = min(allowed, faster)
+        soon = self.head + self.speed_segments_s * dt_s
+        wanted = self.speed_segments_s + (-thrust if self._stopping else thrust) * dt_s
+        allowed = min(self._limit_at(self.head), self._limit_at(soon))
+        self.speed_segments_s = max(0.0, min(allowed, wanted))
         self.head = min(self.head + self.speed_segments_s * dt_s, float(self.joints.last))
         return self.head
 
@@ -87,6 +85,9 @@ class Pulse:
         # least of three neighbours: between two places no limit is missed, and none is a step
         around = np.pad(here, 1, mode="edge")
         allowed = np.minimum(np.minimum(around[:-2], around[2:]), here).tolist()
+        # what comes behind the end may be as steep as the steepest so far: be able to brake for it
+        self._least = min(self._least, *allowed)
+        allowed[-1] = self._least
         for k in range(len(allowed) - 2, -1, -1):
             brake = self._half_acceleration / max(steps[k], steps[k + 1], _TINY)
             allowed[k] = min(allowed[k], math.sqrt(allowed[k + 1] ** 2 + 2.0 * brake))

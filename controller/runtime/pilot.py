@@ -120,7 +120,7 @@ class Pilot:
         self._head_along_m = self.path.nearest(head_m, self._head_along_m)
         self._count(centre, head_m)
         self.decision = None
-        if self.head >= self._source.track.end - _FORESIGHT and not self.done:
+        if self.head >= self._source.track.end - _FORESIGHT:
             self.decision = self._source.decide(*self._aim(view))
         if self.done:
             self._pulse.stop()
