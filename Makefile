@@ -7,7 +7,9 @@ STAMP := $(VENV)/.ready
 
 # Other people's programs for the same servos, which the tests run against the simulated bus; without
 # their dependencies, of which they need none there. What cannot be had is skipped.
-CLIENTS := lerobot==0.4.4 deepdiff orderly-set cachebox tqdm dynamixel-controller==0.9.2 deprecation
+CLIENTS := lerobot==0.4.4 deepdiff orderly-set cachebox tqdm deprecation
+# This one brings an old dynamixel_sdk along, so it gets a folder of its own, without that.
+ASIDE := dynamixel-controller==0.9.2
 
 .PHONY: setup run test lint types unit bench campaign clean
 
@@ -19,6 +21,8 @@ $(STAMP): pyproject.toml
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --editable '.[dev]'
 	$(BIN)/pip install --quiet --no-deps $(CLIENTS) || echo "tests of other clients are skipped"
+	$(BIN)/pip install --quiet --no-deps --target $(VENV)/clients $(ASIDE) || echo "as above"
+	rm -rf $(VENV)/clients/dynamixel_sdk
 	.ci/offscreen
 	touch $(STAMP)
 

@@ -9,6 +9,7 @@ import importlib.util
 import math
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -115,7 +116,9 @@ def test_lerobots_dynamixel_bus(servo_bus: Make, lerobot_motors: ModuleType) -> 
     assert not bus["Torque Enable"].any()
 
 
-def test_dynamixel_controller(servo_bus: Make) -> None:
+def test_dynamixel_controller(servo_bus: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    # installed aside by the Makefile: its wheel would overwrite the SDK with an old one
+    monkeypatch.setattr("sys.path", [*sys.path, str(Path(sys.prefix) / "clients")])
     pytest.importorskip("pkg_resources")
     pytest.importorskip("deprecation")
     dynio = pytest.importorskip("dynio.dynamixel_controller")
