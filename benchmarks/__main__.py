@@ -17,7 +17,7 @@ from benchmarks.rows import Row
 
 MODULES = tuple(
     name
-    for name in ("hil_loop", "cycle_codec", "frames", "walk_step")
+    for name in ("hil_loop", "cycle_codec", "frames", "walk_step", "capture", "repertoire")
     if find_spec(f"benchmarks.{name}") is not None
 )
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from controller.app.drive import Drive
 from controller.app.prepare import Prepared
+from controller.runtime.guide import Guide
 from controller.runtime.loop import ticks
-from controller.runtime.pilot import Pilot
 from drivers.bus import DynamixelBus
 from drivers.chain import ServoChain
 from drivers.safe_link import SafeLink
@@ -28,8 +28,12 @@ State = tuple[Floats, Floats, Floats, Floats]
 class Watcher(Protocol):
     """Told of every cycle."""
 
-    def cycle(self, time_s: float, pilot: Pilot | None, speed_m_s: float) -> None:
+    def cycle(self, time_s: float, pilot: Guide | None, speed_m_s: float) -> None:
         """After the command of a cycle has been sent."""
+        ...
+
+    def note(self, text: str) -> None:
+        """Something that the operator should know."""
         ...
 
 
@@ -40,32 +44,34 @@ class Recorder:
         self._data = data
         self.states: list[State] = []
 
-    def cycle(self, time_s: float, pilot: Pilot | None, speed_m_s: float) -> None:
+    def cycle(self, time_s: float, pilot: Guide | None, speed_m_s: float) -> None:
         """Copy the state."""
         d = self._data
         self.states.append(
             (d.qpos.copy(), d.qvel.copy(), d.qfrc_applied.copy(), d.qacc_warmstart.copy())
         )
 
+    def note(self, text: str) -> None:
+        """Nothing."""
+
 
 class Stopwatch:
-    """CPU time of the cycles, from the end of the first to the end of the last."""
+    """CPU time of each cycle, from the end of the one before."""
 
     def __init__(self) -> None:
-        self.cycles = -1
-        self._first = self._last = 0.0
+        self._ends: list[float] = []
 
-    def cycle(self, time_s: float, pilot: Pilot | None, speed_m_s: float) -> None:
+    def cycle(self, time_s: float, pilot: Guide | None, speed_m_s: float) -> None:
         """Take the time."""
-        self._last = time.process_time()
-        if self.cycles < 0:
-            self._first = self._last
-        self.cycles += 1
+        self._ends.append(time.process_time())
+
+    def note(self, text: str) -> None:
+        """Nothing."""
 
     @property
-    def cycle_s(self) -> float:
-        """Mean, s."""
-        return (self._last - self._first) / self.cycles
+    def cycle_s(self) -> Floats:
+        """Cost of each cycle but the first, s."""
+        return np.diff(self._ends)
 
 
 class NoLog(RunLog):

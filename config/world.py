@@ -36,6 +36,46 @@ class ElevationGround(Strict):
     refine: int = Field(1, ge=1, le=8, description="cubic subdivision of each cell")
 
 
+class WaterGround(Strict):
+    """A pool: level bottom at z = 0, surface at ``depth_m``; each link is dragged and carried.
+
+    The coefficients are those of E. Kelasidi, K. Y. Pettersen, J. T. Gravdahl, P. Liljeback,
+    Modeling of underwater snake robots, ICRA 2014.
+    """
+
+    kind: Literal["water"] = "water"
+    size_m: float = Field(12.0, gt=0.5, description="edge of the drawn bottom, centred at 0, 0")
+    depth_m: float = Field(0.6, gt=0.1, description="of the water")
+    density_kg_m3: float = Field(1000.0, gt=0.0, le=3000.0)
+    drag_across: float = Field(2.0, ge=0.0, le=5.0, description="coefficient of the cross-flow")
+    drag_along: float = Field(0.03, ge=0.0, le=1.0, description="coefficient of the skin")
+    buoyancy: float = Field(
+        1.0, ge=0.0, le=5.0, description="of a link under water over its weight; 1: trimmed neutral"
+    )
+
+
+class PoleObstacle(Strict):
+    """A round pole to climb."""
+
+    kind: Literal["pole"] = "pole"
+    radius_m: float = Field(gt=0.005, le=1.0)
+    length_m: float = Field(3.0, gt=0.1, le=50.0)
+    upright: bool = Field(True, description="from the floor up; otherwise along x, off the floor")
+    at_m: tuple[float, float] = Field((0.5, 0.0), description="x and y of its middle")
+    friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
+
+
+class PipeObstacle(Strict):
+    """A round pipe to climb or creep through inside; the body starts in its middle."""
+
+    kind: Literal["pipe"] = "pipe"
+    radius_m: float = Field(gt=0.02, le=1.0, description="inner")
+    length_m: float = Field(4.0, gt=0.1, le=50.0)
+    upright: bool = Field(True, description="from the floor up; otherwise along x, off the floor")
+    at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of its middle")
+    friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
+
+
 class PlannerConfig(Strict):
     """Where a path may go ([PT] 2.6.1)."""
 
@@ -53,8 +93,11 @@ class WorldConfig(Strict):
     """One world."""
 
     name: str
-    ground: Annotated[FlatGround | ElevationGround, Field(discriminator="kind")] = FlatGround()
+    ground: Annotated[FlatGround | ElevationGround | WaterGround, Field(discriminator="kind")] = (
+        FlatGround()
+    )
     friction: FrictionConfig = FrictionConfig()
+    obstacle: Annotated[PoleObstacle | PipeObstacle, Field(discriminator="kind")] | None = None
     planner: PlannerConfig = PlannerConfig()
 
     def with_relief(self, factor: float) -> Self:

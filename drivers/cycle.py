@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from drivers.debts import Debts
 from drivers.group_answer import GroupAnswer, GroupQuestion
 from drivers.group_write import GroupWrite
-from drivers.port import BytePort
+from drivers.port import AskingPort, BytePort
 
 _PATIENCE = 3
 """Reads in a row after which a silent servo no longer has a say in the length."""
@@ -75,6 +75,7 @@ class GroupCycle:
 
         """
         self._port = port
+        self._asking = port if isinstance(port, AskingPort) else None
         self._count = len(ids)
         self._goals = GroupWrite(ids, goal_address)
         self._ids = tuple(ids)
@@ -92,6 +93,7 @@ class GroupCycle:
         self._debts = debts if debts is not None else Debts(port.clock)
         self._missed = np.zeros(len(ids), np.intp)
         self._sent_until_s = port.clock.now_s()
+        self._usual = GroupQuestion(ids, read_address, read_bytes, fast=fast)
         self.fast = fast
         """Whether the next read is a fast one."""
         self.counters = CycleCounters()
@@ -100,6 +102,15 @@ class GroupCycle:
         """Send raw goals (N,); servos do not answer a sync write."""
         self._send(self._goals.encode(goals))
 
+    def turn(self, goals: NDArray[np.int32]) -> GroupAnswer:
+        """``write_goals`` and ``read`` in one: both packets leave in one write, back to back.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        return self._read(self._goals.encode(goals))
+
     def read(self) -> GroupAnswer:
         """Ask all servos for their block; ``data`` is (N, read_bytes).
 
@@ -107,11 +118,13 @@ class GroupCycle:
             PortError: the port is gone.
 
         """
+        return self._read(b"")
+
+    def _read(self, before: bytes) -> GroupAnswer:
+        """Ask, behind a packet that nobody answers."""
         question, order = self._question(), self._order
         self.counters.reads += 1
-        self._port.clearPort()
-        self._send(question.request)
-        raw, answer = self._collect(question)
+        raw, answer = self._ask(question, before)
         heard = answer.answered
         if not self._debts.none:
             answer = self._believed(question, answer)
@@ -144,6 +157,8 @@ class GroupCycle:
 
     def _question(self) -> GroupQuestion:
         length = self._length
+        if self._order is self._natural and self.fast is self._usual.fast and self._debts.none:
+            return self._usual
         if not self._debts.none:
             listening = [self._ids[k] for k in np.flatnonzero(self._missed < _PATIENCE)]
             length = self._debts.free_length(listening, length, fast=self.fast)
@@ -158,18 +173,29 @@ class GroupCycle:
         return question
 
     def _send(self, packet: bytes) -> None:
-        """Write, and note when it will have left the host (a write does not wait for that)."""
-        now_s = self._port.clock.now_s()
+        self._note_sent(len(packet))
         self._port.write(packet)
-        self._sent_until_s = max(now_s, self._sent_until_s) + self._wire_s(len(packet))
 
-    def _collect(self, question: GroupQuestion) -> tuple[bytes, GroupAnswer]:
-        """All that comes until the answer is complete or the deadline has passed."""
-        port = self._port
+    def _note_sent(self, count: int) -> float:
+        """Note when bytes will have left the host (a write does not wait for that); and now."""
+        now_s = self._port.clock.now_s()
+        self._sent_until_s = max(now_s, self._sent_until_s) + self._wire_s(count)
+        return now_s
+
+    def _ask(self, question: GroupQuestion, before: bytes) -> tuple[bytes, GroupAnswer]:
+        """Ask, and take all that comes until the answer is complete or the deadline has passed."""
+        port, request = self._port, before + question.request
         delays = 1 if question.fast else self._count
         wait_s = self._wire_s(question.answer_bytes) + delays * self._return_delay_s
-        deadline_s = self._sent_until_s + wait_s + self._latency_s
-        raw = port.read_until(question.answer_bytes, deadline_s)
+        if self._asking is not None:
+            now_s = self._note_sent(len(request))
+            deadline_s = self._sent_until_s + wait_s + self._latency_s
+            raw = self._asking.ask(request, question.answer_bytes, deadline_s - now_s)
+        else:
+            port.clearPort()
+            self._send(request)
+            deadline_s = self._sent_until_s + wait_s + self._latency_s
+            raw = port.read_until(question.answer_bytes, deadline_s)
         answer = question.parse(raw)
         while len(raw) >= question.answer_bytes and not answer.complete:
             more = question.missing_bytes(raw)  # stuffed bytes come on top

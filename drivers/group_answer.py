@@ -1,7 +1,8 @@
 """Answers of many servos to one (fast) sync read: bytes to one result per servo.
 
-The plain case, all answers there and none stuffed, is one vectorised pass. Everything else goes
-the slow way and yields what can be proved to belong to the question, servo by servo.
+The plain case, all answers there and none stuffed, is one compiled or vectorised pass
+(``drivers.protocol.group_frames``). Everything else goes the slow way and yields what can be proved
+to belong to the question, servo by servo.
 """
 
 from collections.abc import Sequence
@@ -11,7 +12,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.protocol.crc import crc16, crc16_long, crc16_rows
+from drivers.protocol.crc import crc16
+from drivers.protocol.group_frames import FLAWLESS, IRREGULAR, Frames, quickest_frames
 from drivers.protocol.packet import (
     BROADCAST_ID,
     HEADER,
@@ -26,6 +28,7 @@ from drivers.protocol.parser import PacketReader
 Bytes = NDArray[np.uint8]
 S = TypeVar("S", bound=np.generic)
 _RESULT = 0x7F
+_FRAMES = quickest_frames()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +55,9 @@ class GroupAnswer:
 class GroupQuestion:
     """One sync read of ``length`` bytes at ``address`` from ``ids``, fast or plain."""
 
-    def __init__(self, ids: Sequence[int], address: int, length: int, *, fast: bool) -> None:
+    def __init__(
+        self, ids: Sequence[int], address: int, length: int, *, fast: bool, frames: Frames = _FRAMES
+    ) -> None:
         params = address.to_bytes(2, "little") + length.to_bytes(2, "little") + bytes(ids)
         kind = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ
         self.request = encode_instruction(InstructionPacket(BROADCAST_ID, kind, params))
@@ -70,8 +75,11 @@ class GroupQuestion:
             HEADER + bytes([servo_id]) + (length + 4).to_bytes(2, "little") + bytes([STATUS])
             for servo_id in ids
         )
-        self._heads = np.frombuffer(heads, np.uint8).reshape(count, 8)
-        self._id_bytes = bytes(ids)
+        self._heads = np.frombuffer(heads, np.uint8).reshape(count, 8).copy()
+        self._head = np.frombuffer(self._fast_head, np.uint8).copy()
+        self._id_bytes = np.array(self.ids, np.uint8)
+        self._frames = frames
+        self._error = np.zeros(count, np.uint8)
         self._all_there = _constant(np.ones(count, np.bool_))
         self._no_error = _constant(np.zeros(count, np.uint8))
         self.answer_bytes = (len(self._fast_head) if fast else 0) + count * self.frame_bytes
@@ -79,9 +87,10 @@ class GroupQuestion:
 
     def parse(self, raw: bytes) -> GroupAnswer:
         """Find each servo's result in all that came between the question and its deadline."""
-        answer = self._parse_fast(raw) if self.fast else self._parse_plain(raw)
-        if answer is not None:
-            return answer
+        if len(raw) == self.answer_bytes:
+            answer = self._regular(np.frombuffer(raw, np.uint8))
+            if answer is not None:
+                return answer
         return self._salvage_fast(raw) if self.fast else self._salvage_plain(raw)
 
     def missing_bytes(self, raw: bytes) -> int:
@@ -93,33 +102,19 @@ class GroupQuestion:
         missing = sum(servo_id not in seen for servo_id in self.ids)
         return max(1, missing * self.frame_bytes - reader.pending) if missing else 0
 
-    def _parse_fast(self, raw: bytes) -> GroupAnswer | None:
-        if len(raw) != self.answer_bytes or not raw.startswith(self._fast_head):
+    def _regular(self, raw: Bytes) -> GroupAnswer | None:
+        """All answers as they should be; None if anything is otherwise."""
+        data = np.empty((len(self.ids), self.length), np.uint8)
+        if self.fast:
+            found = self._frames.read_fast(raw, self._head, self._id_bytes, data, self._error)
+        else:
+            found = self._frames.read_plain(raw, self._heads, data, self._error)
+        if found == IRREGULAR:
             return None
-        if raw[len(self._fast_head) + 1 :: self.frame_bytes] != self._id_bytes:
-            return None
-        if crc16_long(raw[:-2]) != raw[-2] | raw[-1] << 8:
-            return None
-        body = np.frombuffer(raw, np.uint8, offset=len(self._fast_head))
-        rows = body.reshape(-1, self.frame_bytes)
-        return self._all(rows[:, 2:-2], rows[:, 0])
-
-    def _parse_plain(self, raw: bytes) -> GroupAnswer | None:
-        # FF FF FD anywhere but in the headers: stuffed data, or a CRC that looks so; the slow way
-        if len(raw) != self.answer_bytes or raw.count(HEADER[:3]) != len(self.ids):
-            return None
-        rows = np.frombuffer(raw, np.uint8).reshape(-1, self.frame_bytes)
-        if not np.array_equal(rows[:, :8], self._heads):
-            return None
-        crc = rows[:, -2] | rows[:, -1].astype(np.uint16) << 8
-        if not np.array_equal(crc16_rows(rows[:, :-2]), crc):
-            return None
-        return self._all(rows[:, 9:-2], rows[:, 8])
-
-    def _all(self, data: Bytes, error: Bytes) -> GroupAnswer:
         there = self._all_there
-        if not np.count_nonzero(error):
+        if found == FLAWLESS:
             return GroupAnswer(data, there, self._no_error, there, clean=True)
+        error = self._error.copy()
         return GroupAnswer(data, (error & _RESULT) == 0, error, there, clean=True)
 
     def _salvage_plain(self, raw: bytes) -> GroupAnswer:

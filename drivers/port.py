@@ -7,7 +7,7 @@ milliseconds), widened by what the cycle codec needs (seconds, deadlines). So on
 both, and nothing above can tell what answers.
 """
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from drivers.clock import Clock
 from drivers.errors import PortError
@@ -106,6 +106,19 @@ class BytePort(SdkPort, Protocol):
 
         Waits ``quiet_s`` at least, so that an answer still on its way cannot be taken for that to
         the next question.
+        """
+        ...
+
+
+@runtime_checkable
+class AskingPort(Protocol):
+    """A byte port that asks and listens in one go, with nothing of ours in between."""
+
+    def ask(self, request: bytes, count: int, wait_s: float) -> bytes:
+        """Forget what has come, send ``request``, wait for ``count`` bytes.
+
+        Returns what has arrived, at most ``count`` bytes: fewer mean that ``wait_s`` have passed
+        since the request was taken.
         """
         ...
 

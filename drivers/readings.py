@@ -1,7 +1,7 @@
 """What the servos last said: blocks in, ``JointState`` out; what was not read is held and ages."""
 
 from collections.abc import Sequence
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from drivers.control_table import ControlTable
 from drivers.group_answer import GroupAnswer
 from drivers.protocol.packet import ALERT
-from drivers.types import JointState
+from drivers.state_block import StateBlock
+from drivers.types import Bools, JointState
 from drivers.units import VOLTAGE_UNIT_V, ServoUnits
 
 Bytes = NDArray[np.uint8]
@@ -20,54 +21,45 @@ class Readings:
     """Newest value of every quantity of J joints; NaN before the first."""
 
     def __init__(self, joints: int, table: ControlTable, units: ServoUnits) -> None:
-        self._units = units
-        self._columns = [
-            _column(table, name)
-            for name in ("Present Current", "Present Velocity", "Present Position")
-        ]
+        self._block = StateBlock(joints, table, units)
         self._numbers = np.full((6, joints), np.nan)
-        (
-            self._position,
-            self._velocity,
-            self._current,
-            self._temperature,
-            self._voltage,
-            self._read_at_s,
-        ) = self._numbers
+        self._motion = self._numbers[:3]
+        self._temperature, self._voltage, self._read_at_s = self._numbers[3:]
         self._read_at_s[:] = -np.inf
         self._hardware_error = np.zeros(joints, np.uint8)
         self._error = np.zeros(joints, np.uint8)
         self._valid = np.zeros(joints, np.bool_)
         self._alarmed = False
+        self._flags = self._frozen_flags()
 
     def take(self, answer: GroupAnswer, now_s: float) -> Sequence[int]:
         """Take the state block in; returns the joints whose alarm (register 70) must be read."""
-        units = self._units
-        current, velocity, position = (
-            answer.data[where].view(kind)[:, 0] for where, kind in self._columns
-        )
-        self._valid = ok = answer.valid
+        ok = answer.valid
         trouble = np.count_nonzero(answer.error) or self._alarmed
         if not trouble and np.count_nonzero(ok) == len(ok):  # as nearly always
-            self._current[:] = units.current_a(current)
-            self._velocity[:] = units.velocity_rad_s(velocity)
-            self._position[:] = units.position_rad(position)
-            self._read_at_s[:] = now_s
+            self._block.motion(answer.data, self._motion)
+            self._read_at_s.fill(now_s)
+            if ok is not self._valid:
+                self._valid = ok
+                self._flags = self._frozen_flags()
             return ()
-        self._current[ok] = units.current_a(current[ok])
-        self._velocity[ok] = units.velocity_rad_s(velocity[ok])
-        self._position[ok] = units.position_rad(position[ok])
+        self._valid = ok
+        motion = np.empty_like(self._motion)
+        self._block.motion(answer.data, motion)
+        self._motion[:, ok] = motion[:, ok]
         self._read_at_s[ok] = now_s
         self._error[answer.answered] = answer.error[answer.answered]
         alert = (answer.error & ALERT) != 0
         self._hardware_error[answer.answered & ~alert] = 0  # bit 7 says: register 70 is not 0
         self._alarmed = bool(self._error.any() or self._hardware_error.any())
+        self._flags = self._frozen_flags()
         return np.flatnonzero(alert & (self._hardware_error == 0)).tolist()
 
     def take_alarm(self, joint: int, hardware_error: int) -> None:
         """Take one joint's register 70 in."""
         self._hardware_error[joint] = hardware_error
         self._alarmed = True
+        self._flags = self._frozen_flags()
 
     def take_slow(self, answer: GroupAnswer) -> None:
         """Take the block of Present Input Voltage (2 bytes) and Present Temperature (1) in."""
@@ -78,8 +70,11 @@ class Readings:
 
     def state(self, now_s: float) -> JointState:
         """Read-only copies of everything."""
-        numbers = _frozen(self._numbers)
-        position, velocity, current, temperature, voltage, read_at_s = numbers
+        numbers = self._numbers.copy()
+        np.subtract(now_s, numbers[5], out=numbers[5])
+        numbers.setflags(write=False)
+        current, velocity, position, temperature, voltage, age_s = numbers
+        hardware_error, error, valid = self._flags
         return JointState(
             time_s=now_s,
             position_rad=position,
@@ -87,18 +82,15 @@ class Readings:
             current_a=current,
             temperature_c=temperature,
             voltage_v=voltage,
-            hardware_error=_frozen(self._hardware_error),
-            error=_frozen(self._error),
-            age_s=_frozen(now_s - read_at_s),
-            valid=_frozen(self._valid),
+            hardware_error=hardware_error,
+            error=error,
+            age_s=age_s,
+            valid=valid,
         )
 
-
-def _column(table: ControlTable, name: str) -> tuple[tuple[slice, slice], np.dtype[Any]]:
-    """Columns and type of a signed register in the state block."""
-    register = table[name]
-    at = register.address - table["Present Current"].address
-    return (slice(None), slice(at, at + register.size)), np.dtype(f"<i{register.size}")
+    def _frozen_flags(self) -> tuple[Bytes, Bytes, Bools]:
+        """Read-only copies of what hardly ever changes; handed out again until it does."""
+        return _frozen(self._hardware_error), _frozen(self._error), _frozen(self._valid)
 
 
 def _frozen(array: NDArray[S]) -> NDArray[S]:

@@ -12,9 +12,8 @@ from drivers.safety import (
     SafetyLimits,
     SafetyMemory,
     Verdict,
-    over_current_since_s,
+    judge,
     stale_fault,
-    state_fault,
     vet,
 )
 from drivers.types import JointCommand, JointState
@@ -157,7 +156,7 @@ class SafeLink:
         else:  # if the program stood still in between, the next step counts from here
             memory = verdict.memory
             self._memory = SafetyMemory(
-                self._clock.now_s(), memory.goal_rad, memory.over_current_since_s
+                self._clock.now_s(), memory.goal_rad, memory.over_current_since_s, memory.sound
             )
 
     def request_stop(self, reason: str) -> None:
@@ -194,11 +193,8 @@ class SafeLink:
         return state
 
     def _judge(self, state: JointState, memory: SafetyMemory) -> None:
-        since_s = over_current_since_s(state, memory, self._limits)
-        self._memory = SafetyMemory(memory.time_s, memory.goal_rad, since_s)
-        fault = self._stop_requested or state_fault(
-            state, since_s, self._limits, self._clock.now_s()
-        )
+        fault, self._memory = judge(state, memory, self._limits, self._clock.now_s())
+        fault = self._stop_requested or fault
         if fault is not None:
             self._trip(fault)
 

@@ -6,7 +6,8 @@ limit, an alarm, lasting over-current, heat, supply voltage, a state that is too
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,23 @@ class SafetyLimits:
     voltage_min_v: float
     voltage_max_v: float
     stale_limit_s: float
+    least: Floats = field(init=False, repr=False)
+    """(5 J,) of angle, velocity, current, temperature and voltage, what is plainly well."""
+    most: Floats = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Line the limits up, for one comparison of all that was measured."""
+        beyond, number = self.limit_rad + self.limit_slack_rad, np.finfo(float).max
+        rows = (
+            (-beyond, beyond),
+            (-number, number),
+            (-self.current_limit_a, self.current_limit_a),
+            (-np.inf, self.temperature_limit_c),
+            (self.voltage_min_v, self.voltage_max_v),
+        )
+        for name, side in (("least", 0), ("most", 1)):
+            ends = [np.broadcast_to(row[side], beyond.shape) for row in rows]
+            object.__setattr__(self, name, np.concatenate(ends))
 
     @staticmethod
     def from_config(robot: RobotConfig, safety: SafetyConfig) -> "SafetyLimits":
@@ -65,12 +83,14 @@ class SafetyMemory:
     """(J,) last goals that passed; at the start the measured angles."""
     over_current_since_s: Floats
     """(J,) time of the first reading above the limit; NaN below it."""
+    sound: tuple[JointState, SafetyLimits] | None = None
+    """The state judged last and the limits it kept: the same two again can only have aged."""
 
     @staticmethod
     def at_rest(state: JointState) -> "SafetyMemory":
         """Memory of joints that hold the pose in ``state``."""
         held = np.array(state.position_rad, float)
-        return SafetyMemory(state.time_s, held, np.full(len(held), np.nan))
+        return SafetyMemory(state.time_s, held, _never(len(held)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,12 +119,10 @@ def vet(
     Where clamps disagree the joint limit wins over the lead, and the lead over the rate: a smaller
     lead is a smaller torque.
     """
-    over_since_s = over_current_since_s(state, last, limits)
-    veto = state_fault(state, over_since_s, limits, now_s) or _command_fault(command, limits)
+    veto, seen = judge(state, last, limits, now_s)
+    veto = veto or _command_fault(command, limits)
     if veto is not None:
-        unchanged = np.zeros(len(last.goal_rad), np.bool_)
-        memory = SafetyMemory(last.time_s, last.goal_rad, over_since_s)
-        return Verdict(last.goal_rad, veto, unchanged, memory)
+        return Verdict(last.goal_rad, veto, np.zeros(len(last.goal_rad), np.bool_), seen)
     # After a pause the allowance does not pile up: never more than that of one stale limit
     dt_s = min(max(now_s - last.time_s, 0.0), limits.stale_limit_s)
     step = limits.goal_rate_rad_s * dt_s
@@ -113,16 +131,36 @@ def vet(
     goal = _within(goal, state.position_rad - lead, state.position_rad + lead)
     goal = _within(goal, -limits.limit_rad, limits.limit_rad)
     goal.setflags(write=False)
-    memory = SafetyMemory(now_s, goal, over_since_s)
+    memory = SafetyMemory(now_s, goal, seen.over_current_since_s, seen.sound)
     return Verdict(goal, None, goal != command.goal_rad, memory)
+
+
+def judge(
+    state: JointState, last: SafetyMemory, limits: SafetyLimits, now_s: float
+) -> tuple[str | None, SafetyMemory]:
+    """First reason to stop that the state gives, None if there is none; and what to remember.
+
+    What a state was found to be does not change when it is asked again, but for its age.
+    """
+    sound = last.sound
+    if sound is not None and sound[0] is state and sound[1] is limits:
+        return stale_fault(state, limits, now_s), last
+    since_s = last.over_current_since_s
+    if _plainly_well(state, since_s, limits):
+        fault = stale_fault(state, limits, now_s)
+    else:
+        since_s = over_current_since_s(state, last, limits)
+        fault = state_fault(state, since_s, limits, now_s)
+    sound = (state, limits) if fault is None else None
+    return fault, SafetyMemory(last.time_s, last.goal_rad, since_s, sound)
 
 
 def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> Floats:
     """(J,) since when each current is above the limit; a joint not read keeps its time."""
     since = last.over_current_since_s
     over = np.abs(state.current_a) > limits.current_limit_a
-    if not np.count_nonzero(over) and not np.count_nonzero(np.isfinite(since)):
-        return since  # all NaN, and so it stays
+    if not over.any() and not np.isfinite(since).any():
+        return _never(len(since))
     started = np.where(np.isnan(since), state.time_s, since)
     return np.where(state.valid, np.where(over, started, np.nan), since)
 
@@ -130,10 +168,9 @@ def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLi
 def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | None:
     """First joint that was not read for too long; None if there is none."""
     age_s = state.age_s + (now_s - state.time_s)
-    fresh = age_s <= limits.stale_limit_s  # of a NaN, too, not
-    if np.count_nonzero(fresh) == len(fresh):
+    if np.maximum.reduce(age_s) <= limits.stale_limit_s:  # of a NaN, too, not
         return None
-    joint = int(np.argmin(fresh))
+    joint = int(np.argmin(age_s <= limits.stale_limit_s))
     return f"joint {joint}: not read for {age_s[joint]:.3f} s"
 
 
@@ -182,21 +219,32 @@ def state_fault(
 def _plainly_well(state: JointState, over_since_s: Floats, limits: SafetyLimits) -> bool:
     """Whether no check of ``state_fault`` can find anything, at a fifth of their cost.
 
-    Stricter than they: what is not plain is left to them. A sum of squares is finite only if all
-    numbers are, and a comparison with a NaN counts as none.
+    Stricter than they: what is not plain is left to them. A comparison with a NaN counts as none.
     """
-    count, position, amps = np.count_nonzero, state.position_rad, state.current_a
-    speed = state.velocity_rad_s
-    return (
-        math.isfinite(position.dot(position) + speed.dot(speed) + amps.dot(amps))
-        and not count(state.error)
-        and not count(state.hardware_error)
-        and count(np.abs(position) <= limits.limit_rad + limits.limit_slack_rad) == len(position)
-        and not count(np.isfinite(over_since_s))
-        and not count(state.temperature_c > limits.temperature_limit_c)
-        and not count(state.voltage_v < limits.voltage_min_v)
-        and not count(state.voltage_v > limits.voltage_max_v)
+    measured = np.concatenate(
+        (
+            state.position_rad,
+            state.velocity_rad_s,
+            state.current_a,
+            state.temperature_c,
+            state.voltage_v,
+        )
     )
+    inside = (measured >= limits.least) & (measured <= limits.most)
+    return (
+        over_since_s is _never(len(over_since_s))
+        and np.count_nonzero(inside) == len(inside)
+        and not np.count_nonzero(state.error)
+        and not np.count_nonzero(state.hardware_error)
+    )
+
+
+@cache
+def _never(joints: int) -> Floats:
+    """(J,) NaN, read-only: that no current is above its limit, told by identity."""
+    since_s = np.full(joints, np.nan)
+    since_s.setflags(write=False)
+    return since_s
 
 
 def _within(values: Floats, low: Floats, high: Floats) -> Floats:

@@ -6,9 +6,14 @@ from __future__ import annotations
 
 import errno
 import os
+import select
+import sys
+import termios
 from contextlib import suppress
+from importlib.util import find_spec
 from types import TracebackType
 
+import numpy as np
 import serial
 from serial.tools import list_ports
 
@@ -20,6 +25,10 @@ _LATENCY_MS = 16.0
 _PROGRAM_S = 0.02
 """How late a program at the other end of a pseudo-terminal may be: it has to be scheduled."""
 _NOISE_LIMIT_BYTES = 1 << 16
+_LONGEST = 1 << 13
+"""Bytes of an answer that one compiled exchange takes."""
+_STUCK_S = 1.0
+"""After so long a device that takes no more bytes is gone."""
 
 
 class SerialPort:
@@ -37,6 +46,13 @@ class SerialPort:
         self._clock: Clock = clock if clock is not None else WallClock()
         self._timeout_at_s = 0.0
         self._serial: serial.Serial | None = None
+        self._readable, self._writable = select.poll(), select.poll()
+        self._answer = np.empty(_LONGEST, np.uint8)
+        self._exchange = None
+        if sys.platform == "linux" and find_spec("numba") is not None:
+            from drivers.compiled_exchange import exchange  # noqa: PLC0415  slow, optional
+
+            self._exchange = exchange
         self._open()
 
     def __enter__(self) -> SerialPort:
@@ -80,19 +96,53 @@ class SerialPort:
 
     def write(self, data: bytes) -> None:
         """Send all of ``data``."""
+        fd = self._descriptor
         try:
-            self._line.write(data)
-        except (serial.SerialException, OSError) as error:
+            sent = os.write(fd, data)
+            while sent < len(data):
+                if not self._writable.poll(_STUCK_S * 1e3):
+                    raise PortError(f"{self._device}: takes no more bytes")
+                sent += os.write(fd, data[sent:])
+        except OSError as error:
             raise self._gone(error) from error
 
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Wait for ``count`` bytes, at most until ``deadline_s``."""
-        line = self._line
+        fd = self._descriptor
+        got = b""
         try:
-            line.timeout = max(0.0, deadline_s - self._clock.now_s())
-            return bytes(line.read(count))
-        except (serial.SerialException, OSError) as error:
+            while len(got) < count:
+                left_s = max(0.0, deadline_s - self._clock.now_s())
+                if not self._readable.poll(left_s * 1e3):
+                    break
+                more = os.read(fd, count - len(got))
+                if not more:
+                    raise OSError(errno.EIO, "ready to be read, but empty")
+                got += more
+        except OSError as error:
             raise self._gone(error) from error
+        return got
+
+    def ask(self, request: bytes, count: int, wait_s: float) -> bytes:
+        """Forget what has come, send ``request``, wait for ``count`` bytes.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        if self._exchange is None or count > _LONGEST:
+            self.clearPort()
+            self.write(request)
+            return self.read_until(count, self._clock.now_s() + wait_s)
+        question, answer = np.frombuffer(request, np.uint8), self._answer
+        begun_s = self._clock.now_s()
+        got = self._exchange(self._descriptor, question, answer, count, int(wait_s * 1e9))
+        if got == count:
+            return answer[:count].tobytes()
+        if got < 0:
+            self.write(request[-1 - got :])
+            begun_s, got = self._clock.now_s(), 0
+        return answer[:got].tobytes() + self.read_until(count - got, begun_s + wait_s)
 
     def drain_until_quiet(self, quiet_s: float) -> int:
         """Throw bytes away until none has come for ``quiet_s``.
@@ -132,7 +182,7 @@ class SerialPort:
     def clearPort(self) -> None:
         try:
             self._line.reset_input_buffer()
-        except (serial.SerialException, OSError) as error:
+        except (serial.SerialException, OSError, termios.error) as error:
             raise self._gone(error) from error
 
     def setBaudRate(self, baudrate: int) -> bool:
@@ -179,12 +229,19 @@ class SerialPort:
             raise PortError(f"{self._device}: is closed")
         return self._serial
 
+    @property
+    def _descriptor(self) -> int:
+        return int(self._line.fileno())
+
     def _open(self) -> None:
         try:
             self._serial = serial.Serial(self._device, self._baud, timeout=0.0, exclusive=True)
             self._serial.reset_input_buffer()
         except (serial.SerialException, OSError, ValueError) as error:
             raise PortError(self._why(error)) from error
+        self._readable, self._writable = select.poll(), select.poll()
+        self._readable.register(self._serial.fileno(), select.POLLIN)
+        self._writable.register(self._serial.fileno(), select.POLLOUT)
         # asks an FTDI driver for a latency timer of 1 ms instead of 16; others have none to set
         with suppress(ValueError, NotImplementedError):
             self._serial.set_low_latency_mode(True)

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class ServoDrive:
     """What the plant needs of J servos in every step; contiguous float64 arrays (J,).
+
+    The arrays are written in place and never exchanged: compiled steps keep their addresses.
 
     Position control as the firmware does it: ``pwm = clip(p_gain * (goal - q), +-pwm_limit)``,
     ``volts = pwm * supply``, ``i = (volts - k_e w) / R``, clipped to ``+-current_limit_a`` in
@@ -44,9 +46,19 @@ class ServoDrive:
 
     def __post_init__(self) -> None:
         joints = len(self.torque_on)
-        self.current_a = np.zeros(joints)
-        self.torque_n_m = np.zeros(joints)
-        self.pwm = np.zeros(joints)
+        for output in ("current_a", "torque_n_m", "pwm"):
+            object.__setattr__(self, output, np.zeros(joints))
+        for each in self.columns():
+            if each.dtype != np.float64 or each.shape != (joints,) or not each.flags.c_contiguous:
+                raise TypeError(f"a drive holds contiguous float64 arrays of {joints} joints")
+
+    def columns(self) -> tuple[Floats, ...]:
+        """All arrays, in the order of the fields."""
+        return (
+            *(self.torque_on, self.goal_rad, self.p_gain_per_rad, self.pwm_limit, self.supply_v),
+            *(self.resistance_ohm, self.torque_constant_n_m_a, self.back_emf_v_s),
+            *(self.current_limit_a, self.current_a, self.torque_n_m, self.pwm),
+        )
 
 
 class Plant(Protocol):

@@ -1,4 +1,4 @@
-"""Writes the log row by row: a kill costs at most the last second, a disk fault stops the run."""
+"""Writes the log row by row: a kill costs half a second at most, a disk fault stops the run."""
 
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
@@ -15,7 +15,18 @@ from config.loader import digest
 from config.robot import RobotConfig
 from config.run import RunConfig
 from config.world import WorldConfig
-from drivers.telemetry.encode import encode, exact, floats, number, thinned
+from drivers.telemetry.encode import (
+    encode,
+    exact,
+    exact_text,
+    flags_text,
+    floats,
+    number,
+    rounded_text,
+    rounded_texts,
+    text,
+    thinned,
+)
 from drivers.telemetry.record import Laid, PlanSummary
 from drivers.telemetry.schema import FORMAT, TOPICS, schema_json, schema_name
 from drivers.types import JointState
@@ -23,7 +34,7 @@ from drivers.types import JointState
 Level = Literal["info", "warning", "error"]
 VerdictKind = Literal["pass", "clamp", "veto"]
 
-_FLUSH_S: Final = 1.0
+_FLUSH_S: Final = 0.5
 _CHUNK_BYTES: Final = 1 << 20
 
 
@@ -119,27 +130,24 @@ class RunLog:
         joints: Sequence[int] = (),
     ) -> None:
         """One control cycle; writes ``/slow`` too when temperature, voltage or alarms changed."""
-        measured = floats(
-            np.stack([state.position_rad, state.velocity_rad_s, state.current_a, state.age_s])
+        asked, sent = np.asarray(asked_rad, dtype=float), np.asarray(sent_rad, dtype=float)
+        asked_text = exact_text(asked)
+        same = sent.tobytes() == asked.tobytes()
+        position, velocity, current, age = rounded_texts(
+            (state.position_rad, state.velocity_rad_s, state.current_a, state.age_s)
         )
-        row = {
-            "time_s": time_s,
-            "asked_rad": exact(asked_rad),
-            "sent_rad": exact(sent_rad),
-            "measured_rad": measured[0],
-            "velocity_rad_s": measured[1],
-            "current_a": measured[2],
-            "age_s": measured[3],
-            "valid": state.valid.tolist(),
-            "error": state.error.tolist(),
-            "deadline_s": deadline_s,
-            "lateness_s": number(lateness_s),
-            "wire_busy_s": number(wire_busy_s),
-            "verdict": verdict,
-            "reason": reason,
-            "joints": [int(j) for j in joints],
-        }
-        self._add("/cycle", time_s, row)
+        row = (
+            f'{{"time_s":{text(time_s)},"asked_rad":{asked_text},'
+            f'"sent_rad":{asked_text if same else exact_text(sent)},'
+            f'"measured_rad":{position},"velocity_rad_s":{velocity},"current_a":{current},'
+            f'"age_s":{age},"valid":{flags_text(state.valid.tobytes(), state.valid.dtype.char)},'
+            f'"error":{flags_text(state.error.tobytes(), state.error.dtype.char)},'
+            f'"deadline_s":{text(deadline_s)},'
+            f'"lateness_s":{rounded_text(lateness_s)},"wire_busy_s":{rounded_text(wire_busy_s)},'
+            f'"verdict":"{verdict}","reason":{encode(reason)},'
+            f'"joints":{encode([int(j) for j in joints])}}}'
+        )
+        self._add_text("/cycle", time_s, row)
         self._slow_row(time_s, state)
 
     def pose(
@@ -157,19 +165,17 @@ class RunLog:
         target: int = 0,
     ) -> None:
         """Where the body is: head (3,), rotation (3, 3), links (L, 3), centre of mass (3,)."""
-        row = {
-            "time_s": time_s,
-            "head_m": floats(head_m),
-            "rotation": floats(np.ravel(rotation)),
-            "links_m": None if links_m is None else floats(links_m),
-            "centre_m": floats(centre_m),
-            "speed_m_s": number(speed_m_s),
-            "predicted_speed_m_s": number(predicted_speed_m_s),
-            "pulse_m_s": number(pulse_m_s),
-            "path_s_m": number(path_s_m),
-            "target": int(target),
-        }
-        self._add("/pose", time_s, row)
+        given = (head_m, np.ravel(rotation), centre_m, *(() if links_m is None else (links_m,)))
+        head, turn, centre, *links = rounded_texts([np.asarray(a, dtype=float) for a in given])
+        row = (
+            f'{{"time_s":{text(time_s)},"head_m":{head},"rotation":{turn},'
+            f'"links_m":{links[0] if links else "null"},"centre_m":{centre},'
+            f'"speed_m_s":{rounded_text(speed_m_s)},'
+            f'"predicted_speed_m_s":{rounded_text(predicted_speed_m_s)},'
+            f'"pulse_m_s":{rounded_text(pulse_m_s)},"path_s_m":{rounded_text(path_s_m)},'
+            f'"target":{int(target)}}}'
+        )
+        self._add_text("/pose", time_s, row)
 
     def path_laid(self, time_s: float, points_m: ArrayLike) -> None:
         """Log a path (n, 2) or (n, 3) that replaces the plan's."""
@@ -226,9 +232,12 @@ class RunLog:
         self._add("/slow", time_s, row)
 
     def _add(self, topic: str, time_s: float, row: Mapping[str, Any]) -> None:
+        self._add_text(topic, time_s, encode(row))
+
+    def _add_text(self, topic: str, time_s: float, row: str) -> None:
         stamp_ns = round(time_s * 1e9)
         self._writer.add_message(
-            self._channels[topic], stamp_ns, encode(row).encode(), publish_time=stamp_ns
+            self._channels[topic], stamp_ns, row.encode(), publish_time=stamp_ns
         )
         if time_s - self._flushed_s >= _FLUSH_S:
             self._flushed_s = time_s

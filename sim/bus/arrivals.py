@@ -14,6 +14,10 @@ class Arrivals:
         """Time of one byte on the wire."""
         self._packets: deque[tuple[float, bytes]] = deque()
 
+    def __bool__(self) -> bool:
+        """Whether anything is under way or waits to be taken."""
+        return bool(self._packets)
+
     def add(self, start_s: float, data: bytes) -> float:
         """Put a packet on the wire at ``start_s``; when its last byte will have arrived."""
         self._packets.append((start_s, data))
@@ -37,6 +41,8 @@ class Arrivals:
     def take(self, count: int, now_s: float) -> bytes:
         """Up to ``count`` bytes of those that have arrived."""
         packets, taken = self._packets, bytearray()
+        if packets and len(packets[0][1]) == count == self._arrived(packets[0], now_s):
+            return packets.popleft()[1]  # one packet, all of it, as nearly always
         while packets and len(taken) < count:
             start_s, data = packets[0]
             ready = min(self._arrived(packets[0], now_s), count - len(taken))

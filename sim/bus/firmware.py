@@ -44,8 +44,8 @@ HOMING_LIMIT_TICKS = 1_024
 """Homing Offset(20) beyond this is ignored in position control mode (e-manual)."""
 IN_POSITION_TICKS, FOLLOWING_TICKS = 20, 100
 """Deviations behind the flags of Moving Status(123), "predefined" in the e-manual: ours."""
-PRESENT, SUPPLY = range(120, 147), range(144, 147)
-"""Addresses of all present values, and of voltage and temperature among them; e-manual."""
+PRESENT, SUPPLY = range(120, 144), range(144, 147)
+"""Addresses of what time and shafts show, and of voltage and temperature; e-manual."""
 IN_POSITION, PROFILE_ONGOING, FOLLOWING_ERROR = 0x01, 0x02, 0x08
 
 
@@ -81,15 +81,12 @@ class Firmware:
         self._goal_address = bank.register("Goal Position").address
         # Without a sensor load is "inferred from the internal output": in tenths of a per cent
         effort = "Present Current" if bank.measures_current else "Present Load"
-        self._shown_at = (
-            bank.register(effort).address,
-            bank.register("Present Velocity").address,
-            bank.register("Present Position").address,
-        )
+        shown = (effort, "Present Velocity", "Present Position")
+        self._shown_at = np.array([bank.register(name).address for name in shown])
         ampere, most = self.motor.current_unit_a, math.inf
         if not bank.measures_current:
             ampere, most = self.motor.stall_current_a / 1e3, 1e3
-        self._shown_units = (ampere, most, VELOCITY_UNIT_RAD_S, TICKS_PER_RAD)
+        self._shown_units = np.array([ampere, most, VELOCITY_UNIT_RAD_S, TICKS_PER_RAD])
         self._taken = np.zeros(joints, bool)
         self.changed()
         self.power_up(np.arange(joints))
@@ -98,23 +95,24 @@ class Firmware:
 
     def advance(self, until_s: float) -> None:
         """Step physics, watchdog, heat and protections to ``until_s``."""
+        plant, drive, protection = self.plant, self.drive, self.protection
         while self._time_s < until_s:
             stop_s = min(until_s, self._slice_s, self._watchdog_s, self.agenda.next_s)
             if self.loops.active:
                 stop_s = min(stop_s, self._control_s)
-            self.plant.advance(stop_s, self.drive)
-            self.protection.pass_time(stop_s - self._time_s)
+            plant.advance(stop_s, drive)
+            protection.pass_time(stop_s - self._time_s)
             self._time_s = stop_s
             if self.loops.active and stop_s >= self._control_s:
                 self._control_s = stop_s + CONTROL_S
-                self.loops.tick(self.plant, self._goal, self._sign, self._held)
+                self.loops.tick(plant, self._goal, self._sign, self._held)
             if stop_s >= self.agenda.next_s:
                 self.agenda.carry_out(stop_s)
                 self.changed()
             if stop_s >= self._watchdog_s:
                 self._trip_watchdog()
             if stop_s >= self._slice_s:
-                if self.protection.look(self.plant):
+                if protection.look(plant):
                     self.changed()
                 self._slice_s += SLICE_S
 
@@ -179,11 +177,9 @@ class Firmware:
         """
         plain = not (self._holding or self._pushed or self.loops.active or self.jam.any)
         goal_rad = self.drive.goal_rad if plain else np.empty(len(self.bank))
-        places = (at, self._goal_address)
-        limits, frame, taken = self._limits, self._frame, self._taken
-        take_goals(
-            raw, rows, self.bank.table, places, limits, frame, TICKS_PER_RAD, goal_rad, taken
-        )
+        table, address, taken = self.bank.table, self._goal_address, self._taken
+        limits, frame = self._limits, self._frame
+        take_goals(raw, rows, table, at, address, limits, frame, TICKS_PER_RAD, goal_rad, taken)
         if self._woken_by_goals:
             self.wake(np.flatnonzero(taken))
         if not plain:
@@ -267,8 +263,16 @@ class Firmware:
 
     def refresh_motion(self) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
-        shafts = (self.jam.current_a(), self.plant.velocity_rad_s, self.plant.position_rad)
-        show_motion(self.bank.table, self._shown_at, shafts, self._frame, self._shown_units)
+        plant = self.plant
+        show_motion(
+            self.bank.table,
+            self._shown_at,
+            self.jam.current_a(),
+            plant.velocity_rad_s,
+            plant.position_rad,
+            self._frame,
+            self._shown_units,
+        )
 
     def refresh(self, address: int = 0, length: int = TABLE_BYTES) -> None:
         """Present values, those at least that a read of this block shows."""

@@ -29,7 +29,7 @@ class GroupPath:
         self._status_address = self._bank.register("Hardware Error Status").address
         self._version = -1
         self._reads: dict[bytes, GroupRead] = {}
-        self._goal_rows: tuple[bytes, NDArray[np.intp]] | None = None
+        self._goals: tuple[bytes, bytes, NDArray[np.intp]] | None = None
 
     def execute(self, raw: bytes, now_s: float, whole: bool) -> list[Answer] | None:
         """Carry out ``raw`` if it is plain, else return None and leave all as it was.
@@ -39,7 +39,7 @@ class GroupPath:
         if self._version != self._service.version:
             self._version = self._service.version
             self._reads.clear()
-            self._goal_rows = None
+            self._goals = None
         read = self._reads.get(raw)
         if read is None:
             if raw[:5] != _PREFIX or len(raw) < 15:
@@ -58,16 +58,17 @@ class GroupPath:
         return read.answers(self._bank.table, whole)
 
     def _write_goals(self, raw: bytes, now_s: float) -> list[Answer] | None:
-        if (len(raw) - 14) % 5 or not _intact(raw):
-            return None
-        ids = raw[12:-2:5]
-        if self._goal_rows is None or self._goal_rows[0] != ids:
+        head, ids = raw[:12], raw[12:-2:5]
+        known = self._goals
+        if known is None or known[0] != head or known[1] != ids:
             rows = self._service.roll.rows[np.frombuffer(ids, np.uint8)]
-            if (rows < 0).any() or len(np.unique(rows)) != len(rows):
+            if (len(raw) - 14) % 5 or (rows < 0).any() or len(np.unique(rows)) != len(rows):
                 return None
-            self._goal_rows = (ids, rows)
+            known = self._goals = (head, ids, rows)
+        if not _intact(raw):
+            return None
         self._firmware.heard(now_s)
-        self._firmware.write_goals(self._goal_rows[1], np.frombuffer(raw, np.uint8), 12)
+        self._firmware.write_goals(known[2], np.frombuffer(raw, np.uint8), 12)
         return []
 
     def _plan(self, raw: bytes) -> GroupRead | None:
@@ -90,8 +91,8 @@ class GroupPath:
 
 def _intact(raw: bytes) -> bool:
     return (
-        int.from_bytes(raw[5:7], "little") == len(raw) - 7
-        and HEADER[:3] not in raw[8:-2]
+        raw[5] | raw[6] << 8 == len(raw) - 7
+        and raw.find(HEADER[:3], 8, -2) < 0
         and crc_of(np.frombuffer(raw, np.uint8), 0, len(raw) - 2, 0, TABLE)
-        == int.from_bytes(raw[-2:], "little")
+        == raw[-2] | raw[-1] << 8
     )

@@ -34,12 +34,13 @@ class GroupRead:
         self.address, self.length = address, length
         self.motion = address in MOTION and address + length <= MOTION.stop
         self._rows = rows
-        self._block = (address, length, status)
+        self._block = np.array([address, length, status])
         self._delays_s = delays_s
         self._gapless = not any(delays_s[1:])
         head, frames, error_at, data_at = self._template(ids, length)
         self._packet = np.frombuffer(head + frames.tobytes(), np.uint8).copy()
-        self._shape = (len(head), frames.shape[1], error_at, data_at)
+        self._share = frames.shape[1]
+        self._shape = np.array([len(head), self._share, error_at, data_at])
 
     def answers(self, table: Bytes, whole: bool) -> list[Answer]:
         """Packets with the table's present bytes."""
@@ -66,7 +67,7 @@ class PlainRead(GroupRead):
         return b"", frames, 8, 9
 
     def _cut(self, raw: bytes, whole: bool) -> list[Answer]:
-        size = self._shape[1]
+        size = self._share
         frames = [raw[at : at + size] for at in range(0, len(raw), size)]
         if raw.count(HEADER[:3]) > len(frames):  # some data look like a header
             frames = [self._stuffed(frame) for frame in frames]

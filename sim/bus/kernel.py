@@ -1,6 +1,7 @@
 """What every control cycle asks of the servos, as loops over servos and bytes.
 
-Compiled where numba is installed, else run as they stand, to the same bytes.
+Compiled where numba is installed, else run as they stand, to the same bytes. Arguments are arrays
+and plain numbers: numba takes five times longer to look at a tuple than at an array.
 """
 
 from collections.abc import Callable
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 Bytes = NDArray[np.uint8]
 Rows = NDArray[np.intp]
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Registers = NDArray[np.integer]
 F = TypeVar("F", bound=Callable[..., object])
 
 
@@ -43,24 +46,27 @@ def put(data: Bytes, at: int, value: int, size: int) -> None:
 @_compiled
 def show_motion(
     table: Bytes,
-    places: tuple[int, int, int],
-    shafts: tuple[Floats, Floats, Floats],
+    places: Ints,
+    current_a: Floats,
+    velocity_rad_s: Floats,
+    position_rad: Floats,
     frame: Floats,
-    units: tuple[float, float, float, float],
+    units: Floats,
 ) -> None:
     """Present Current (or Load), Velocity and Position of all servos into their ``table``.
 
     Args:
         table: (S, bytes) control tables.
-        places: addresses of the three registers.
-        shafts: (S,) currents, A, velocities, rad/s, and angles, rad.
+        places: (3,) addresses of the registers.
+        current_a: (S,)
+        velocity_rad_s: (S,)
+        position_rad: (S,)
         frame: (2, S) sign of a servo's direction, and ticks at the shaft's zero.
-        units: ampere, and its greatest reading; rad/s; ticks per rad.
+        units: (4,) ampere, and its greatest reading; rad/s; ticks per rad.
 
     """
-    at_current, at_velocity, at_position = places
-    current_a, velocity_rad_s, position_rad = shafts
-    ampere, limit, rad_s, ticks_per_rad = units
+    at_current, at_velocity, at_position = places[0], places[1], places[2]
+    ampere, limit, rad_s, ticks_per_rad = units[0], units[1], units[2], units[3]
     for row in range(len(table)):
         sign, zero = frame[0, row], frame[1, row]
         shown = np.rint(current_a[row] * (sign / ampere))
@@ -73,26 +79,26 @@ def show_motion(
 @_compiled
 def compose(
     packet: Bytes,
-    shape: tuple[int, int, int, int],
+    shape: Ints,
     table: Bytes,
     rows: Rows,
-    block: tuple[int, int, int],
+    block: Ints,
     crc_table: NDArray[np.uint16],
 ) -> None:
     """Fill the answers of ``rows`` to one group read into the template ``packet``.
 
     Args:
         packet: the whole answer; IDs and all that is constant are there already.
-        shape: bytes before the first servo's share; bytes of a share; where in it the error byte
-            stands, and where the data. A packet with a head is one: its CRCs go on and on.
+        shape: (4,) bytes before the first servo's share; bytes of a share; where in it the error
+            byte stands, and where the data. A packet with a head is one: its CRCs go on and on.
         table: (S, bytes) control tables.
         rows: servos, in the order of their shares.
-        block: address and length of the data, and address of Hardware Error Status.
+        block: (3,) address and length of the data, and address of Hardware Error Status.
         crc_table: (256,) CRC of a byte.
 
     """
-    head, share, error_at, data_at = shape
-    address, length, status = block
+    head, share, error_at, data_at = shape[0], shape[1], shape[2], shape[3]
+    address, length, status = block[0], block[1], block[2]
     crc = crc_of(packet, 0, head, 0, crc_table)
     for k in range(len(rows)):
         row, start = rows[k], head + k * share
@@ -111,8 +117,9 @@ def take_goals(
     raw: Bytes,
     rows: Rows,
     table: Bytes,
-    places: tuple[int, int],
-    limits: NDArray[np.int64],
+    at: int,
+    address: int,
+    limits: Ints,
     frame: Floats,
     ticks_per_rad: float,
     goal_rad: Floats,
@@ -124,7 +131,8 @@ def take_goals(
         raw: the packet.
         rows: servos, in the order of the entries.
         table: (S, bytes) control tables.
-        places: of the first entry in ``raw``, and address of the register.
+        at: place of the first entry in ``raw``.
+        address: of the register.
         limits: (2, S) least and greatest goal, ticks.
         frame: as in ``show_motion``.
         ticks_per_rad: its unit.
@@ -132,7 +140,6 @@ def take_goals(
         taken: (S,) set to whether a servo has taken one.
 
     """
-    at, address = places
     taken[:] = False
     for k in range(len(rows)):
         row, entry = rows[k], at + 5 * k + 1
@@ -152,3 +159,72 @@ def add_loss(heat_j: Floats, current_a: Floats, ohm_s: float) -> None:
     """Add what the windings turned into heat."""
     for row in range(len(heat_j)):
         heat_j[row] += current_a[row] * current_a[row] * ohm_s
+
+
+@_compiled
+def warm_up(temperature_c: Floats, heat_j: Floats, slice_s: float, thermal: Floats) -> None:
+    """Move each sensor towards where its heat would take it in the long run; heat is used up.
+
+    Args:
+        temperature_c: (S,)
+        heat_j: (S,) since the last call.
+        slice_s: time since then.
+        thermal: (3,) of the air, C; kelvin per watt; share of the way made in a slice.
+
+    """
+    for row in range(len(heat_j)):
+        target_c = thermal[0] + thermal[1] * (heat_j[row] / slice_s)
+        temperature_c[row] += (target_c - temperature_c[row]) * thermal[2]
+        heat_j[row] = 0.0
+
+
+@_compiled
+def out_of_range(
+    temperature_c: Floats,
+    hottest_c: Registers,
+    tenths: int,
+    least: Registers,
+    most: Registers,
+) -> bool:
+    """Whether a sensor is too hot, or the supply outside a servo's limits (tenths of a volt)."""
+    for row in range(len(temperature_c)):
+        if tenths < least[row] or tenths > most[row]:
+            return True
+        if np.rint(temperature_c[row]) > hottest_c[row]:
+            return True
+    return False
+
+
+@_compiled
+def drawn(pwm: Floats, current_a: Floats) -> float:
+    """Current that the bridges take from the supply, A."""
+    sum_a = 0.0
+    for row in range(len(pwm)):
+        sum_a += abs(pwm[row] * current_a[row])
+    return sum_a
+
+
+@_compiled
+def count_blocked(
+    blocked_s: Floats,
+    slice_s: float,
+    pwm: Floats,
+    pwm_limit: Floats,
+    torque_on: Floats,
+    velocity_rad_s: Floats,
+    slow_rad_s: float,
+) -> float:
+    """Add a slice to the time of each motor that pushes with all it may and does not turn.
+
+    Returns:
+        The longest such time, s.
+
+    """
+    longest_s = 0.0
+    for row in range(len(blocked_s)):
+        full = abs(pwm[row]) >= 0.98 * min(pwm_limit[row], 1.0)
+        along_rad_s = np.sign(pwm[row]) * velocity_rad_s[row]
+        held = full and along_rad_s < slow_rad_s and torque_on[row] > 0.0
+        blocked_s[row] = blocked_s[row] + slice_s if held else 0.0
+        longest_s = max(longest_s, blocked_s[row])
+    return longest_s

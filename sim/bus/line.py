@@ -80,6 +80,10 @@ class SimLine(Wire):
         self._service.baud = baud
         self._service.retune()
 
+    def _wake_host(self) -> None:
+        if self._script is not None or not self.is_open:
+            super()._wake_host()
+
     def _host_wakes_s(self, now_s: float) -> float:
         return now_s if self._script is None else self._script.host_wakes_s(now_s)
 
@@ -91,23 +95,25 @@ class SimLine(Wire):
 
     def _obey(self, data: bytes, end_s: float) -> list[Answer]:
         """Let the servos hear what the host has sent."""
-        noise = None if self._script is None else self._script.noise
-        heard = [data] if noise is None or not noise.any else noise.question(data, end_s)
+        if self._script is None:
+            apart = self.tamper is not None or bool(self.taps)
+            quick = self._group.execute(data, end_s, whole=not apart)
+            return self._one_by_one(data, end_s) if quick is None else quick
+        noise = self._script.noise
+        heard = noise.question(data, end_s) if noise.any else [data]
         answers: list[Answer] = []
         for piece in heard:
-            apart = self.tamper is not None or bool(self.taps) or noise is not None
-            quick = self._group.execute(piece, end_s, whole=not apart)
-            answers += (
-                quick
-                if quick is not None
-                else [
-                    answer
-                    for packet in self._reader.feed(piece)
-                    if isinstance(packet, InstructionPacket)
-                    for answer in self._service.execute(packet, end_s)
-                ]
-            )
+            quick = self._group.execute(piece, end_s, whole=False)
+            answers += self._one_by_one(piece, end_s) if quick is None else quick
         return answers
+
+    def _one_by_one(self, data: bytes, end_s: float) -> list[Answer]:
+        return [
+            answer
+            for packet in self._reader.feed(data)
+            if isinstance(packet, InstructionPacket)
+            for answer in self._service.execute(packet, end_s)
+        ]
 
     def _fate(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
         """What becomes of one answer, and by how much it is slow."""
@@ -118,6 +124,8 @@ class SimLine(Wire):
         return [(0.0, data)]
 
     def _frames(self, data: bytes) -> Sequence[bytes]:
+        if len(data) >= 7 and data[5] | data[6] << 8 == len(data) - 7:
+            return (data,)
         frames, at = [], 0
         while data.startswith(HEADER, at) and at + 7 <= len(data):
             end = at + 7 + int.from_bytes(data[at + 5 : at + 7], "little")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sim.bus.bank import ServoBank
 from sim.bus.jam import Jam
-from sim.bus.kernel import add_loss
+from sim.bus.kernel import add_loss, count_blocked, drawn, out_of_range, warm_up
 from sim.bus.motor import MotorModel
 from sim.plant import Plant, ServoDrive
 
@@ -57,6 +57,10 @@ class Protection:
         self._ohm = motor.resistance_ohm
         self._heat_j = np.zeros(len(bank))
         self._blocked_s = np.zeros(len(bank))
+        names = "Min Voltage Limit", "Max Voltage Limit", "Temperature Limit"
+        self._limits = bank[names[0]], bank[names[1]], bank[names[2]]
+        share = 1.0 - math.exp(-SLICE_S / motor.thermal_time_s)
+        self._thermal = np.array([around.ambient_c, motor.winding_k_per_w, share])
 
     @property
     def supply_v(self) -> float:
@@ -87,21 +91,24 @@ class Protection:
         """Judge one slice of ``SLICE_S``; whether registers have changed."""
         self._warm_up()
         volts = self._sag()
-        bank, drive = self._bank, self._drive
-        pwm = self._jam.pwm()
-        full = np.abs(pwm) >= 0.98 * np.minimum(drive.pwm_limit, 1.0)
-        if np.count_nonzero(full):
-            along_rad_s = np.sign(pwm) * plant.velocity_rad_s
-            held = full & (along_rad_s < 0.05 * self._motor.no_load_rad_s) & (drive.torque_on > 0)
-            self._blocked_s = np.where(held, self._blocked_s + SLICE_S, 0.0)
-        else:
-            self._blocked_s[:] = 0.0
-        low, tenths = bank["Min Voltage Limit"], round(volts * 10.0)
-        outside = (tenths < low) | (tenths > bank["Max Voltage Limit"])
-        hot = np.rint(self.temperature_c) > bank["Temperature Limit"]
-        overload = self._blocked_s >= OVERLOAD_S
-        if not any(map(np.count_nonzero, (outside, hot, overload))):  # starved is outside, too
+        drive = self._drive
+        longest_s = count_blocked(
+            self._blocked_s,
+            SLICE_S,
+            self._jam.pwm(),
+            drive.pwm_limit,
+            drive.torque_on,
+            plant.velocity_rad_s,
+            0.05 * self._motor.no_load_rad_s,
+        )
+        low, high, hottest = self._limits
+        tenths = round(volts * 10.0)
+        wrong = out_of_range(self.temperature_c, hottest, tenths, low, high)
+        if longest_s < OVERLOAD_S and not wrong:  # starved is outside, too
             return False
+        outside = (tenths < low) | (tenths > high)
+        hot = np.rint(self.temperature_c) > hottest
+        overload = self._blocked_s >= OVERLOAD_S
         starved = (volts < STARVED * low * 0.1) & (drive.torque_on > 0)
         self._note(
             VOLTAGE_ERROR * outside
@@ -117,16 +124,12 @@ class Protection:
         bank["Torque Enable"][(bank["Hardware Error Status"] & bank["Shutdown"]) != 0] = 0
 
     def _warm_up(self) -> None:
-        motor = self._motor
-        watts = self._heat_j / SLICE_S
-        target_c = self._around.ambient_c + motor.winding_k_per_w * watts
-        share = 1.0 - math.exp(-SLICE_S / motor.thermal_time_s)
-        self.temperature_c += (target_c - self.temperature_c) * share
-        self._heat_j[:] = 0.0
+        self._thermal[0] = self._around.ambient_c
+        warm_up(self.temperature_c, self._heat_j, SLICE_S, self._thermal)
 
     def _sag(self) -> float:
         drive = self._drive
-        servos_a = float(np.add.reduce(np.abs(drive.pwm * drive.current_a)))
+        servos_a = float(drawn(drive.pwm, drive.current_a))
         drawn_a = servos_a + self._motor.standby_a * len(self._bank)
         volts = self._around.supply_v - self._around.supply_ohm * drawn_a
         drive.supply_v[:] = volts

@@ -3,7 +3,7 @@
 The two packets of a control cycle have a vectorised way in ``sim.bus.group`` with the same result.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from drivers.protocol.packet import (
     BROADCAST_ID,
@@ -27,8 +27,7 @@ BITS_PER_BYTE = 10
 """Start bit, eight data bits, stop bit."""
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(NamedTuple):
     """Bytes on the wire after a silence."""
 
     delay_s: float

@@ -110,8 +110,10 @@ class Wire(ABC):
 
     def clearPort(self) -> None:
         """Drop what has arrived by now; bytes still under way will arrive all the same."""
-        self._carry_out(self.clock.now_s())
-        self._arriving.take(1 << 30, self.clock.now_s())
+        now_s = self.clock.now_s()
+        self._carry_out(now_s)
+        if self._arriving:
+            self._arriving.take(1 << 30, now_s)
 
     def getBytesAvailable(self) -> int:
         """Bytes that have arrived by now."""
@@ -150,10 +152,10 @@ class Wire(ABC):
 
     def write(self, data: bytes) -> None:
         """Put bytes on the wire behind those already there; returns at once."""
-        self.clock.sleep_until_s(self._host_wakes_s(self.clock.now_s()))
-        self._must_be_open()
+        self._wake_host()
         start_s = max(self.clock.now_s(), self._sent_until_s)
-        self._carry_out(start_s)
+        if self._sent:
+            self._carry_out(start_s)
         clear = self._quiet_s <= start_s + INSTANT_S
         if not clear:
             self._collide(start_s)
@@ -167,21 +169,20 @@ class Wire(ABC):
 
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Up to ``count`` bytes; the clock moves to the last of them, or to ``deadline_s``."""
-        clock = self.clock
-        clock.sleep_until_s(self._host_wakes_s(clock.now_s()))
-        self._must_be_open()
+        clock, arriving, sent = self.clock, self._arriving, self._sent
+        self._wake_host()
         limit_s = max(deadline_s, clock.now_s())
         while count > 0:
-            due_s = self._arriving.due_s(count)
+            due_s = arriving.due_s(count) if arriving else None
             if due_s is not None:
                 clock.sleep_until_s(min(due_s, limit_s))
                 break
-            if not self._sent or self._sent[0][0] > limit_s:
+            if not sent or sent[0][0] > limit_s:
                 clock.sleep_until_s(limit_s)
                 break
-            self._carry_out(self._sent[0][0])
+            self._carry_out(sent[0][0])
         self._must_be_open()
-        return self._arriving.take(count, clock.now_s())
+        return arriving.take(count, clock.now_s())
 
     def drain_until_quiet(self, quiet_s: float) -> int:
         """Throw bytes away until none has come for ``quiet_s``; the number thrown away."""
@@ -208,6 +209,11 @@ class Wire(ABC):
     def gone(self) -> bool:
         """Whether the port has vanished."""
         return self._gone
+
+    def _wake_host(self) -> None:
+        """Let a host go on that wants to use the port, when and if it can."""
+        self.clock.sleep_until_s(self._host_wakes_s(self.clock.now_s()))
+        self._must_be_open()
 
     def _must_be_open(self) -> None:
         if self._gone:
@@ -237,7 +243,9 @@ class Wire(ABC):
             for tap in self.taps:
                 tap(end_s, True, data)
             answers = self._obey(data, end_s)
-            if answers and self._sent and end_s + answers[0].delay_s < self._sent_until_s:
+            if not answers:
+                continue
+            if self._sent and end_s + answers[0].delay_s < self._sent_until_s:
                 self.collisions += 1  # the host has already begun its next packet
                 self._sent.clear()
                 continue

@@ -17,6 +17,7 @@ from sim.physics.drive import shaft_torque
 from sim.physics.friction import ellipse_force, stop_drag
 from sim.physics.layout import StepLayout
 from sim.physics.mechanics import LEAST_DEPTH_M, Mechanics
+from sim.physics.water import add_water, immersed
 from sim.plant import ServoDrive
 
 Floats = NDArray[np.float64]
@@ -24,6 +25,8 @@ Floats = NDArray[np.float64]
 register_jitable(ellipse_force)
 register_jitable(stop_drag)
 register_jitable(shaft_torque)
+register_jitable(immersed)
+register_jitable(add_water)
 
 
 def _pointer(typing: Any, address: Any) -> Any:
@@ -104,6 +107,7 @@ def _add_friction(
     law: tuple[float, ...],
     load: Floats,
     totals: Floats,
+    water: Floats,
 ) -> None:
     """Ellipse at every contact of now under the load of the last step, collected into ``qfrc``."""
     reals, integers, count, at = contacts
@@ -115,11 +119,15 @@ def _add_friction(
     depth[:] = 0.0
     for c in range(count):
         i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
+        if i < 0:  # an obstacle's: it has MuJoCo's own friction
+            continue
         depth[i] += max(-reals[size * c + at_dist], LEAST_DEPTH_M)
     _move(v, w, before, qvel, chain, step_s)
     wrench[:] = 0.0
     for c in range(count):
         i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
+        if i < 0:
+            continue
         share = max(-reals[size * c + at_dist], LEAST_DEPTH_M) / depth[i]
         p = reals[size * c + at_place : size * c + at_place + 3]
         n = reals[size * c + at_up : size * c + at_up + 3]
@@ -149,6 +157,8 @@ def _add_friction(
         wrench[i, 3] += p[1] * f2 - p[2] * f1
         wrench[i, 4] += p[2] * f0 - p[0] * f2
         wrench[i, 5] += p[0] * f1 - p[1] * f0
+    if water[3] > 0.0:
+        totals[0] += add_water(wrench, centre[1:], rotation[1:], v, w, water, step_s)
     _collect(wrench, qfrc, chain)
 
 
@@ -159,8 +169,9 @@ def _weigh(
     _, integers, count, at = contacts
     for c in range(count):
         row = integers[2 * at[0] * c + at[5]]
-        if row >= 0:
-            load[geom_body[integers[2 * at[0] * c + at[4] + 1]] - 1] += force_n[row]
+        i = geom_body[integers[2 * at[0] * c + at[4] + 1]] - 1
+        if row >= 0 and i >= 0:
+            load[i] += force_n[row]
 
 
 def _steps(
@@ -175,6 +186,7 @@ def _steps(
     drive: tuple[Floats, ...],
     load: Floats,
     totals: Floats,
+    water: Floats,
 ) -> None:
     """Advance: ``mj_step1``, drive, friction, ``mj_step2``, so often."""
     qpos, qvel, qfrc = state
@@ -218,18 +230,70 @@ def _steps(
             count,
             at,
         )
-        _add_friction(contacts, qfrc, qvel, chain, work, geom_body, law, load, totals)
+        _add_friction(contacts, qfrc, qvel, chain, work, geom_body, law, load, totals, water)
         call(step2, model, data)
         load[:] = 0.0
         force_n = carray(pointer(force_list[0]), (1 << 30,), np.float64)
         _weigh(load, contacts, force_n, geom_body)
 
 
+def _run(
+    steps: int,
+    where: NDArray[np.int64],
+    arrays: NDArray[np.int64],
+    sizes: NDArray[np.int64],
+    constants: Floats,
+) -> None:
+    """Advance, with all arrays by their addresses: handing over forty would take 7 us a call."""
+    joints, bodies, geoms = sizes[0], sizes[1], sizes[2]
+    links = joints + 1
+    at = carray(pointer(arrays[0]), (joints + 7,), np.float64)
+    rate = carray(pointer(arrays[1]), (joints + 6,), np.float64)
+    force = carray(pointer(arrays[2]), (joints + 6,), np.float64)
+    chain = (
+        carray(pointer(arrays[3]), (bodies, 3), np.float64),
+        carray(pointer(arrays[4]), (bodies, 9), np.float64),
+        carray(pointer(arrays[5]), (links, 3), np.float64),
+        carray(pointer(arrays[6]), (links, 3), np.float64),
+    )
+    work = (
+        carray(pointer(arrays[7]), (links, 3), np.float64),
+        carray(pointer(arrays[8]), (links, 3), np.float64),
+        carray(pointer(arrays[9]), (links, 6), np.float64),
+        carray(pointer(arrays[10]), (links,), np.float64),
+        carray(pointer(arrays[11]), (links, 3), np.float64),
+    )
+    load = carray(pointer(arrays[12]), (links,), np.float64)
+    totals = carray(pointer(arrays[13]), (2,), np.float64)
+    geom_body = carray(pointer(arrays[14]), (geoms,), np.int32)
+    drive = (
+        carray(pointer(arrays[15]), (joints,), np.float64),
+        carray(pointer(arrays[16]), (joints,), np.float64),
+        carray(pointer(arrays[17]), (joints,), np.float64),
+        carray(pointer(arrays[18]), (joints,), np.float64),
+        carray(pointer(arrays[19]), (joints,), np.float64),
+        carray(pointer(arrays[20]), (joints,), np.float64),
+        carray(pointer(arrays[21]), (joints,), np.float64),
+        carray(pointer(arrays[22]), (joints,), np.float64),
+        carray(pointer(arrays[23]), (joints,), np.float64),
+        carray(pointer(arrays[24]), (joints,), np.float64),
+        carray(pointer(arrays[25]), (joints,), np.float64),
+        carray(pointer(arrays[26]), (joints,), np.float64),
+    )
+    law = (constants[0], constants[1], constants[2], constants[3], constants[4])
+    state = (at, rate, force)
+    _steps(
+        *(steps, where, state, chain, work, geom_body, law, constants[5], drive, load, totals),
+        constants[6:12],
+    )
+
+
 register_jitable(_move)
 register_jitable(_collect)
 register_jitable(_add_friction)
 register_jitable(_weigh)
-run_steps = njit(cache=True)(_steps)
+register_jitable(_steps)
+run_steps = njit(cache=True)(_run)
 
 
 class CompiledSteps:
@@ -258,47 +322,26 @@ class CompiledSteps:
             dtype=np.int64,
         )
         links = m.joint_count + 1
-        self._state = (d.qpos, d.qvel, d.qfrc_applied)
-        self._chain = (d.xipos, d.xmat, d.xanchor, d.xaxis)
-        self._work = (
-            np.zeros((links, 3)),
-            np.zeros((links, 3)),
-            np.zeros((links, 6)),
-            np.zeros(links),
-            m.before_m,
+        self._arrays = (
+            *(d.qpos, d.qvel, d.qfrc_applied),
+            *(d.xipos, d.xmat, d.xanchor, d.xaxis),
+            *(np.zeros((links, 3)), np.zeros((links, 3)), np.zeros((links, 6)), np.zeros(links)),
+            *(m.before_m, m.load_n, m.totals, m.model.geom_bodyid),
         )
-        self._law = (m.mu_along, m.mu_across, m.link_mass_kg, m.radius_m, m.step_s)
+        self._sizes = np.array([m.joint_count, m.model.nbody, m.model.ngeom], dtype=np.int64)
+        self._constants = np.array(
+            [
+                *(m.mu_along, m.mu_across, m.link_mass_kg, m.radius_m, m.step_s),
+                *(m.gear_drag_n_m_s, *m.water),
+            ]
+        )
+        self._drive: ServoDrive | None = None
+        self._addresses = np.zeros(0, dtype=np.int64)
 
     def run(self, steps: int, drive: ServoDrive) -> None:
         """Advance ``steps`` steps."""
-        m = self._m
-        run_steps(
-            steps,
-            self._where,
-            self._state,
-            self._chain,
-            self._work,
-            m.model.geom_bodyid,
-            self._law,
-            m.gear_drag_n_m_s,
-            _arrays(drive),
-            m.load_n,
-            m.totals,
-        )
-
-
-def _arrays(drive: ServoDrive) -> tuple[Floats, ...]:
-    return (
-        drive.torque_on,
-        drive.goal_rad,
-        drive.p_gain_per_rad,
-        drive.pwm_limit,
-        drive.supply_v,
-        drive.resistance_ohm,
-        drive.torque_constant_n_m_a,
-        drive.back_emf_v_s,
-        drive.current_limit_a,
-        drive.current_a,
-        drive.torque_n_m,
-        drive.pwm,
-    )
+        if drive is not self._drive:
+            self._drive = drive
+            arrays = (*self._arrays, *drive.columns())
+            self._addresses = np.array([each.ctypes.data for each in arrays], dtype=np.int64)
+        run_steps(steps, self._where, self._addresses, self._sizes, self._constants)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sim.physics.drive import drive_shafts
 from sim.physics.friction import ellipse_forces, stop_drag
 from sim.physics.mechanics import LEAST_DEPTH_M, Mechanics, velocities
+from sim.physics.water import add_water
 from sim.plant import ServoDrive
 
 Floats = NDArray[np.float64]
@@ -44,11 +45,13 @@ def friction_forces(m: Mechanics) -> Floats:
     out = np.zeros(m.model.nv)
     contacts = d.contact
     link = m.model.geom_bodyid[contacts.geom[:, 1]] - 1
-    depth = np.maximum(-contacts.dist, LEAST_DEPTH_M)
+    ours = link >= 0  # the others are an obstacle's: they have MuJoCo's own friction
+    link = link[ours]
+    depth = np.maximum(-contacts.dist[ours], LEAST_DEPTH_M)
     load = m.load_n[link]
     share = depth / np.bincount(link, depth, len(m.load_n))[link]
     normal_n = load * share
-    place, up = contacts.pos, contacts.frame[:, :3]
+    place, up = contacts.pos[ours], contacts.frame[ours, :3]
     centre = d.xipos[1:]
     velocity, (_, spin) = (centre - m.before_m) / m.step_s, velocities(d)
     m.before_m[:] = centre
@@ -68,6 +71,8 @@ def friction_forces(m: Mechanics) -> Floats:
     force = f_along[:, None] * along + f_across[:, None] * across
     wrench = np.zeros((len(centre), 6))
     np.add.at(wrench, link, np.hstack([force, np.cross(place, force)]))
+    if m.water[3] > 0.0:
+        m.totals[0] += add_water(wrench, centre, d.xmat[1:], velocity, spin, m.water, m.step_s)
     behind = wrench[::-1].cumsum(axis=0)[::-1]
     f, t = behind[1:, :3], behind[1:, 3:]
     out[6:] = (d.xaxis[1:] * (t - np.cross(d.xanchor[1:], f))).sum(axis=1)

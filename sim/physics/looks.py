@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from config.heightfield import HeightField
 from config.robot import RobotConfig
-from config.world import WorldConfig
+from config.world import WaterGround, WorldConfig
 from sim.physics.model import finish, mjcf
 from sim.physics.shade import SUN_DIRECTION
 
@@ -26,6 +26,8 @@ REACHED: Rgba = (0.10, 0.62, 0.38, 1)
 WAY: Rgba = (0.98, 0.98, 0.95, 1)
 RING_PARTS = 32
 LOWLAND, HIGHLAND = np.array([96.0, 112, 70]), np.array([214.0, 192, 152])
+SHALLOW = [0.30, 0.56, 0.66], [0.26, 0.51, 0.62]
+SURFACE: Rgba = (0.55, 0.80, 0.92, 0.13)
 CONTOURS = 12
 TEXELS = 1024
 
@@ -51,10 +53,11 @@ def dressed_model(
     """
     spec = mujoco.MjSpec.from_string(mjcf(robot, world, ground, 0.002))
     for geom in spec.geoms:
-        geom.group = 0 if geom.name == "ground" else 4  # the bellies are not drawn
+        geom.group = 4 if geom.name.startswith("belly") else 0  # bellies are not drawn
     _light(spec, robot, fine)
     _floor(spec, ground)
     _skin(spec, robot)
+    _water(spec, world)
     for k, (x, y) in enumerate(waypoints_m):
         z = 0.0 if ground is None else float(ground.elevation_m(x, y))
         _add(
@@ -163,6 +166,15 @@ def _floor(spec: mujoco.MjSpec, ground: HeightField | None) -> None:
         floor.size = [0.0, 0.0, 0.1]
 
 
+def _water(spec: mujoco.MjSpec, world: WorldConfig) -> None:
+    """Tint the floor by the water above it and draw its surface, which is seen through."""
+    if not isinstance(world.ground, WaterGround):
+        return
+    spec.texture("ground").rgb1, spec.texture("ground").rgb2 = SHALLOW
+    surface = 0.5 * world.ground.size_m, 0.5 * world.ground.size_m, 0.001
+    _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_BOX, surface, (0, 0, world.ground.depth_m), SURFACE)
+
+
 def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
     """Colour by elevation, with contour lines and a little of the slope's shade."""
     w, h = ground.size_m
@@ -183,14 +195,13 @@ def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
 
 
 def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
-    """A capsule a link, thinner at neck and tail; a broad head with eyes and a forked tongue."""
+    """A capsule a link; a broad head with eyes and a forked tongue."""
     r, length = robot.body_radius_m, robot.link_length_m
     links = robot.joint_count + 1
+    thickness = _thickness_m(robot)
     for i in range(1, links):
         body = spec.body(f"link{i}")
-        along = i / (links - 1)
-        thick = r * (0.80 + 0.20 * np.sin(np.pi * min(along / 0.55, 1.0) / 2))
-        thick *= 1.0 - 0.55 * max(0.0, (along - 0.55) / 0.45) ** 1.5
+        thick = thickness[i]
         low = thick - r  # the belly stays on the ground
         ends = (0.0, 0.0, low, -length, 0.0, low)
         _add(body, _CAPSULE, (thick, 0, 0), (), BACK[i % 2], ends)
@@ -214,6 +225,17 @@ def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
         TONGUE,
         (half * 1.3, 0, -0.35 * r, half * 1.9, 0, -0.35 * r),
     )
+
+
+def _thickness_m(robot: RobotConfig) -> Floats:
+    """Skin radius (L,) of each link: the robot's profile, or one thinner at neck and tail."""
+    links = robot.joint_count + 1
+    if robot.body_profile is not None:
+        return np.array(robot.radii_m(2 * links + 1))[1::2]  # at the links' middles
+    along = np.arange(links) / (links - 1)
+    thick = 0.80 + 0.20 * np.sin(np.pi * np.minimum(along / 0.55, 1.0) / 2)
+    thick *= 1.0 - 0.55 * np.maximum(0.0, (along - 0.55) / 0.45) ** 1.5
+    return np.asarray(robot.body_radius_m * thick)
 
 
 def _dots(path_m: Floats | None, spacing_m: float = 0.12) -> Floats:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from config.robot import RobotConfig
 from config.world import WorldConfig
+from sim.physics.water import water_constants
 
 Floats = NDArray[np.float64]
 
@@ -31,8 +32,10 @@ class Mechanics:
     """(L,) what the ground bore of each link in the last step, N."""
     before_m: Floats
     """(L, 3) centres of the links at the start of the last step."""
+    water: Floats
+    """(6,) ``sim.physics.water.water_constants``."""
     totals: Floats = field(default_factory=lambda: np.zeros(2))
-    """Energy lost to ground friction, J; way slipped across the links, mean of all links, m."""
+    """Energy lost to ground friction and water, J; way slipped across the links, their mean, m."""
 
     @classmethod
     def of(
@@ -41,13 +44,16 @@ class Mechanics:
         robot: RobotConfig,
         world: WorldConfig,
         gear_drag_n_m_s: float,
+        gravity_m_s2: float = 9.81,
     ) -> "Mechanics":
         """Gather what the steps need."""
         mu = world.friction
         load, before = np.zeros(robot.joint_count + 1), np.zeros((robot.joint_count + 1, 3))
         data = mujoco.MjData(model)
         mass, radius = robot.link_mass_kg, robot.body_radius_m
-        return cls(model, data, mu.along, mu.across, mass, radius, gear_drag_n_m_s, load, before)
+        water = water_constants(world, robot, gravity_m_s2)
+        grip = mu.along, mu.across, mass, radius, gear_drag_n_m_s
+        return cls(model, data, *grip, load, before, water)
 
     @property
     def joint_count(self) -> int:
@@ -68,8 +74,9 @@ class Mechanics:
         """Read ``load_n`` off the contact forces in the data."""
         d = self.data
         row = np.asarray(d.contact.efc_address)
-        bears = row >= 0
-        link = self.model.geom_bodyid[d.contact.geom[bears, 1]] - 1
+        body = self.model.geom_bodyid[d.contact.geom[:, 1]]
+        bears = (row >= 0) & (body > 0)
+        link = body[bears] - 1
         self.load_n[:] = np.bincount(link, d.efc_force[row[bears]], len(self.load_n))
 
 

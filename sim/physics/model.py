@@ -11,7 +11,8 @@ import numpy as np
 
 from config.heightfield import HeightField
 from config.robot import RobotConfig
-from config.world import FlatGround, WorldConfig
+from config.world import ElevationGround, WorldConfig
+from sim.physics.obstacles import obstacle_mjcf
 
 GEAR_RATIO = 353.5
 """XM430-W350, e-manual."""
@@ -70,16 +71,18 @@ def mjcf(
     """Write the model as MJCF text (a height field's samples are filled in by ``finish``)."""
     soft = f'solref="{max(CONTACT_TIME_S, 2.0 * step_s)} 1" solimp="0.9 0.95 0.001"'
     asset, floor = _ground(world, ground)
+    options, obstacle = obstacle_mjcf(world)
     return f"""<mujoco model="{robot.name}">
   <compiler angle="radian" autolimits="true"/>
-  <option timestep="{step_s!r}" gravity="0 0 {-gravity_m_s2!r}" integrator="Euler" solver="Newton"/>
+  <option timestep="{step_s!r}" gravity="0 0 {-gravity_m_s2!r}" integrator="Euler" solver="Newton"
+    {options}/>
   <asset>{asset}</asset>
   <default>
     <joint type="hinge" armature="{armature_kg_m2!r}"/>
     <geom condim="1" {soft}/>
   </default>
   <worldbody>
-    {floor}
+    {floor}{obstacle}
     <body name="link0"><freejoint name="head"/>
       {_link(robot, 0)}
       {_links_behind(robot)}
@@ -91,7 +94,7 @@ def mjcf(
 def _ground(world: WorldConfig, ground: HeightField | None) -> tuple[str, str]:
     masks = 'name="ground" contype="1" conaffinity="2"'
     if ground is None:
-        size = world.ground.size_m if isinstance(world.ground, FlatGround) else 10.0
+        size = 10.0 if isinstance(world.ground, ElevationGround) else world.ground.size_m
         return "", f'<geom {masks} type="plane" size="{size / 2} {size / 2} 0.1"/>'
     low, span = _levels(ground)
     (w, h), (rows, columns) = ground.size_m, ground.z_m.shape

@@ -6,7 +6,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from config.heightfield import HeightField
 from config.robot import RobotConfig
+from config.world import WaterGround, WorldConfig
 from sim.physics.mechanics import Mechanics
+from sim.physics.water import floating_height_m
 
 Floats = NDArray[np.float64]
 
@@ -38,13 +40,7 @@ def place(
 
     """
     model, data = m.model, m.data
-    q = np.asarray(joint_rad, dtype=float)
-    if q.shape != (m.joint_count,):
-        raise ValueError(f"joint_rad has shape {q.shape}; the robot has {m.joint_count} joints")
-    mujoco.mj_resetData(model, data)
-    data.qpos[:2] = start_m
-    data.qpos[3:7] = np.cos(heading_rad / 2), 0.0, 0.0, np.sin(heading_rad / 2)
-    data.qpos[7:] = q
+    _pose(m, start_m, heading_rad, joint_rad)
     if ground is not None:
         _drape(m, robot, ground)
     mujoco.mj_kinematics(model, data)
@@ -56,6 +52,44 @@ def place(
     data.qvel[:] = 0.0
     mujoco.mj_forward(model, data)
     m.rest()
+
+
+def float_at(
+    m: Mechanics,
+    robot: RobotConfig,
+    world: WorldConfig,
+    start_m: tuple[float, float],
+    heading_rad: float,
+    joint_rad: ArrayLike,
+) -> bool:
+    """Put a body that water carries at the height where it stays; False on dry ground.
+
+    Raises:
+        ValueError: ``joint_rad`` is not (J,).
+
+    """
+    water = world.ground
+    if not isinstance(water, WaterGround) or water.buoyancy < 1.0:
+        return False
+    _pose(m, start_m, heading_rad, joint_rad)
+    mujoco.mj_kinematics(m.model, m.data)
+    height = floating_height_m(water, robot.body_radius_m)
+    m.data.qpos[2] += height - float(m.data.xipos[1:, 2].mean())
+    mujoco.mj_forward(m.model, m.data)
+    m.rest()
+    return True
+
+
+def _pose(
+    m: Mechanics, start_m: tuple[float, float], heading_rad: float, joint_rad: ArrayLike
+) -> None:
+    q = np.asarray(joint_rad, dtype=float)
+    if q.shape != (m.joint_count,):
+        raise ValueError(f"joint_rad has shape {q.shape}; the robot has {m.joint_count} joints")
+    mujoco.mj_resetData(m.model, m.data)
+    m.data.qpos[:2] = start_m
+    m.data.qpos[3:7] = np.cos(heading_rad / 2), 0.0, 0.0, np.sin(heading_rad / 2)
+    m.data.qpos[7:] = q
 
 
 def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField) -> None:

@@ -16,7 +16,8 @@ from sim.physics.interpreted import InterpretedSteps
 from sim.physics.layout import step_layout
 from sim.physics.mechanics import Mechanics
 from sim.physics.model import ARMATURE_KG_M2, build_model
-from sim.physics.placing import place
+from sim.physics.obstacles import place_at
+from sim.physics.placing import float_at, place
 from sim.plant import ServoDrive
 
 Floats = NDArray[np.float64]
@@ -60,6 +61,7 @@ class MujocoPlant:
         gravity_m_s2: float = 9.81,
     ) -> None:
         self.robot = robot
+        self.world = world
         self.ground = ground
         self.step_s = step_s
         model = build_model(
@@ -70,7 +72,7 @@ class MujocoPlant:
             armature_kg_m2=armature_kg_m2,
             gravity_m_s2=gravity_m_s2,
         )
-        self.mechanics = Mechanics.of(model, robot, world, gear_drag_n_m_s)
+        self.mechanics = Mechanics.of(model, robot, world, gear_drag_n_m_s, gravity_m_s2)
         self._data = self.mechanics.data
         self._place: Floats = self._data.qpos[:7]
         self._position_rad: Floats = self._data.qpos[7:]
@@ -111,7 +113,9 @@ class MujocoPlant:
             return
         self._steps.run(steps, drive)
         self._count += steps
-        if abs(self._data.time - self.time_s) > 0.5 * self.step_s:  # MuJoCo resets what diverges
+        if (
+            abs(self._data.time - self._count * self.step_s) > 0.5 * self.step_s
+        ):  # MuJoCo resets what diverges
             raise PhysicsError(
                 f"the physics diverged before {self.time_s:.3f} s; "
                 f"a step of {self.step_s * 1e3:g} ms may be too long for this robot"
@@ -121,13 +125,18 @@ class MujocoPlant:
         """Put the body on the ground, at rest, at time 0.
 
         Yaw joints take ``joint_rad`` (J,); pitch joints start from it and drape over the ground, as
-        those of a robot laid down without power do (on a plane they keep it).
+        those of a robot laid down without power do (on a plane they keep it). A coil goes round a
+        pole, everything into a pipe, and what water carries floats: ``start_m`` is of the floor.
 
         Raises:
             ValueError: ``joint_rad`` is not (J,).
 
         """
-        place(self.mechanics, self.robot, self.ground, start_m, heading_rad, joint_rad)
+        m = self.mechanics
+        if not place_at(m, self.robot, self.world, heading_rad, joint_rad) and not float_at(
+            m, self.robot, self.world, start_m, heading_rad, joint_rad
+        ):
+            place(m, self.robot, self.ground, start_m, heading_rad, joint_rad)
         self._count = 0
         self._data.time = 0.0
         self.mechanics.totals[:] = 0.0
@@ -159,7 +168,7 @@ class MujocoPlant:
         row = np.asarray(d.contact.efc_address)
         bears = row >= 0
         bears[bears] = d.efc_force[row[bears]] > 0.0
-        bodies = self.mechanics.model.geom_bodyid[d.contact.geom[bears, 1]]
+        bodies = self.mechanics.model.geom_bodyid[d.contact.geom[bears]].max(axis=1)
         return len(np.unique(bodies))
 
     @property
@@ -182,7 +191,7 @@ class MujocoPlant:
 
     @property
     def friction_loss_j(self) -> float:
-        """Energy that ground friction has taken since the reset."""
+        """Energy that ground friction and water have taken since the reset."""
         return float(self.mechanics.totals[0])
 
     @property

@@ -48,6 +48,18 @@ class Servos:
         ]
 
 
+class AskingScript(ScriptedPort):
+    """With question and answer in one go, as a serial device has it."""
+
+    def ask(self, request: bytes, count: int, wait_s: float) -> bytes:
+        self.clearPort()
+        self.write(request)
+        return self.read_until(count, self.clock.now_s() + wait_s)
+
+
+any_port = pytest.mark.parametrize("kind", [ScriptedPort, AskingScript])
+
+
 @pytest.fixture
 def servos() -> Servos:
     return Servos()
@@ -66,12 +78,25 @@ def test_a_healthy_cycle_is_one_packet_each_way(servos: Servos) -> None:
     assert (port.drains, cycle.counters.timeouts) == (0, 0)
 
 
+@any_port
+def test_a_turn_is_one_write_of_both_packets(servos: Servos, kind: type[ScriptedPort]) -> None:
+    goals = np.array([1, 2, 3, 4], np.int32)
+    packet = GroupWrite(IDS, 116).encode(goals)
+    port = kind(lambda raw: servos(raw.removeprefix(packet)))
+    answer = GroupCycle(port, IDS).turn(goals)
+    assert len(port.written) == 1
+    assert port.written[0].startswith(packet)
+    assert answer.valid.all()
+    assert answer.data.tolist() == [[1] * 10] * 4
+
+
+@any_port
 @pytest.mark.parametrize("is_fast", [False, True])
 @pytest.mark.parametrize("late_s", [0.005, 0.012, 0.05, 0.0501, 0.3])
 def test_a_late_answer_is_never_taken_for_a_new_one(
-    servos: Servos, is_fast: bool, late_s: float
+    kind: type[ScriptedPort], servos: Servos, is_fast: bool, late_s: float
 ) -> None:
-    port = ScriptedPort(servos)
+    port = kind(servos)
     cycle = GroupCycle(port, IDS, fast=is_fast)
     servos.late_s = {3: late_s, 4: late_s / 2}
     for _ in range(60):
@@ -93,15 +118,16 @@ def test_the_block_has_its_own_length_again_after_clean_reads(servos: Servos) ->
     assert servos.lengths[-1] == 10
 
 
+@any_port
 @pytest.mark.parametrize("is_fast", [False, True])
 @pytest.mark.parametrize("period_s", [0.0, 0.005, 0.02, 0.03])
 def test_an_adapter_that_is_late_for_good_never_gives_an_old_value(
-    servos: Servos, is_fast: bool, period_s: float
+    kind: type[ScriptedPort], servos: Servos, is_fast: bool, period_s: float
 ) -> None:
     for lag_s in np.arange(0.0035, 0.4, 0.0035):
         servos = Servos()
         servos.late_s = dict.fromkeys(range(5, 200), float(lag_s))
-        port = ScriptedPort(servos)
+        port = kind(servos)
         cycle = GroupCycle(port, IDS, fast=is_fast)
         for k in range(40):
             port.clock.sleep_until_s(k * period_s)

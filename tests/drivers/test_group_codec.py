@@ -1,12 +1,14 @@
 """The vectorised packets of a cycle against the general codec, and against the SDK's reader."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.group_answer import GroupQuestion
 from drivers.group_write import GroupWrite
 from drivers.protocol.crc import crc16
+from drivers.protocol.group_frames import Frames, NumpyFrames, quickest_frames
 from drivers.protocol.packet import (
     BROADCAST_ID,
     HEADER,
@@ -21,6 +23,9 @@ HEADER_LIKE = int.from_bytes(b"\xff\xff\xfd\xff", "little", signed=True)
 raw_goals = st.integers(-(2**31), 2**31 - 1) | st.sampled_from([HEADER_LIKE, -1, -131073])
 nasty_block = st.lists(st.sampled_from([0xFF, 0xFD, 0, 7]), min_size=10, max_size=10).map(bytes)
 blocks = st.lists(nasty_block | st.binary(min_size=10, max_size=10), min_size=1, max_size=9)
+
+ALL_FRAMES = [NumpyFrames(), quickest_frames()]
+any_frames = pytest.mark.parametrize("frames", ALL_FRAMES, ids=["numpy", "quickest"])
 
 
 def plain(data: list[bytes], errors: list[int] | None = None) -> bytes:
@@ -45,41 +50,45 @@ def fast(
     return raw
 
 
+@any_frames
 @given(st.lists(raw_goals, min_size=1, max_size=9))
-def test_goals_are_a_sync_write_stuffed_where_needed(goals: list[int]) -> None:
+def test_goals_are_a_sync_write_stuffed_where_needed(frames: Frames, goals: list[int]) -> None:
     params = (116).to_bytes(2, "little") + b"\x04\x00"
     for k, goal in enumerate(goals):
         params += bytes([k + 1]) + goal.to_bytes(4, "little", signed=True)
     expected = encode_instruction(InstructionPacket(BROADCAST_ID, Instruction.SYNC_WRITE, params))
-    writer = GroupWrite(range(1, len(goals) + 1), 116)
+    writer = GroupWrite(range(1, len(goals) + 1), 116, frames)
     writer.encode(np.zeros(len(goals), np.int32))  # nothing of one packet stays in the next
     assert writer.encode(np.array(goals, np.int32)) == expected
 
 
+@any_frames
 @given(blocks)
-def test_plain_answers_with_any_stuffing(data: list[bytes]) -> None:
-    question = GroupQuestion(range(1, len(data) + 1), 126, 10, fast=False)
+def test_plain_answers_with_any_stuffing(frames: Frames, data: list[bytes]) -> None:
+    question = GroupQuestion(range(1, len(data) + 1), 126, 10, fast=False, frames=frames)
     answer = question.parse(plain(data))
     assert [row.tobytes() for row in answer.data] == data
     assert answer.valid.all()
     assert answer.clean
 
 
+@any_frames
 @given(blocks)
-def test_fast_answers_are_never_unstuffed(data: list[bytes]) -> None:
-    question = GroupQuestion(range(1, len(data) + 1), 126, 10, fast=True)
+def test_fast_answers_are_never_unstuffed(frames: Frames, data: list[bytes]) -> None:
+    question = GroupQuestion(range(1, len(data) + 1), 126, 10, fast=True, frames=frames)
     answer = question.parse(fast(data))
     assert [row.tobytes() for row in answer.data] == data
     assert answer.valid.all()
     assert answer.clean
 
 
+@any_frames
 @settings(derandomize=True)  # one damage in 65536 has a right CRC
 @given(blocks, st.booleans(), st.data())
 def test_what_is_valid_after_damage_is_what_was_sent(
-    data: list[bytes], is_fast: bool, draw: st.DataObject
+    frames: Frames, data: list[bytes], is_fast: bool, draw: st.DataObject
 ) -> None:
-    question = GroupQuestion(range(1, len(data) + 1), 126, 10, fast=is_fast)
+    question = GroupQuestion(range(1, len(data) + 1), 126, 10, fast=is_fast, frames=frames)
     raw = bytearray(fast(data) if is_fast else plain(data))
     start = draw.draw(st.integers(0, len(raw) - 1))
     del raw[start : start + draw.draw(st.integers(0, 5))]
@@ -110,10 +119,11 @@ def test_a_cut_fast_answer_gives_the_shares_before_the_cut() -> None:
     assert not answer.clean
 
 
-def test_the_error_byte_of_each_servo_comes_through() -> None:
+@any_frames
+def test_the_error_byte_of_each_servo_comes_through(frames: Frames) -> None:
     data = [bytes(10)] * 4
     for is_fast, build in ((False, plain), (True, fast)):
-        question = GroupQuestion([1, 2, 3, 4], 126, 10, fast=is_fast)
+        question = GroupQuestion([1, 2, 3, 4], 126, 10, fast=is_fast, frames=frames)
         answer = question.parse(build(data, [0, 0x80, 0x03, 0x87]))
         assert answer.error.tolist() == [0, 0x80, 0x03, 0x87]
         assert answer.valid.tolist() == [True, True, False, False]  # an alert still has values
@@ -143,3 +153,24 @@ def test_an_answer_of_another_length_is_not_this_questions() -> None:
     assert not answer.valid.any()
     fast_question = GroupQuestion([1, 2], 126, 11, fast=True)
     assert not fast_question.parse(fast([b"a" * 10, b"b" * 10])).valid.any()
+
+
+@pytest.mark.parametrize("is_fast", [False, True])
+@given(st.data())
+def test_compiled_and_numpy_refuse_and_accept_the_same(is_fast: bool, draw: st.DataObject) -> None:
+    data = [bytes([k]) * 10 for k in range(3)]
+    codes = draw.draw(st.lists(st.sampled_from([0, 0x80, 7]), min_size=3, max_size=3))
+    raw = bytearray(fast(data, codes) if is_fast else plain(data, codes))
+    for _ in range(draw.draw(st.integers(0, 1))):
+        raw[draw.draw(st.integers(0, len(raw) - 1))] = draw.draw(st.integers(0, 255))
+    one, other = (
+        GroupQuestion([1, 2, 3], 126, 10, fast=is_fast, frames=frames)._regular(
+            np.frombuffer(raw, np.uint8)
+        )
+        for frames in ALL_FRAMES
+    )
+    if one is None or other is None:
+        assert one is other
+        return
+    for field in ("data", "valid", "error", "answered"):
+        assert (getattr(one, field) == getattr(other, field)).all()

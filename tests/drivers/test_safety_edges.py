@@ -1,14 +1,18 @@
 """What mutation showed that no test noticed: small print of the judgement."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from config.loader import load_robot
 from config.run import SafetyConfig
-from drivers.safety import SafetyLimits
+from drivers.safety import SafetyLimits, SafetyMemory, vet
+from drivers.types import JointCommand
 
 from .test_safety_vet import (
     LIMITS,
+    NOW,
     J,
     TestVetoesAtTheirBoundary,
     judge,
@@ -70,3 +74,73 @@ def test_a_goal_far_away_is_a_number_all_the_same() -> None:
         verdict = judge(one(1e200, 1))
     assert verdict.veto is None
     assert verdict.clamped.tolist() == [False, True, False]
+
+
+def test_a_state_judged_before_is_still_watched_for_its_age() -> None:
+    now = state()
+    first = judge(0.05, now)
+    assert first.veto is None
+    assert first.memory.sound is not None
+    again = judge(0.05, now, first.memory, NOW + 0.1 + 1e-3)
+    assert again.veto == "joint 0: not read for 0.101 s"
+    assert judge(0.05, now, first.memory, NOW + 0.1 - 1e-3).veto is None
+
+
+def test_what_one_state_or_one_set_of_limits_kept_says_nothing_of_another() -> None:
+    first = judge(0.05, state())
+    assert judge(0.05, state(current_a=np.full(J, np.nan)), first.memory).veto is not None
+    now = state(position_rad=np.full(J, 0.3))
+    kept = judge(0.3, now, memory(0.3))
+    strict = replace(LIMITS, limit_rad=np.full(J, 0.05))
+    command = JointCommand(NOW, np.full(J, 0.3))
+    assert vet(command, now, kept.memory, LIMITS, NOW).veto is None
+    assert "forced beyond" in str(vet(command, now, kept.memory, strict, NOW).veto)
+
+
+def test_a_state_with_a_fault_is_judged_again_and_refused_again() -> None:
+    hot = state(temperature_c=np.full(J, 71.0))
+    first = judge(0.05, hot)
+    assert first.memory.sound is None
+    assert judge(0.05, hot, first.memory).veto == first.veto == "joint 0: 71 C: too hot"
+
+
+def test_lasting_over_current_is_no_sound_state_that_is_looked_at_only_once() -> None:
+    """The same reading again, later: the time since it began is judged by its own time."""
+    early = state(time_s=NOW - 1.0, current_a=one(3.0, 1))
+    begun = judge(0.0, early, now_s=NOW - 1.0)
+    assert begun.veto is None
+    assert begun.memory.over_current_since_s[1] == NOW - 1.0
+    later = judge(0.0, state(current_a=one(3.0, 1)), begun.memory)
+    assert later.veto == "joint 1: 3.00 A for too long"
+
+
+def test_limits_in_one_row_are_the_limits() -> None:
+    assert LIMITS.least.tolist() == [
+        *(-LIMITS.limit_rad - 0.2),
+        *[-np.finfo(float).max] * J,
+        *[-2.0] * J,
+        *[-np.inf] * J,
+        *[10.0] * J,
+    ]
+    assert LIMITS.most[: J + 1].tolist() == [*(LIMITS.limit_rad + 0.2), np.finfo(float).max]
+    assert LIMITS.most[2 * J :].tolist() == [2.0] * J + [70.0] * J + [14.8] * J
+
+
+def test_memory_at_rest_tells_that_no_current_was_too_high() -> None:
+    memory_at_rest = SafetyMemory.at_rest(state())
+    assert np.isnan(memory_at_rest.over_current_since_s).all()
+    with pytest.raises(ValueError, match="read-only"):
+        memory_at_rest.over_current_since_s[0] = NOW
+
+
+def test_the_joint_that_is_too_old_is_named_not_one_at_the_limit() -> None:
+    assert judge(now=state(age_s=np.array([0.1, 0.2, 0.0]))).veto == (
+        "joint 1: not read for 0.200 s"
+    )
+
+
+def test_a_joint_that_was_not_read_keeps_its_time_though_none_is_above_the_limit_now() -> None:
+    begun = replace(memory(), over_current_since_s=one(NOW - 0.3, 1, np.nan))
+    unread = state(valid=np.array([True, False, True]))
+    assert judge(now=unread, last=begun).memory.over_current_since_s[1] == NOW - 0.3
+    assert np.isnan(judge(last=begun).memory.over_current_since_s).all()

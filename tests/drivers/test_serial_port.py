@@ -1,10 +1,10 @@
 """The serial port on a pseudo terminal; the other end is the test."""
 
 import os
+import threading
 from collections.abc import Iterator
 
 import pytest
-import serial
 
 from config.errors import InputError
 from drivers.errors import PortError
@@ -98,20 +98,19 @@ def test_a_closed_port_says_so(pair: tuple[int, SerialPort]) -> None:
     port.write(b"x")
 
 
-@pytest.mark.parametrize("call", ["write", "read", "clear", "waiting"])
-def test_a_port_that_vanishes_is_a_port_error(
-    pair: tuple[int, SerialPort], monkeypatch: pytest.MonkeyPatch, call: str
-) -> None:
-    def gone(*_: object) -> None:
-        raise serial.SerialException("device reports readiness but returned no data")
-
-    port = pair[1]
-    for name in ("write", "read", "reset_input_buffer"):
-        monkeypatch.setattr(serial.Serial, name, gone)
-    monkeypatch.setattr(serial.Serial, "in_waiting", property(gone))
+@pytest.mark.parametrize("call", ["write", "read", "ask", "clear", "waiting"])
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_port_that_vanishes_is_a_port_error(call: str, compiled: bool) -> None:
+    master, slave = os.openpty()
+    port = SerialPort(os.ttyname(slave), 57_600)
+    os.close(slave)
+    os.close(master)
+    if not compiled:
+        port._exchange = None
     calls = {
         "write": lambda: port.write(b"x"),
         "read": lambda: port.read_until(1, 0.0),
+        "ask": lambda: port.ask(b"x", 1, 1.0),
         "clear": port.clearPort,
         "waiting": port.getBytesAvailable,
     }
@@ -119,6 +118,65 @@ def test_a_port_that_vanishes_is_a_port_error(
     with pytest.raises(PortError, match="the port is gone"):
         calls[call]()
     assert not port.is_using
+    port.closePort()
+
+
+@pytest.fixture(params=[True, False], ids=["compiled", "python"])
+def asking(pair: tuple[int, SerialPort], request: pytest.FixtureRequest) -> tuple[int, SerialPort]:
+    if not request.param:
+        pair[1]._exchange = None
+    elif pair[1]._exchange is None:
+        pytest.skip("numba is not installed")
+    return pair
+
+
+def servo(master: int, request: bytes, *answers: bytes) -> threading.Thread:
+    """Answers piece by piece once the whole request is there."""
+
+    def serve() -> None:
+        heard = b""
+        while len(heard) < len(request):
+            heard += os.read(master, 4096)
+        for answer in answers if heard == request else ():
+            os.write(master, answer)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    return thread
+
+
+def test_an_exchange_forgets_what_came_before_it(asking: tuple[int, SerialPort]) -> None:
+    master, port = asking
+    os.write(master, b"an older answer")
+    thread = servo(master, b"question", b"a" * 100, b"b" * 64, b"c" * 64, b"d" * 72)
+    whole = b"a" * 100 + b"b" * 64 + b"c" * 64 + b"d" * 72
+    assert port.ask(b"question", 300, 5.0) == whole
+    thread.join()
+
+
+def test_an_exchange_ends_at_its_deadline_with_what_came(asking: tuple[int, SerialPort]) -> None:
+    master, port = asking
+    thread = servo(master, b"question", b"short")
+    now = port.clock.now_s()
+    assert port.ask(b"question", 300, 0.2) == b"short"
+    assert port.clock.now_s() >= now + 0.2
+    thread.join()
+
+
+def test_an_exchange_takes_no_more_than_it_asked_for(asking: tuple[int, SerialPort]) -> None:
+    master, port = asking
+    thread = servo(master, b"question", b"answer and more")
+    assert port.ask(b"question", 6, 5.0) == b"answer"
+    assert port.read_until(9, port.clock.now_s() + 5.0) == b" and more"
+    thread.join()
+
+
+def test_a_question_longer_than_the_devices_buffer(asking: tuple[int, SerialPort]) -> None:
+    master, port = asking
+    question = bytes(range(256)) * 80
+    thread = servo(master, question, b"answer")
+    assert port.ask(question, 6, 5.0) == b"answer"
+    thread.join()
 
 
 def test_no_latency_timer_on_a_pseudo_terminal(pair: tuple[int, SerialPort]) -> None:

@@ -1,0 +1,97 @@
+"""From image to skeleton: time on one core, and error on films whose truth is known.
+
+The paper's own implementation took 45 s for an image of 1.6 megapixels ([PT] 3).
+"""
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import cv2
+import numpy as np
+
+from benchmarks.rows import Row, cpu_s
+from controller.capture.accuracy import distance, swapped
+from controller.capture.capture import capture
+from controller.capture.equipartition import equipartition
+from controller.capture.eye import Eye, open_eye
+from controller.capture.render import Scene, empty, film, true_midlines
+from controller.capture.silhouette import Look
+
+TITLE = "Capture: image to skeleton on one core, and its error on rendered films"
+
+PAPER_S = 45.0
+WANTED_S = 0.05
+CAMERA_S = 1.0 / 30.0
+SIZES_PX = (20.0, 50.0, 150.0, 400.0)
+PLAIN = Scene(frames=60, wave_hz=0.6)
+CONDITIONS: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "noise 8": {"noise": 8.0},
+    "blur 1.5 px": {"blur_px": 1.5},
+    "uneven light": {"light": 0.4},
+    "shadow": {"shadow": 0.3},
+    "all at once": {
+        "noise": 6.0,
+        "blur_px": 1.2,
+        "light": 0.3,
+        "shadow": 0.25,
+        "texture": 5.0,
+    },
+}
+
+
+def run() -> list[Row]:
+    """Measure."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        return [*_times(), *_errors()]
+    finally:
+        cv2.setNumThreads(threads)
+
+
+def _times() -> list[Row]:
+    found = []
+    for name, scene, wanted in (
+        ("1.6 megapixels", Scene(rows=1080, columns=1480, length_px=700.0, frames=1), WANTED_S),
+        ("640 x 480", Scene(length_px=250.0, frames=1), CAMERA_S),
+    ):
+        image, ground = next(film(scene)), empty(scene)
+        for kind in ("grey", "colour"):
+            seen, behind = image, ground
+            if kind == "colour":
+                seen, behind = np.dstack([image] * 3), np.dstack([ground] * 3)
+            eye = Eye(behind, Look.DARK, "given")
+            spent_s = cpu_s(partial(eye.see, seen), 5)
+            against = f"{wanted * 1e3:.0f} ms"
+            found.append(
+                Row(f"{name}, {kind}", spent_s * 1e3, "ms", against, spent_s / wanted, 1.0)
+            )
+            if wanted == WANTED_S and kind == "grey":
+                found.append(Row("the same", spent_s * 1e3, "ms", "paper 45 s", spent_s / PAPER_S))
+    body = true_midlines(replace(PLAIN, frames=1))[0]
+    spent_s = cpu_s(lambda: equipartition(body, 100), 20)
+    found.append(Row("equipartition, 100 chords", spent_s * 1e3, "ms"))
+    return found
+
+
+def _errors() -> list[Row]:
+    found = []
+    frames = swaps = 0
+    for name, change in CONDITIONS.items():
+        for length_px in SIZES_PX:
+            scene = replace(PLAIN, length_px=length_px, **change)
+            truth = true_midlines(scene)
+            images = list(film(scene))
+            seen = capture(images, open_eye(images[::5]), scene.rate_hz)
+            good = np.flatnonzero(seen.good)
+            away = float(np.median([distance(seen.points_px[k], truth[k]) for k in good]))
+            frames += len(good)
+            swaps += sum(swapped(seen.points_px[k], truth[k]) for k in good)
+            part = away / length_px
+            what = f"{name}, {length_px:g} px, {len(good)} of {len(images)} frames"
+            found.append(Row(what, away, "px", "1 % of the body", part / 0.01, 1.0))
+    share = swaps / frames / 0.001
+    found.append(Row(f"head and tail swapped, of {frames}", swaps, "frames", "0.1 %", share, 1.0))
+    return found

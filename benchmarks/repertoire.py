@@ -1,0 +1,88 @@
+"""Replay of recorded actions against the physics that they were recorded from ([YT] Table 1).
+
+A frame is 1/60 s. The physics frame is all that the simulated robot needs for one: a bus cycle
+(read and write), its servos, safety, and eight steps of the body. A body-frame of the replay is the
+new body frame and all link centres of one body. Both in one run, on one core.
+"""
+
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.rows import Row, cpu_s
+from config.loader import load_robot, load_world
+from controller.app.repertoire_physics import FRAME_S, PhysicsBody
+from controller.app.repertoire_planning import plan_route
+from controller.app.repertoire_recording import ACTIONS, record
+from controller.app.repertoire_timing import search_cost
+from controller.repertoire.crowd import Crowd
+from controller.repertoire.repertoire import Repertoire
+
+TITLE = "Repertoire: 17 links, 60 frames a second, one core"
+
+PAPER = 4000.0
+BODIES = 10_000
+FRAMES = 60
+TRIES = 5
+CANDIDATES = 8
+
+
+def run() -> list[Row]:
+    """Measure."""
+    robot, world = load_robot("yaw16"), load_world("flat")
+    repertoire = record(robot, world)
+    physics_s = physics_frame_s(repertoire)
+    seen_s, hidden_s = (crowd_second_s(repertoire, visible) for visible in (True, False))
+    frame_s = seen_s / (BODIES * FRAMES)
+    fits = physics_s / frame_s
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "repertoire.npz"
+        repertoire.save(file)
+        cost = search_cost(plan_route("flat-slalom", file), CANDIDATES)
+    return [
+        Row("one frame of the simulated robot", physics_s * 1e6, "us"),
+        Row("one body-frame of the replay", frame_s * 1e9, "ns"),
+        Row("4,000 body-frames", PAPER * frame_s * 1e6, "us", "a physics frame", PAPER / fits, 1.0),
+        Row("body-frames in a physics frame", fits, ""),
+        Row("a second of 10,000 bodies, seen", seen_s * 1e3, "ms", "1 s", seen_s, 1.0),
+        Row("the same, none in view", hidden_s * 1e3, "ms", "1 s", hidden_s),
+        Row("search: a candidate", cost.candidate_s * 1e6, "us"),
+        Row("a candidate run on the physics", cost.physics_candidate_s * 1e3, "ms"),
+        Row(
+            "4,000 candidates of the search", PAPER * cost.candidate_s * 1e3, "ms",
+            "one on the physics", PAPER / cost.ratio, 1.0,
+        ),
+        Row("candidates in one on the physics", cost.ratio, ""),
+        Row("the whole search", cost.candidates * cost.candidate_s * 1e3, "ms"),
+        Row("the same on the physics, extrapolated", cost.physics_search_s, "s"),
+    ]  # fmt: skip
+
+
+def physics_frame_s(repertoire: Repertoire) -> float:
+    """CPU time of a frame of the simulated robot, least mean of ``TRIES`` cycles."""
+    segment = repertoire.segments[[action.name for action in ACTIONS].index("forward-fast")]
+    robot, world = load_robot(repertoire.robot), load_world(repertoire.world)
+    best = float("inf")
+    with PhysicsBody(robot, world, segment.goal_rad[0]) as body:
+        for _ in range(TRIES):
+            begun = time.process_time()
+            for goal in segment.goal_rad:
+                body.frame(goal)
+            best = min(best, (time.process_time() - begun) / segment.frames)
+    return best
+
+
+def crowd_second_s(repertoire: Repertoire, visible: bool) -> float:
+    """CPU time in which ``BODIES`` bodies go on by a second; they change actions meanwhile."""
+    crowd = Crowd(repertoire, BODIES)
+    crowd.visible[:] = visible
+    crowd.stagger()
+    random = np.random.default_rng(0)
+
+    def second() -> None:
+        crowd.segment[:] = random.integers(len(repertoire.segments), size=BODIES)
+        crowd.step(round(1.0 / FRAME_S))
+
+    return cpu_s(second, 1, TRIES)

@@ -1,0 +1,200 @@
+"""A pole to hold and a pipe to press against: their geometry, and how a coiled body is put there.
+
+Bodies touch them with MuJoCo's own cone (``condim`` 3), since an isotropic friction knows no
+direction along a body. The floor keeps the anisotropic friction of ``sim.physics.friction``.
+"""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+
+from config.robot import RobotConfig
+from config.world import PipeObstacle, PoleObstacle, WorldConfig
+from sim.physics.mechanics import Mechanics
+
+Floats = NDArray[np.float64]
+
+STAVES = 24
+"""Of which a pipe is made: its wall is flat by less than 1 % of its radius."""
+STAVE_M = 0.02
+CLEAR_M = 0.2
+"""Between the floor and what lies level, on the outside."""
+TAIL_UP_M = 0.01
+"""Of the lowest link above the floor at the start."""
+WINDS_RAD = 2.0
+"""A body that goes less far round its own axis is no coil."""
+
+
+@dataclass(frozen=True, slots=True)
+class Coil:
+    """A cylinder through the links of a body."""
+
+    axis: Floats
+    """(3,) unit, from tail to head."""
+    centre_m: Floats
+    """(3,) on the axis, beside the middle of the body."""
+    radius_m: Floats
+    """(L,) distance of each link's centre from the axis."""
+    wound_rad: float
+    """How far the body goes round."""
+
+
+def obstacle_mjcf(world: WorldConfig) -> tuple[str, str]:
+    """Options and geoms of the world's obstacle, as MJCF; empty where there is none."""
+    thing = world.obstacle
+    if thing is None:
+        return "", ""
+    common = f'contype="1" conaffinity="2" condim="3" priority="1" friction="{thing.friction!r}"'
+    turn = np.eye(3) if thing.upright else np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]])
+    middle = _middle_m(thing)
+    if isinstance(thing, PoleObstacle):
+        staves = [(np.zeros(3), 0.0, f"{thing.radius_m!r} {thing.length_m / 2!r}")]
+        kind, colour = "cylinder", "0.55 0.42 0.30 1"
+    else:
+        kind, colour = "box", "0.55 0.68 0.78 0.22"
+        half = (thing.radius_m + STAVE_M) * math.tan(math.pi / STAVES)
+        out = thing.radius_m + STAVE_M / 2
+        size = f"{STAVE_M / 2!r} {half!r} {thing.length_m / 2!r}"
+        staves = [
+            (out * np.array([math.cos(a), math.sin(a), 0.0]), a, size)
+            for a in 2.0 * math.pi * np.arange(STAVES) / STAVES
+        ]
+    text = ""
+    for k, (place, angle, size) in enumerate(staves):
+        c, s = math.cos(angle), math.sin(angle)
+        axes = turn @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        xyxes = " ".join(repr(float(v)) for v in (*axes[:, 0], *axes[:, 1]))
+        pos = " ".join(repr(float(v)) for v in middle + turn @ place)
+        text += (
+            f'<geom name="obstacle{k}" type="{kind}" size="{size}" pos="{pos}" xyaxes="{xyxes}" '
+            f'rgba="{colour}" {common}/>'
+        )
+    return ' cone="elliptic" impratio="10"', text
+
+
+def _middle_m(thing: PoleObstacle | PipeObstacle) -> Floats:
+    outer = thing.radius_m + (STAVE_M if isinstance(thing, PipeObstacle) else 0.0)
+    height = thing.length_m / 2 if thing.upright else outer + CLEAR_M
+    return np.array([*thing.at_m, height])
+
+
+def fit_coil(links_m: Floats) -> Coil:
+    """Cylinder through points (L, 3) of a helix: least squares on the distances from its axis."""
+    bends = np.diff(links_m, n=2, axis=0)
+    axis = np.linalg.svd(bends)[2][2] if np.abs(bends).max() > 1e-9 else links_m[0] - links_m[-1]
+    axis = axis / np.linalg.norm(axis)
+    side = np.linalg.svd(axis[None])[2][1:]
+    middle = links_m.mean(axis=0)
+
+    def distances(x: Floats) -> Floats:
+        away = links_m - middle - x[2:4] @ side
+        line = axis + x[:2] @ side
+        line = line / np.linalg.norm(line)
+        return np.asarray(np.linalg.norm(away - (away @ line)[:, None] * line, axis=1))
+
+    def spread(x: Floats) -> Floats:
+        d = distances(x)
+        return np.asarray(d - d.mean())
+
+    start = np.zeros(4)
+    if np.abs(bends).max() > 1e-9:
+        start = least_squares(spread, start, x_scale=0.1).x
+    line = axis + start[:2] @ side
+    line /= np.linalg.norm(line)
+    line *= math.copysign(1.0, float(line @ (links_m[0] - links_m[-1])))
+    centre = middle + start[2:4] @ side
+    around = np.linalg.svd(line[None])[2][1:]
+    x, y = around @ (links_m - centre).T
+    wound = np.unwrap(np.arctan2(y, x))
+    winds = abs(float(wound[-1] - wound[0])) if np.hypot(x, y).min() > 1e-6 else 0.0
+    return Coil(line, centre, distances(start), winds)
+
+
+def place_at(
+    m: Mechanics, robot: RobotConfig, world: WorldConfig, heading_rad: float, joint_rad: ArrayLike
+) -> bool:
+    """Put a coiled body round the world's pole, or any body into its pipe; head up, at rest.
+
+    The coil is opened, or drawn together, until it just touches: the servos close it. Returns
+    False, and does nothing, where there is no obstacle, or a pole and no coil.
+
+    Raises:
+        ValueError: ``joint_rad`` is not (J,).
+
+    """
+    thing, q = world.obstacle, np.asarray(joint_rad, dtype=float)
+    if thing is None:
+        return False
+    if q.shape != (m.joint_count,):
+        raise ValueError(f"joint_rad has shape {q.shape}; the robot has {m.joint_count} joints")
+    coil = fit_coil(_links_m(m, q))
+    winds = coil.wound_rad >= WINDS_RAD
+    if isinstance(thing, PoleObstacle) and not winds:
+        return False
+    if winds:
+        q = _touching(m, robot, thing, q)
+        coil = fit_coil(_links_m(m, q))
+    up = np.array([0.0, 0.0, 1.0]) if thing.upright else np.array([1.0, 0.0, 0.0])
+    turn = _rotation(coil.axis, up, heading_rad)
+    place = _middle_m(thing) - turn @ coil.centre_m
+    links = _links_m(m, q) @ turn.T + place
+    if thing.upright:
+        place[2] += robot.body_radius_m + TAIL_UP_M - links[:, 2].min()
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, turn.ravel())
+    mujoco.mj_resetData(m.model, m.data)
+    m.data.qpos[:3], m.data.qpos[3:7], m.data.qpos[7:] = place, quaternion, q
+    mujoco.mj_forward(m.model, m.data)
+    m.rest()
+    return True
+
+
+def _links_m(m: Mechanics, joint_rad: Floats) -> Floats:
+    """(L, 3) centres of the links, the head at 0 along x."""
+    m.data.qpos[:7] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
+    m.data.qpos[7:] = joint_rad
+    mujoco.mj_kinematics(m.model, m.data)
+    links: Floats = m.data.xipos[1:].copy()
+    return links
+
+
+def _touching(
+    m: Mechanics, robot: RobotConfig, thing: PoleObstacle | PipeObstacle, q: Floats
+) -> Floats:
+    """Scale the bends of a coil so that it clears the obstacle by no more than a hair."""
+    pole = isinstance(thing, PoleObstacle)
+    wanted = thing.radius_m + (1.0 if pole else -1.0) * robot.body_radius_m
+
+    def clears(scale: float) -> bool:
+        radius = fit_coil(_links_m(m, scale * q)).radius_m
+        return bool(radius.min() >= wanted if pole else radius.max() <= wanted)
+
+    if clears(1.0):
+        return q
+    good, bad = (0.4, 1.0) if pole else (2.5, 1.0)
+    for _ in range(20):
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if clears(middle) else (good, middle)
+    return good * q
+
+
+def _rotation(line: Floats, up: Floats, about_rad: float) -> Floats:
+    """(3, 3) that turns unit ``line`` to ``up``, then about it."""
+    cross, dot = np.cross(line, up), float(line @ up)
+    if dot < -1.0 + 1e-9:
+        side = np.linalg.svd(up[None])[2][1]
+        first = 2.0 * np.outer(side, side) - np.eye(3)
+    else:
+        k = _skew(cross)
+        first = np.eye(3) + k + k @ k / (1.0 + dot)
+    k = _skew(up)
+    second = np.eye(3) + math.sin(about_rad) * k + (1.0 - math.cos(about_rad)) * k @ k
+    return np.asarray(second @ first)
+
+
+def _skew(v: Floats) -> Floats:
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

@@ -1,0 +1,122 @@
+"""Water: every link is dragged across and along itself, and carried.
+
+Resistive drag, quadratic in the speed, each component by itself (E. Kelasidi, K. Y. Pettersen,
+J. T. Gravdahl, P. Liljeback, Modeling of underwater snake robots, ICRA 2014; the cross-flow
+principle of G. I. Taylor, Proc. R. Soc. A 214, 1952). Per metre of a body of radius r:
+
+    across: 1/2 rho C_D 2 r |v_n| v_n        along: 1/2 rho C_F pi r |v_t| v_t
+
+``v_n`` is a vector across the link: its size, not each component's, enters. A link is dragged at
+the two Gauss points of its length, which is exact for the drag of a cubic in the place, so turning
+links are braked too. Added mass is left out: MuJoCo's bodies weigh the same in all directions.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import RobotConfig
+from config.world import WaterGround, WorldConfig
+
+Floats = NDArray[np.float64]
+
+GAUSS = 0.5 / math.sqrt(3.0)
+"""Of a link's length, from its middle."""
+
+
+def water_constants(world: WorldConfig, robot: RobotConfig, gravity_m_s2: float = 9.81) -> Floats:
+    """Drag across and along of half a link, kg/m; a Gauss point's arm, radius and surface, m; lift.
+
+    The lift is that of a link under water, N. All zero where the world is dry.
+    """
+    water = world.ground
+    if not isinstance(water, WaterGround):
+        return np.zeros(6)
+    r, half = robot.body_radius_m, 0.5 * robot.link_length_m
+    return np.array(
+        [
+            0.5 * water.density_kg_m3 * water.drag_across * 2.0 * r * half,
+            0.5 * water.density_kg_m3 * water.drag_along * math.pi * r * half,
+            GAUSS * robot.link_length_m,
+            r,
+            water.depth_m,
+            water.buoyancy * robot.link_mass_kg * gravity_m_s2,
+        ]
+    )
+
+
+def immersed(height_m: float, radius_m: float, surface_m: float) -> float:
+    """Share of a ball's volume under the surface, its centre at a height."""
+    x = min(max((surface_m - height_m + radius_m) / (2.0 * radius_m), 0.0), 1.0)
+    return x * x * (3.0 - 2.0 * x)
+
+
+def floating_height_m(water: WaterGround, radius_m: float) -> float:
+    """Height of a link's centre at which water carries it: the surface's, or half the depth.
+
+    A body that is heavier than its water lies on the bottom.
+    """
+    if water.buoyancy < 1.0:
+        return radius_m
+    if water.buoyancy == 1.0:
+        return max(0.5 * water.depth_m, radius_m)
+    low, high = -radius_m, radius_m
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if water.buoyancy * immersed(middle, radius_m, 0.0) > 1.0:
+            low = middle
+        else:
+            high = middle
+    return max(water.depth_m + low, radius_m)
+
+
+def add_water(
+    wrench: Floats,
+    centre: Floats,
+    rotation: Floats,
+    v: Floats,
+    w: Floats,
+    water: Floats,
+    step_s: float,
+) -> float:
+    """Add drag and lift to the links' wrenches; returns the energy lost in the step, J.
+
+    Args:
+        wrench: (L, 6) force, and torque about the world's origin; changed.
+        centre: (L, 3) of the links.
+        rotation: (L, 9) rows of their rotations.
+        v: (L, 3) velocity of the centres, world.
+        w: (L, 3) spins, world.
+        water: ``water_constants``.
+        step_s: length of the step.
+
+    """
+    across, along, arm = water[0], water[1], water[2]
+    radius, surface, lift = water[3], water[4], water[5]
+    lost = 0.0
+    for i in range(len(wrench)):
+        wet = immersed(centre[i, 2], radius, surface)
+        wrench[i, 2] += wet * lift
+        wrench[i, 3] += centre[i, 1] * wet * lift
+        wrench[i, 4] -= centre[i, 0] * wet * lift
+        e0, e1, e2 = rotation[i, 0], rotation[i, 3], rotation[i, 6]
+        for side in (-1.0, 1.0):
+            r0, r1, r2 = side * arm * e0, side * arm * e1, side * arm * e2
+            s0 = v[i, 0] + w[i, 1] * r2 - w[i, 2] * r1
+            s1 = v[i, 1] + w[i, 2] * r0 - w[i, 0] * r2
+            s2 = v[i, 2] + w[i, 0] * r1 - w[i, 1] * r0
+            slide = s0 * e0 + s1 * e1 + s2 * e2
+            n0, n1, n2 = s0 - slide * e0, s1 - slide * e1, s2 - slide * e2
+            d_n = -wet * across * math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+            d_t = -wet * along * abs(slide) * slide
+            f0, f1, f2 = d_n * n0 + d_t * e0, d_n * n1 + d_t * e1, d_n * n2 + d_t * e2
+            lost -= (f0 * s0 + f1 * s1 + f2 * s2) * step_s
+            p0, p1, p2 = centre[i, 0] + r0, centre[i, 1] + r1, centre[i, 2] + r2
+            wrench[i, 0] += f0
+            wrench[i, 1] += f1
+            wrench[i, 2] += f2
+            wrench[i, 3] += p1 * f2 - p2 * f1
+            wrench[i, 4] += p2 * f0 - p0 * f2
+            wrench[i, 5] += p0 * f1 - p1 * f0
+    return lost
