@@ -98,6 +98,8 @@ def _kind(annotation: Any) -> str:
         return (
             f"list of {inner[0]}" if Ellipsis in get_args(annotation) else f"[{', '.join(inner)}]"
         )
+    if get_origin(annotation) is dict:
+        return "table"
     names = {float: "number", int: "whole number", str: "text", bool: "true or false"}
     return names.get(annotation, str(annotation))
 

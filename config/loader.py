@@ -8,12 +8,13 @@ from typing import Any, Literal, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from config.errors import ConfigError
+from config.gait import GaitSetConfig
 from config.robot import RobotConfig
 from config.run import RunConfig
 from config.world import WorldConfig
 
 M = TypeVar("M", bound=BaseModel)
-Kind = Literal["robots", "worlds", "runs", "recordings"]
+Kind = Literal["robots", "worlds", "runs", "recordings", "gaits"]
 
 
 def shipped(kind: Kind) -> tuple[str, ...]:
@@ -81,6 +82,11 @@ def load_world(name_or_path: str, beside: Path | None = None) -> WorldConfig:
 def load_run(name_or_path: str) -> RunConfig:
     """Load a run by shipped name or path."""
     return load(locate("runs", name_or_path), RunConfig)
+
+
+def load_gait(name_or_path: str) -> GaitSetConfig:
+    """Load a set of gait parameters by shipped name or path."""
+    return load(locate("gaits", name_or_path), GaitSetConfig)
 
 
 def digest(*models: BaseModel) -> str:

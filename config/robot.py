@@ -34,6 +34,13 @@ class RobotConfig(Strict):
     )
     link_length_m: float = Field(0.07, gt=0.005, le=1.0, description="joint axis to joint axis")
     body_radius_m: float = Field(0.03, gt=0.002, le=0.5)
+    body_profile: tuple[float, ...] | None = Field(
+        None,
+        min_length=2,
+        max_length=200,
+        description="radii over body_radius_m at equal stations, head to tail, each over "
+        "0.05 and at most 1; for the look and the ground step (snakewalk body measures it)",
+    )
     link_mass_kg: float = Field(0.11, gt=0.001, le=20.0)
     yaw_limit_rad: float = Field(1.5, gt=0.05, le=3.1)
     pitch_limit_rad: float = Field(1.2, gt=0.05, le=3.1)
@@ -49,6 +56,12 @@ class RobotConfig(Strict):
             raise ValueError(f"servo IDs would run to {last}; the bus has 0 to 252")
         return self
 
+    @model_validator(mode="after")
+    def _profile_is_relative(self) -> Self:
+        if any(not 0.05 < radius <= 1.0 for radius in self.body_profile or ()):
+            raise ValueError("body_profile must be over 0.05 and at most 1 everywhere")
+        return self
+
     @property
     def joint_count(self) -> int:
         """Number of servos J; the chain has J + 1 links."""
@@ -58,6 +71,17 @@ class RobotConfig(Strict):
     def length_m(self) -> float:
         """Body length: J + 1 links."""
         return self.link_length_m * (self.joint_count + 1)
+
+    def radii_m(self, stations: int) -> tuple[float, ...]:
+        """Body radius at ``stations`` (1 or more) equal places from head tip to tail tip."""
+        profile = self.body_profile or (1.0,)
+        radii = []
+        for k in range(stations):
+            at = k / max(stations - 1, 1) * (len(profile) - 1)
+            low = min(int(at), max(len(profile) - 2, 0))
+            high = min(low + 1, len(profile) - 1)
+            radii.append(profile[low] + (at - low) * (profile[high] - profile[low]))
+        return tuple(self.body_radius_m * radius for radius in radii)
 
     @property
     def servo_ids(self) -> tuple[int, ...]:

@@ -1,12 +1,14 @@
 """What a run is: robot, world, recording, waypoints, motion and safety, by name or by path."""
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from config.base import Strict
+from config.camera import CameraConfig, PoseName
+from config.gait import GaitConfig
 
-MotionName = Literal["walk", "walk-printed", "walk-blind", "serpenoid"]
+MotionName = Literal["walk", "walk-printed", "walk-blind", "serpenoid", "gait", "repertoire"]
 
 
 class StatesConfig(Strict):
@@ -65,7 +67,9 @@ class RunConfig(Strict):
     world: str = Field("flat", description="a shipped world's name or a TOML path")
     track: str = Field("worm-like", description="a shipped recording's name or a file")
     motion: MotionName = "walk"
-    waypoints_m: tuple[tuple[float, float], ...] = Field(min_length=1)
+    waypoints_m: tuple[tuple[float, float], ...] = Field(
+        (), description="in order; every motion but a gait needs one"
+    )
     start_m: tuple[float, float] = Field((0.0, 0.0), description="where the head starts")
     start_heading_rad: float | None = Field(None, description="default: towards the path")
     waypoint_radius_m: float = Field(0.3, gt=0.0)
@@ -77,3 +81,16 @@ class RunConfig(Strict):
     walk: WalkConfig = WalkConfig()
     behaviour: BehaviourConfig = BehaviourConfig()
     safety: SafetyConfig = SafetyConfig()
+    gait: GaitConfig | None = None
+    pose: PoseName | None = Field(
+        None, description="what measures the head; default: the simulator, on servos the joints"
+    )
+    camera: CameraConfig = CameraConfig()
+
+    @model_validator(mode="after")
+    def _motion_has_its_table(self) -> Self:
+        if self.motion == "gait" and self.gait is None:
+            raise ValueError("motion gait needs a table [gait] with its name")
+        if self.motion != "gait" and not self.waypoints_m:
+            raise ValueError("waypoints_m: at least one is needed")
+        return self

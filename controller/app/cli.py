@@ -6,17 +6,25 @@ from pathlib import Path
 import typer
 
 from config.errors import InputError
+from controller.app.commands.analyse import analyse
+from controller.app.commands.body import body
 from controller.app.commands.bus import serve, sniff
 from controller.app.commands.bus_set import bus_set
+from controller.app.commands.capture import capture
 from controller.app.commands.doctor import doctor
+from controller.app.commands.fish import film, match, synthesise
+from controller.app.commands.gait import list_gaits, run_gait, show_gait
 from controller.app.commands.listing import list_
 from controller.app.commands.plan import plan
+from controller.app.commands.repertoire import record, run_plan, show_file
 from controller.app.commands.replay import replay
 from controller.app.commands.report import report
 from controller.app.commands.run import run
 from controller.app.commands.scan import scan
+from controller.app.commands.sweep import sweep
 from controller.app.commands.track import track
 from controller.app.commands.trials import trials
+from controller.app.commands.tune import tune
 from controller.app.commands.walk import walk
 from drivers.errors import DriverError
 
@@ -33,16 +41,41 @@ def _examples(*lines: str) -> str:
 
 
 app.command("list", epilog=_examples("list --json"))(list_)
-app.command(epilog=_examples("plan", "plan flat-slalom --motion serpenoid --json"))(plan)
+app.command(
+    epilog=_examples(
+        "plan",
+        "plan flat-slalom --motion serpenoid --json",
+        "plan flat-slalom --with repertoire -o plan.json --run",
+    )
+)(plan)
 app.command(
     epilog=_examples("run", "run flat-slalom --seed 3", "run my-run.toml --port /dev/ttyUSB0")
 )(run)
 app.command(epilog=_examples("report runs/flat-square-walk-seed0/log.mcap"))(report)
 app.command(epilog=_examples("replay runs/flat-square-walk-seed0/log.mcap --json"))(replay)
 app.command(
+    epilog=_examples(
+        "sweep sidewinding rolling --points 30 -o sweep.csv --picture sweep.png",
+        "sweep --dask tcp://cluster:8786 --points 500",
+    )
+)(sweep)
+app.command(
+    epilog=_examples("tune sidewinding --for speed --out mine.toml", "gait run mine.toml")
+)(tune)
+app.command(
     epilog=_examples("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json")
 )(trials)
 app.command(epilog=_examples("track", "track MIDLINES.csv --rate 60 --picture track.png"))(track)
+app.command(epilog=_examples("analyse worm-like", "analyse MIDLINES.csv --picture ."))(analyse)
+app.command(
+    epilog=_examples("body worm-like -o worm.glb", "body TRACK.npz --image 0.png -o b.obj")
+)(body)
+app.command(
+    epilog=_examples(
+        "capture film.mp4 -o track.npz --length-m 0.4 --sheet sheet.png",
+        "capture frames/ --cropped --overlay overlay.mp4 --force --json",
+    )
+)(capture)
 app.command(
     epilog=_examples("walk", "walk --graph er:1000:9 --rule snake --rule stack --repeats 30 --json")
 )(walk)
@@ -64,6 +97,48 @@ bus.command(
     )
 )(serve)
 bus.command(epilog=_examples("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))(sniff)
+gait_app = typer.Typer(no_args_is_help=True, help="Gaits: list, show, run.")
+app.add_typer(gait_app, name="gait")
+gait_app.command("list", epilog=_examples("gait list --json"))(list_gaits)
+gait_app.command(
+    "show", epilog=_examples("gait show sidewinding", "gait show rolling --picture rolling.png")
+)(show_gait)
+gait_app.command(
+    "run",
+    epilog=_examples(
+        "gait run sidewinding --param lift_rad=0.15 --seconds 10",
+        "gait run lateral-undulation --robot yaw16 --live",
+        "gait run rolling --port /dev/ttyUSB0",
+    ),
+)(run_gait)
+
+fish_app = typer.Typer(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
+app.add_typer(fish_app, name="fish")
+fish_app.command(
+    epilog=_examples(
+        "fish match top.mp4 --side side.mp4 -o postures.npz",
+        "fish match tank/top --background tank/top-background.png --picture match.png",
+    )
+)(match)
+fish_app.command(
+    epilog=_examples(
+        "fish synthesise postures.npz --seconds 30 --seed 1 -o track.npz",
+        "fish synthesise postures.npz --through 3,0 --through 5,3 --mirror",
+    )
+)(synthesise)
+fish_app.command(
+    epilog=_examples("fish film tank --side", "fish film eel --motion MIDLINES.csv --build eel")
+)(film)
+repertoire = typer.Typer(no_args_is_help=True, help="Actions recorded from the physics.")
+app.add_typer(repertoire, name="repertoire")
+repertoire.command(
+    "record", epilog=_examples("repertoire record", "repertoire record -o yaw16.npz --json")
+)(record)
+repertoire.command("show", epilog=_examples("repertoire show repertoire-yaw16-flat.npz"))(show_file)
+repertoire.command(
+    "run",
+    epilog=_examples("repertoire run plan.json", "repertoire run plan.json --open-loop --json"),
+)(run_plan)
 
 
 def main() -> None:

@@ -12,8 +12,9 @@ from config.robot import RobotConfig
 from config.run import RunConfig
 from controller.runtime.advance import AdvanceWatch
 from controller.runtime.body import BodyView, body_in_world
+from controller.runtime.derating import Derating
+from controller.runtime.guide import Guide
 from controller.runtime.loop import Tick, ticks
-from controller.runtime.pilot import Pilot
 from controller.runtime.ramp import Ramp
 from drivers.clock import Clock
 from drivers.errors import SafetyTrippedError
@@ -29,7 +30,7 @@ _SETTLE_S = 0.3
 class Watcher(Protocol):
     """Told of every cycle: a progress bar, a film recorder."""
 
-    def cycle(self, time_s: float, pilot: Pilot, speed_m_s: float) -> None:
+    def cycle(self, time_s: float, pilot: Guide, speed_m_s: float) -> None:
         """After the command of a cycle has been sent."""
         ...
 
@@ -43,6 +44,8 @@ class Outcome:
     duration_s: float
     alarms: int
     tripped: str | None
+    least_rate: float = 1.0
+    """Lowest rate to which derating slowed the motion."""
 
     def complete(self, waypoints: int) -> bool:
         """Whether every waypoint was reached without a trip."""
@@ -58,24 +61,27 @@ class Drive:
         link: SafeLink,
         clock: Clock,
         pose: PoseSource,
-        pilot: Pilot,
+        pilot: Guide,
         log: RunLog,
         robot: RobotConfig,
         run: RunConfig,
         gain: float,
         watchers: tuple[Watcher, ...] = (),
         wire_busy_s: Callable[[], float] = lambda: float("nan"),
+        say: Callable[[str], None] = lambda text: None,
     ) -> None:
         self._link, self._clock, self._pose = link, clock, pose
         self._pilot, self._log, self._robot, self._run = pilot, log, robot, run
         self._gain = gain
         self._watch = AdvanceWatch(robot.length_m, gain, run.safety.advance_fraction)
-        self._watchers = watchers
+        self._derating = Derating(run.safety)
+        self._watchers, self._say = watchers, say
         self._wire_busy_s = wire_busy_s
         self._wire_s = wire_busy_s()
         self._alarms = 0
         self._speed_m_s = 0.0
         self._last: BodyView | None = None
+        self._way_m = 0.0
 
     def run(self) -> Outcome:
         """Enable, ramp to the first shape, follow the path, settle, disable."""
@@ -102,20 +108,33 @@ class Drive:
                     break
                 pose = self._pose(state)
                 view = body_in_world(self._robot, pose, state.position_rad)
+                self._way_m = view.way_since_m(self._last) if self._last is not None else 0.0
                 if clock.now_s() < walk_s:
                     goal = ramp.at(clock.now_s() - start_s)
                 else:
-                    goal = self._steer(period_s, view)
+                    goal = self._steer(period_s * self._rate(state, period_s), view)
                 self._send(tick, state, pose, view, goal)
                 if self._link.tripped or pilot.at_rest:
                     break
             tripped = self._link.tripped
             if tripped:
                 log.event(clock.now_s(), "trip", tripped, "error")
-        end = "every waypoint reached" if pilot.done else f"{pilot.reached} waypoints reached"
+        if not self._run.waypoints_m:
+            end = "the motion came to its end" if pilot.done else "the motion was cut off"
+        else:
+            end = "every waypoint reached" if pilot.done else f"{pilot.reached} waypoints reached"
         log.event(clock.now_s(), "stop", f"torque off; {end}")
         duration_s = clock.now_s() - start_s
-        return Outcome(pilot.reached, pilot.missed, duration_s, self._alarms, tripped)
+        least = self._derating.least
+        return Outcome(pilot.reached, pilot.missed, duration_s, self._alarms, tripped, least)
+
+    def _rate(self, state: JointState, period_s: float) -> float:
+        """How fast the motion may run, so that no servo trips."""
+        rate = self._derating.update(state, period_s)
+        for text in self._derating.news():
+            self._log.event(self._clock.now_s(), "derating", text, "warning")
+            self._say(text)
+        return rate
 
     def _steer(self, period_s: float, view: BodyView) -> Floats:
         pilot, log, now_s = self._pilot, self._log, self._clock.now_s()
@@ -123,7 +142,7 @@ class Drive:
         goal = pilot.step(period_s, view)
         if pilot.reached > reached:
             log.event(now_s, "waypoint", f"waypoint {pilot.reached} reached")
-        if pilot.missed > missed:
+        if pilot.missed > missed and pilot.path is not None:
             log.event(now_s, "missed", f"waypoint {pilot.reached + 1} passed by; back", "warning")
             log.path_laid(now_s, pilot.path.position(np.linspace(0, pilot.path.length_m, 60)))
         if pilot.decision is not None:
@@ -136,8 +155,7 @@ class Drive:
                 ramp_rad=d.ramp_rad,
                 candidates=d.candidates,
             )
-        way_m = view.way_since_m(self._last) if self._last is not None else 0.0
-        if self._watch.update(pilot.pulse_m_s * period_s, way_m):
+        if self._watch.update(pilot.pulse_m_s * period_s, self._way_m):
             self._alarms += 1
             share = self._watch.window.share if self._watch.window else float("nan")
             text = f"the body makes {share:.0%} of its predicted way: is the ground too slippery?"
@@ -166,7 +184,7 @@ class Drive:
             reason=self._link.tripped or "",
             joints=clamped,
         )
-        self._measure_speed(view)
+        self._measure_speed()
         pilot = self._pilot
         self._log.pose(
             tick.deadline_s,
@@ -184,10 +202,7 @@ class Drive:
         for watcher in self._watchers:
             watcher.cycle(tick.deadline_s, pilot, self._speed_m_s)
 
-    def _measure_speed(self, view: BodyView) -> None:
+    def _measure_speed(self) -> None:
         """Forward speed of the links along themselves, mean over the body, smoothed over 0.5 s."""
-        if self._last is None:
-            return
-        way = view.way_since_m(self._last)
-        share = 1.0 / (0.5 * self._run.cycle_hz)
-        self._speed_m_s += min(share, 1.0) * (way * self._run.cycle_hz - self._speed_m_s)
+        hz = self._run.cycle_hz
+        self._speed_m_s += min(2.0 / hz, 1.0) * (self._way_m * hz - self._speed_m_s)

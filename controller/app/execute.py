@@ -4,18 +4,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from controller.app.backend import Backend, metal, simulated
-from controller.app.drive import Drive, Outcome, PoseSource, Watcher
-from controller.app.prepare import Prepared
+from controller.app.backend import metal, simulated
+from controller.app.drive import Drive, Outcome, Watcher
+from controller.app.job import Job
+from controller.app.overhead import pose_faults
+from controller.app.pose_source import pose_source
 from controller.app.report.build import write_summary
-from controller.runtime.dead_reckoning import DeadReckoning
 from drivers.recovery import Recovery
 from drivers.safe_link import SafeLink
 from drivers.safety import SafetyLimits
 from drivers.telemetry.reader import read_log
-from drivers.telemetry.record import PlanSummary
 from drivers.telemetry.writer import RunLog
 
 
@@ -29,21 +27,24 @@ class Finished:
 
 
 def execute(
-    prepared: Prepared,
+    prepared: Job,
     folder: Path,
     port: str | None = None,
     watchers: tuple[Watcher, ...] = (),
     confirm: Callable[[str], bool] | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Finished:
     """Run on ``port``, or on the simulator where it is None; nothing else differs.
 
-    ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``).
+    ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``);
+    ``say`` is told what the motion decides by itself: a slower rate, an operator's change.
 
     Raises:
         InputError: the plan breaks a limit, the port is not there, the servos are not the robot's.
 
     """
-    ahead = prepared.forecast()
+    pose_faults(prepared.run, prepared.robot, prepared.world, metal=port is not None)
+    plan = prepared.judged()
     if port is None:
         laid = prepared.laid()
         backend = simulated(
@@ -63,13 +64,7 @@ def execute(
             prepared.robot,
             prepared.world,
             backend=backend.name,
-            plan=PlanSummary(
-                path_m=prepared.path.position(np.linspace(0.0, prepared.path.length_m, 200)),
-                waypoints_m=np.array(prepared.run.waypoints_m),
-                waypoint_radius_m=prepared.run.waypoint_radius_m,
-                predicted_speed_m_s=prepared.gain * ahead.pulse_m / ahead.duration_s,
-                states=None if prepared.run.motion == "serpenoid" else prepared.library.counts,
-            ),
+            plan=plan,
             ground=prepared.ground,
             laid=laid,
             torque_constant_n_m_a=_torque_constant_n_m_a(prepared.robot.servo.model),
@@ -83,20 +78,27 @@ def execute(
             confirm=confirm,
             say=lambda text: log.event(clock.now_s(), "recovery", text, "warning"),
         )
+
+        def note(kind: str, text: str) -> None:
+            log.event(clock.now_s(), kind, text)
+            say(text)
+
         limits = SafetyLimits.from_config(prepared.robot, safety)
-        drive = Drive(
-            link=SafeLink(backend.chain, limits, clock, recovery),
-            clock=clock,
-            pose=_pose_source(prepared, backend),
-            pilot=prepared.pilot(),
-            log=log,
-            robot=prepared.robot,
-            run=prepared.run,
-            gain=prepared.gain,
-            watchers=watchers,
-            wire_busy_s=backend.wire_busy_s,
-        )
-        outcome = drive.run()
+        with pose_source(prepared, backend, note) as pose:
+            drive = Drive(
+                link=SafeLink(backend.chain, limits, clock, recovery),
+                clock=clock,
+                pose=pose,
+                pilot=prepared.guide(note),
+                log=log,
+                robot=prepared.robot,
+                run=prepared.run,
+                gain=prepared.gain,
+                watchers=watchers,
+                wire_busy_s=backend.wire_busy_s,
+                say=say,
+            )
+            outcome = drive.run()
     numbers = dict(write_summary(read_log(log_path), folder))
     return Finished(outcome, log_path, numbers)
 
@@ -106,15 +108,3 @@ def _torque_constant_n_m_a(model: str) -> float:
     from sim.bus.motor import MOTORS  # noqa: PLC0415  only for this figure
 
     return MOTORS[model].torque_constant_n_m_a if model in MOTORS else float("nan")
-
-
-def _pose_source(prepared: Prepared, backend: Backend) -> PoseSource:
-    measured = backend.pose
-    if measured is not None:
-        return lambda state: measured()
-    return DeadReckoning(
-        prepared.robot,
-        prepared.world.friction,
-        prepared.run.start_m,
-        prepared.start_heading_rad,
-    )

@@ -1,5 +1,6 @@
 """From a run's configuration to a pilot: recording, library, path, forecast, margins."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -24,13 +25,14 @@ from controller.motion.traction import quasi_static_gain
 from controller.motion.usable import refusals
 from controller.motion.walker import Walker
 from controller.runtime.forecast import Forecast, forecast, mean_heading_rad
+from controller.runtime.guide import Guide
 from controller.runtime.margins import margin_faults
 from controller.runtime.pilot import Pilot, TrackSource
 from controller.shape.library import Refuse, StateLibrary, build_library
 from controller.terrain.path import SplinePath
 from controller.terrain.planner import TerrainPlanner
 from drivers.budget import wire_budget
-from drivers.telemetry.record import Laid
+from drivers.telemetry.record import Laid, PlanSummary
 
 Floats = NDArray[np.float64]
 POINTS = 100
@@ -160,6 +162,26 @@ class Prepared:
             raise InputError(faults)
         return plan
 
+    def judged(self) -> PlanSummary:
+        """Forecast the run; what the log says of the plan.
+
+        Raises:
+            InputError: as ``forecast``.
+
+        """
+        ahead = self.forecast()
+        return PlanSummary(
+            path_m=self.path.position(np.linspace(0.0, self.path.length_m, 200)),
+            waypoints_m=np.array(self.run.waypoints_m),
+            waypoint_radius_m=self.run.waypoint_radius_m,
+            predicted_speed_m_s=self.gain * ahead.pulse_m / ahead.duration_s,
+            states=None if self.run.motion == "serpenoid" else self.library.counts,
+        )
+
+    def guide(self, say: Callable[[str, str], None]) -> Guide:
+        """Return a fresh pilot; it says nothing beside what the drive logs."""
+        return self.pilot()
+
     def _source(self) -> TrackSource:
         if self.run.motion == "serpenoid":
             return Serpentine(POINTS)
@@ -192,6 +214,10 @@ def prepare(run: str, **changes: object) -> Prepared:
     wanted = {key: value for key, value in changes.items() if value is not None}
     wanted.setdefault("track", track_beside(loaded.track, beside))
     loaded = checked(RunConfig, loaded.model_dump() | wanted, "command line")
+    if loaded.motion == "gait":
+        raise InputError(f"run {loaded.name}: a gait is run by: snakewalk gait run NAME")
+    if loaded.motion == "repertoire":
+        raise InputError(f"run {loaded.name}: planned by: snakewalk plan --with repertoire")
     robot = load_robot(loaded.robot, beside)
     budget = wire_budget(robot.joint_count, robot.servo.baud, fast=True, slow_read_bytes=7)
     budget.check(loaded.cycle_hz)

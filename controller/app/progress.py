@@ -6,7 +6,7 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from controller.runtime.pilot import Pilot
+from controller.runtime.guide import Guide
 
 
 class PathProgress:
@@ -38,7 +38,7 @@ class PathProgress:
         """Leave the last state standing."""
         self._progress.__exit__(kind, error, trace)
 
-    def cycle(self, time_s: float, pilot: Pilot, speed_m_s: float) -> None:
+    def cycle(self, time_s: float, pilot: Guide, speed_m_s: float) -> None:
         """Update, not in every cycle."""
         self._cycles += 1
         if self._cycles % 10 and not pilot.done:
@@ -49,3 +49,7 @@ class PathProgress:
             completed=pilot.along_m,
             now=f"{time_s:5.1f} s  {speed_m_s:5.2f} m/s",
         )
+
+    def note(self, text: str) -> None:
+        """Print a line above the bar."""
+        self._progress.console.print(text)

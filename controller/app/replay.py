@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from config.errors import InputError
 from config.ground import build_ground
 from controller.app.backend import Backend, simulated
-from controller.app.prepare import Prepared
+from controller.app.job import job_of
 from controller.app.report.compare import Comparison, compare
 from controller.runtime.body import body_in_world
 from drivers.telemetry.record import Laid, RunRecord
@@ -108,14 +108,16 @@ def differences(
     """Compare a run with its replay; joints and, where it was measured, the head decide.
 
     Velocities and currents are told but not held against the replay, and neither is the head of a
-    run whose pose was reckoned from the joints. Angles that the original failed to read are left
+    run whose pose was reckoned from the joints or seen by a camera. Angles that the original failed to read are left
     out.
     """
     valid = original.cycle.valid
+    header = original.header
+    measured = header.backend == "sim" and header.run.pose in (None, "simulator")
     told = dict.fromkeys(("velocity_rad_s", "current_a"), float("inf"))
     limits = told | {
         "measured_rad": tolerance_rad,
-        "head_m": tolerance_m if original.header.backend == "sim" else float("inf"),
+        "head_m": tolerance_m if measured else float("inf"),
     }
     return compare(_known(original, valid), _known(again, valid), tolerances=limits)
 
@@ -135,7 +137,7 @@ def _backend(record: RunRecord) -> Backend:
     header = record.header
     laid = header.laid
     if laid is None:
-        prepared = Prepared(header.run, header.robot, header.world)
+        prepared = job_of(header.run, header.robot, header.world)
         first = record.cycle.measured_rad[0]
         known = first if np.isfinite(first).all() else np.zeros(header.robot.joint_count)
         laid = Laid(prepared.start_heading_rad, known)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from config.heightfield import HeightField
+from config.robot import RobotConfig
 
 Floats = NDArray[np.float64]
 Known = Literal["tail", "head"]
@@ -40,6 +41,11 @@ class Laid:
     def steepest_rad(self) -> float:
         """Largest inclination; the printed method assumes less than 25 degrees."""
         return float(np.abs(self.pitch_rad).max())
+
+
+def half_heights_m(robot: RobotConfig, segments: int) -> Floats:
+    """Half the body's height at the points of a skeleton (segments + 1,): the robot's profile."""
+    return np.array(robot.radii_m(segments + 1))
 
 
 class GroundStep:

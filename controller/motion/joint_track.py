@@ -61,10 +61,8 @@ class JointTrack:
         """(J,) joint angles; at both ends of what is known the spline runs on straight."""
         middle = min(max(round(head), self.first), self.last)
         t = head - middle + 0.5
-        before, at, after = self._around(middle - self.first)
-        return np.asarray(
-            0.5 * (1.0 - t) ** 2 * before + (0.5 + t - t * t) * at + 0.5 * t * t * after
-        )
+        weights = np.array([0.5 * (1.0 - t) ** 2, 0.5 + t - t * t, 0.5 * t * t])
+        return np.asarray(weights.dot(self._around(middle - self.first)))
 
     def bends(self, start: int) -> tuple[Floats, Floats]:
         """Largest |dq/dS| and |d2q/dS2| over the joints near each whole head from ``start`` on.
@@ -87,11 +85,13 @@ class JointTrack:
         skip = start - self.first - low
         return slope[skip:], wide[skip:]
 
-    def _around(self, k: int) -> tuple[Floats, Floats, Floats]:
-        """Samples k - 1, k and k + 1 of the table."""
+    def _around(self, k: int) -> Floats:
+        """(3, J) samples k - 1, k and k + 1 of the table."""
         q = self._q
+        if 0 < k < len(q) - 1:
+            return q[k - 1 : k + 2]
         if len(q) == 1:
-            return q[0], q[0], q[0]
+            return q[[0, 0, 0]]
         before = q[k - 1] if k > 0 else 2.0 * q[0] - q[1]
         after = q[k + 1] if k + 1 < len(q) else 2.0 * q[-1] - q[-2]
-        return before, q[k], after
+        return np.stack([before, q[k], after])

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from config.heightfield import HeightField
 from config.robot import RobotConfig
-from controller.motion.ground_step import GroundStep
+from controller.motion.ground_step import GroundStep, half_heights_m
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Lift:
     def __init__(self, robot: RobotConfig, ground: HeightField | None) -> None:
         self._step = GroundStep(ground)
         self._link_m = robot.link_length_m
-        self._radius_m = robot.body_radius_m
+        self._half_m = half_heights_m(robot, robot.joint_count + 1)
         self._pitch = np.array(robot.pitch_joints, dtype=np.intp)
         self._limit_rad = robot.pitch_limit_rad
         self._joints = robot.joint_count
@@ -63,7 +63,7 @@ class Lift:
         """
         forward = np.column_stack([np.cos(heading_rad), np.sin(heading_rad)])
         tip = np.asarray(head_in_world_m, float)[:2] + 0.5 * self._link_m * forward[0]
-        laid = self._step.one(heading_rad, tip, self._link_m, self._radius_m, known="head")
+        laid = self._step.one(heading_rad, tip, self._link_m, self._half_m, known="head")
         wanted = 0.5 * (laid.points_m[1:, 2] + laid.points_m[:-1, 2])
 
         ends = np.zeros((self._joints + 2, 2))

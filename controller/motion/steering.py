@@ -20,6 +20,10 @@ class Path(Protocol):
         """(..., 2) points at arc lengths, clamped to the ends."""
         ...
 
+    def gap_m(self, point_m: Floats, s_m: float) -> float:
+        """Distance of a point (2,) from the path at an arc length that ``nearest`` has given."""
+        ...
+
     def nearest(self, point_m: ArrayLike, from_s_m: float = 0.0, window_m: float = 1.5) -> float:
         """Arc length of the closest point in ``[from_s_m, from_s_m + window_m]``."""
         ...

@@ -1,6 +1,7 @@
 """The body as it lies in the world: the measured head pose carried along the measured joints."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,8 @@ class BodyView:
 
     def way_since_m(self, before: "BodyView") -> float:
         """How far the links have gone along themselves since ``before``, mean over the body."""
-        return float(((self.link_m - before.link_m) * self.forward).sum() / len(self.link_m))
+        way_m = (self.link_m - before.link_m).ravel().dot(self.forward.ravel())
+        return float(way_m) / len(self.link_m)
 
 
 def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> BodyView:
@@ -43,12 +45,22 @@ def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> Body
     Yaw turns the link behind by ``-q`` about the up axis, pitch by ``+q`` about the left axis, so a
     positive joint bends the head side to the left, or lifts it.
     """
-    # The axes in plain floats: seventeen steps in a row, in every control cycle
-    rows = np.asarray(pose.rotation, dtype=float).T.tolist()
+    if "p" in robot.joint_axes:
+        forward = _forward(robot.joint_axes, pose.rotation, joint_rad)
+    else:
+        forward = _forward_in_plane(pose.rotation, joint_rad)
+    placed = _centres(len(forward), robot.link_length_m).dot(forward)
+    placed += pose.head_in_world_m
+    return BodyView(placed[:-1], forward, placed[-1])
+
+
+def _forward(joint_axes: str, rotation: Floats, joint_rad: Floats) -> Floats:
+    """(L, 3) link axes of any chain, in plain floats: one turn after the other."""
+    rows = np.asarray(rotation, dtype=float).T.tolist()
     (fx, fy, fz), (lx, ly, lz), (ux, uy, uz) = rows
     axes = [fx, fy, fz]
     turns = zip(np.cos(joint_rad).tolist(), np.sin(joint_rad).tolist(), strict=True)
-    for axis, (c, s) in zip(robot.joint_axes, turns, strict=True):
+    for axis, (c, s) in zip(joint_axes, turns, strict=True):
         if axis == "y":
             fx, lx = c * fx - s * lx, s * fx + c * lx
             fy, ly = c * fy - s * ly, s * fy + c * ly
@@ -58,10 +70,31 @@ def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> Body
             fy, uy = c * fy - s * uy, s * fy + c * uy
             fz, uz = c * fz - s * uz, s * fz + c * uz
         axes += (fx, fy, fz)
-    forward = np.array(axes).reshape(-1, 3)
-    link_m = np.empty_like(forward)
-    link_m[0] = 0.0
-    (forward[:-1] + forward[1:]).cumsum(axis=0, out=link_m[1:])
-    link_m *= -0.5 * robot.link_length_m
-    link_m += pose.head_in_world_m
-    return BodyView(link_m, forward, link_m.sum(axis=0) / len(link_m))
+    return np.array(axes).reshape(-1, 3)
+
+
+def _forward_in_plane(rotation: Floats, joint_rad: Floats) -> Floats:
+    """The same for yaw joints alone: all turn about the head's up axis, so that angles add up."""
+    links = len(joint_rad) + 1
+    turn_rad = _sums(links).dot(joint_rad)
+    turned = np.empty((links, 2))
+    np.cos(turn_rad, out=turned[:, 0])
+    np.sin(turn_rad, out=turned[:, 1])
+    return np.asarray(turned.dot(rotation.T[:2]))
+
+
+@cache
+def _sums(links: int) -> Floats:
+    """(L, L - 1) weights of the yaw joints in the heading of each link, from the head's on."""
+    return -np.tri(links, links - 1, k=-1)
+
+
+@cache
+def _centres(links: int, link_m: float) -> Floats:
+    """(L + 1, L) weights of the links' axes in the place of each centre, last in their mean."""
+    whole = np.tri(links, k=-1)  # of every link before, but for half of the head's
+    whole[1:, 0] = 0.5
+    own = 0.5 * np.eye(links)
+    own[0, 0] = 0.0  # places are from the head's centre on
+    weights = -link_m * (whole + own)
+    return np.vstack([weights, weights.mean(axis=0)])

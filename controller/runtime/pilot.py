@@ -160,10 +160,9 @@ class Pilot:
             last = path.position([end_m - 0.05, end_m])
             ahead = (last[1] - last[0]) / 0.05
             along_m += float((centre_m - last[1]) @ ahead)
-        gap_m = math.dist(path.position(self._along_m), centre_m)
         return bool(
             along_m > self._passed_m[self.reached] + self._radius_m
-            or gap_m > _ASTRAY_BODIES * self._length_m
+            or path.gap_m(centre_m, self._along_m) > _ASTRAY_BODIES * self._length_m
         )
 
     def _lay_path(self, from_m: Floats, first: int) -> None:

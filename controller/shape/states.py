@@ -5,6 +5,8 @@ Corrections to the printed text: angles are unwrapped first, or rotation invaria
 energy in seven coefficients holds up to four or five waves on the body, not beyond.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -72,9 +74,28 @@ def energy_kept(angles_rad: Floats, coefficients: int = 7) -> Floats:
     return np.asarray(np.where(total > 0.0, kept / np.where(total > 0.0, total, 1.0), 1.0))
 
 
+@dataclass(frozen=True, slots=True)
+class StateRange:
+    """What a recording's states say of its animal: [PT] 2.5 draws between these."""
+
+    low: Floats
+    """(n,) smallest modulus of each coefficient, C_min of [PT]."""
+    high: Floats
+    """(n,) largest, C_max."""
+
+    def amplitude_rad(self, points: int = 100) -> Floats:
+        """Both as amplitudes of a wave of tangent angle, (n, 2): modulus over half the samples."""
+        return np.stack([self.low, self.high], axis=-1) / (0.5 * padded_length(points))
+
+
+def state_range(states: Complexes) -> StateRange:
+    """Range of the moduli of recorded states (T, n), T >= 1."""
+    size = np.abs(states)
+    return StateRange(size.min(axis=0), size.max(axis=0))
+
+
 def random_states(states: Complexes, count: int, rng: np.random.Generator) -> Complexes:
     """Draw states with moduli in the recorded range and free phases ([PT] Eq. 1-2): (count, n)."""
-    size = np.abs(states)
-    low, high = size.min(axis=0), size.max(axis=0)
-    modulus = low + rng.random((count, states.shape[-1])) * (high - low)
+    seen = state_range(states)
+    modulus = seen.low + rng.random((count, states.shape[-1])) * (seen.high - seen.low)
     return np.asarray(modulus * np.exp(2j * np.pi * rng.random((count, states.shape[-1]))))

@@ -1,5 +1,6 @@
 """A smooth path: a cubic spline through points in order, by arc length ([PT] 2.6.1)."""
 
+import math
 from bisect import bisect_left, bisect_right
 
 import numpy as np
@@ -31,7 +32,7 @@ class SplinePath:
         fine = spline(np.linspace(0.0, chord[-1], max(2, round(chord[-1] / _STEP_M) + 1)))
         self._s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
         self._points = fine
-        self._x, self._y = np.ascontiguousarray(fine.T)
+        self._xy = np.ascontiguousarray(fine.T)
         self._marks: list[float] = self._s.tolist()
 
     @property
@@ -43,9 +44,14 @@ class SplinePath:
         """(..., 2) points at arc lengths, clamped to the ends."""
         s = np.asarray(s_m, dtype=float)
         points = np.empty((*s.shape, 2))
-        points[..., 0] = np.interp(s, self._s, self._x)
-        points[..., 1] = np.interp(s, self._s, self._y)
+        points[..., 0] = np.interp(s, self._s, self._xy[0])
+        points[..., 1] = np.interp(s, self._s, self._xy[1])
         return points
+
+    def gap_m(self, point_m: Floats, s_m: float) -> float:
+        """Distance of a point (2,) from the path's mark at ``s_m``, as ``nearest`` gives it."""
+        low = min(bisect_left(self._marks, s_m), len(self._marks) - 1)
+        return math.dist(self._points[low], point_m)
 
     def heading_rad(self, s_m: float) -> float:
         """Direction of the path at an arc length."""
@@ -60,9 +66,9 @@ class SplinePath:
         marks = self._marks
         low = min(bisect_left(marks, from_s_m - 1e-9), len(marks) - 1)
         high = max(bisect_right(marks, from_s_m + window_m), low + 1)
-        x, y = np.asarray(point_m, dtype=float)[:2].tolist()
-        dx, dy = self._x[low:high] - x, self._y[low:high] - y
-        return marks[low + int((dx * dx + dy * dy).argmin())]
+        way = self._xy[:, low:high] - np.asarray(point_m, dtype=float)[:2, None]
+        way *= way
+        return marks[low + int((way[0] + way[1]).argmin())]
 
     def first_pass(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
         """Arc length, from ``from_s_m`` on, at which the path first comes nearest to a point.

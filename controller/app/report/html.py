@@ -68,11 +68,16 @@ def _verdict(n: Summary) -> str:
     """One sentence: how far it came, how fast, how well it kept to its path, whether on time."""
     where = "on the simulator" if n["backend"] == "sim" else f"on {n['backend']}"
     late = n["missed_deadlines"]
+    missed = f"{_count(late, 'deadline') if late else 'no deadline'} missed."
+    if n["waypoints"] == 0:
+        return (
+            f"{n['robot']} moved by {n['motion']} {where}: its centre of mass went "
+            f"{_fmt(n['travelled_m'], 1)} m in {_fmt(n['duration_s'], 1)} s, {missed}"
+        )
     return (
         f"{n['robot']} reached {n['waypoints_reached']} of {_count(n['waypoints'], 'waypoint')} "
         f"{where}: {_fmt(n['travelled_m'], 1)} m in {_fmt(n['duration_s'], 1)} s, "
-        f"{_centimetres(n['path_error_mean_m'])} from its path on average, "
-        f"{_count(late, 'deadline') if late else 'no deadline'} missed."
+        f"{_centimetres(n['path_error_mean_m'])} from its path on average, {missed}"
     )
 
 
@@ -95,7 +100,8 @@ def _tiles(n: Summary) -> list[str]:
     torque = "" if n["peak_torque_n_m"] is None else f"{_fmt(n['peak_torque_n_m'], 2)} N m"
     vetoes = _count(n["vetoes"], "veto", "vetoes")
     missed = f"{n['missed_deadlines']} of {n['cycles']}"
-    return [
+    took = f"in {_fmt(n['duration_s'], 1)} s"
+    tiles = [
         _tile("Waypoints", f"{n['waypoints_reached']} of {n['waypoints']}",
               f"in {_fmt(n['duration_s'], 1)} s"),
         _tile("Path error", f"{_fmt(n['path_error_mean_m'], 3)} m",
@@ -113,6 +119,9 @@ def _tiles(n: Summary) -> list[str]:
         _tile("Missed deadlines", missed, wire),
         _tile("Safety", _count(n["clamps"], "clamp"), f"{vetoes}, {_count(n['alarms'], 'alarm')}"),
     ]  # fmt: skip
+    if n["waypoints"] == 0:  # a gait has no path, and its shape need not go along the body
+        return [_tile("Travelled", f"{_fmt(n['travelled_m'], 2)} m", took), *tiles[5:]]
+    return tiles
 
 
 def _tile(name: str, value: str, below: str) -> str:

@@ -29,7 +29,7 @@ def _identity(record: RunRecord) -> Summary:
     h = record.header
     return {
         "run": h.run.name,
-        "motion": h.run.motion,
+        "motion": h.run.motion if h.run.gait is None else f"gait {h.run.gait.name}",
         "robot": h.robot.name,
         "world": h.world.name,
         "backend": h.backend,
@@ -47,6 +47,8 @@ def _outcome(record: RunRecord) -> Summary:
     tripped = trip(record)
     if tripped is not None:
         outcome = f"stopped by safety: {tripped}"
+    elif total == 0:
+        outcome = "ran to its end"
     elif reached == total:
         outcome = "every waypoint reached"
     else:

@@ -21,7 +21,10 @@ def advance_figure(record: RunRecord) -> Figure | None:
     pose = record.pose
     if len(pose.time_s) == 0:
         return None
-    figure, (speed, error) = canvas(2, 5.2)
+    distance = path_error_m(record)
+    on_path = bool(np.isfinite(distance).any())
+    figure, panels = canvas(2 if on_path else 1, 5.2 if on_path else 3.0)
+    speed = panels[0]
     measured = "simulated" if record.header.backend == "sim" else "measured"
     for values, colour, label in (
         (pose.pulse_m_s, GREY, "pulse speed u"),
@@ -37,18 +40,18 @@ def advance_figure(record: RunRecord) -> Figure | None:
     speed.set_title("Forward speed")
     if speed.get_legend_handles_labels()[0]:
         legend_above(speed)
-    distance = path_error_m(record)
-    if np.isfinite(distance).any():
+    if on_path:
+        error = panels[1]
         trace(error, pose.time_s, distance, BLUE, "distance")
         mean = float(np.nanmean(distance))
         error.axhline(
             mean, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)), label=f"mean {mean:.3f} m"
         )
         legend_above(error)
-    error.set_ylabel("distance (m)")
-    error.set_ylim(bottom=0.0)
-    error.set_title("Centre of mass from the path")
-    error.set_xlabel("time (s)")
-    error.set_xlim(0.0, max(record.end_s, 1e-3))
-    mark_waypoints([speed, error], waypoint_times_s(pose, record.header.plan))
+        error.set_ylabel("distance (m)")
+        error.set_ylim(bottom=0.0)
+        error.set_title("Centre of mass from the path")
+    panels[-1].set_xlabel("time (s)")
+    panels[-1].set_xlim(0.0, max(record.end_s, 1e-3))
+    mark_waypoints(panels, waypoint_times_s(pose, record.header.plan))
     return figure

@@ -79,7 +79,8 @@ def _ground(axes: Axes, ground: HeightField) -> None:
 
 def _plan(axes: Axes, record: RunRecord) -> None:
     plan = record.header.plan
-    for number, (_, path) in enumerate(record.paths):
+    paths = record.paths if len(plan.waypoints_m) else ()
+    for number, (_, path) in enumerate(paths):
         label = "planned path" if number == 0 else ("laid again" if number == 1 else None)
         strong = number == 0
         axes.plot(

@@ -1,0 +1,48 @@
+"""What an overhead camera is: where it hangs, what it shows, and how often it looks."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from config.base import Strict
+
+PoseName = Literal["simulator", "camera", "joints"]
+Place = tuple[float, float]
+
+
+class CameraConfig(Strict):
+    """A camera that looks down on a level floor (docs/overhead-camera.md)."""
+
+    width_px: int = Field(640, ge=64, le=4096)
+    height_px: int = Field(480, ge=64, le=4096)
+    rate_hz: float = Field(30.0, gt=0.0, le=240.0, description="frames a second")
+    field_width_m: float = Field(
+        6.0, gt=0.1, le=100.0, description="width of the floor that an image shows"
+    )
+    height_m: float = Field(6.0, gt=0.2, le=100.0, description="lens above the floor")
+    centre_m: Place | None = Field(
+        None,
+        description="floor under the lens, and in the image's middle if no corners are given; "
+        "default in the simulator: the middle of start and waypoints",
+    )
+    turn_rad: float = Field(
+        0.0, ge=-6.3, le=6.3, description="direction on the floor of the image's right"
+    )
+    corners_px: tuple[Place, Place, Place, Place] | None = Field(
+        None, description="four places of a real image, x to the right, y down"
+    )
+    corners_m: tuple[Place, Place, Place, Place] | None = Field(
+        None, description="the same on the floor; with them the camera may look aslant"
+    )
+    device: str | None = Field(
+        None, description="of a real camera: a number, a device or an address that OpenCV opens"
+    )
+    background: str | None = Field(
+        None, description="image of the empty floor, needed with a real camera"
+    )
+
+    @model_validator(mode="after")
+    def _corners_are_pairs(self) -> Self:
+        if (self.corners_px is None) != (self.corners_m is None):
+            raise ValueError("corners_px and corners_m are given together")
+        return self

@@ -1,0 +1,116 @@
+"""What measures the head in a run: the simulator, an overhead camera, or the joints alone."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.app.backend import Backend
+from controller.app.drive import PoseSource
+from controller.app.job import Job
+from controller.app.overhead import RenderedCamera
+from controller.app.overhead_device import DeviceCamera
+from controller.runtime.body import body_in_world
+from controller.runtime.camera_pose import CameraPose
+from controller.runtime.dead_reckoning import DeadReckoning
+from drivers.types import BodyPose, JointState
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """A believed pose held against the simulator's."""
+
+    head_m: Floats
+    """(T,) distance of the head link's centres."""
+    heading_rad: Floats
+    """(T,) difference of its headings, absolute."""
+    waypoints_reached: int
+    """By the body's true centre, in order."""
+
+    def __str__(self) -> str:
+        if not self.head_m.size:
+            return "no pose was asked for"
+        rms_mm, worst_mm = 1e3 * _rms(self.head_m), 1e3 * self.head_m.max()
+        return (
+            f"against the simulator's truth: head {rms_mm:.0f} mm rms, {worst_mm:.0f} mm at most; "
+            f"heading {_rms(self.heading_rad):.3f} rad rms, {self.heading_rad.max():.3f} rad at "
+            f"most; {self.waypoints_reached} waypoints reached"
+        )
+
+
+@dataclass
+class Watched:
+    """A pose source, and beside it what the simulator knows: for the record, never for the run."""
+
+    prepared: Job
+    believed: PoseSource
+    true: Callable[[], BodyPose]
+    _head_m: list[float] = field(default_factory=list)
+    _heading_rad: list[float] = field(default_factory=list)
+    _reached: int = 0
+
+    def __call__(self, state: JointState) -> BodyPose:
+        """Return the pose believed."""
+        pose, true = self.believed(state), self.true()
+        self._head_m.append(float(np.hypot(*(pose.head_in_world_m - true.head_in_world_m)[:2])))
+        turn = pose.heading_rad - true.heading_rad
+        self._heading_rad.append(float(abs(np.arctan2(np.sin(turn), np.cos(turn)))))
+        run = self.prepared.run
+        if self._reached < len(run.waypoints_m):
+            centre = body_in_world(self.prepared.robot, true, state.position_rad).centre_m[:2]
+            away = np.hypot(*(centre - run.waypoints_m[self._reached]))
+            self._reached += int(away <= run.waypoint_radius_m)
+        return pose
+
+    @property
+    def truth(self) -> Truth:
+        """How good the poses were."""
+        return Truth(np.array(self._head_m), np.array(self._heading_rad), self._reached)
+
+
+@contextmanager
+def pose_source(
+    prepared: Job, backend: Backend, note: Callable[[str, str], None]
+) -> Iterator[PoseSource]:
+    """Make the source that the run asks for; ``note`` is told (kind, text) at its end.
+
+    Raises:
+        InputError: the camera is not there, does not show the robot, or cannot work here.
+
+    """
+    run, robot = prepared.run, prepared.robot
+    true = backend.pose
+    if true is not None and run.pose in (None, "simulator"):
+        measured = true
+        yield lambda state: measured()
+        return
+    reckoning = DeadReckoning(
+        robot, prepared.world.friction, run.start_m, prepared.start_heading_rad
+    )
+    with ExitStack() as stack:
+        believed: PoseSource = reckoning
+        if run.pose == "camera":
+            camera = stack.enter_context(closing(_camera(prepared, backend)))
+            seen = CameraPose(robot, camera, reckoning, lambda text: note("camera", text))
+            stack.callback(lambda: note("camera", f"{seen.used} of {seen.frames} frames used"))
+            believed = seen
+        if true is not None:
+            watched = Watched(prepared, believed, true)
+            stack.callback(lambda: note("pose", str(watched.truth)))
+            believed = watched
+        yield believed
+
+
+def _camera(prepared: Job, backend: Backend) -> RenderedCamera | DeviceCamera:
+    run, robot, clock = prepared.run, prepared.robot, backend.clock
+    if backend.qpos is None:
+        return DeviceCamera(run, robot, clock)
+    return RenderedCamera(run, robot, prepared.world, backend.qpos, clock)
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values * values)))

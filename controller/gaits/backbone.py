@@ -1,0 +1,216 @@
+"""Backbone-curve fitting: a curve in space in, joint angles out, links kept at their length.
+
+Two steps. The first is that of Yamada and Hirose (Study of active cord mechanism: approximations to
+continuous curves of a multi-joint body, J. RSJ 26, 2008): in a frame that goes along the curve
+without turning about it (R. L. Bishop, There is more than one way to frame a curve, 1975) the curve
+bends to the left by ``k_left(s)`` and upwards by ``k_up(s)``, and a joint takes the bend of its own
+direction over the stretch that it stands for. The second moves the chain onto the curve, which the
+first leaves by an error that grows along the body: Gauss-Newton on the distances of all joints from
+the curve, in the spirit of R. L. Hatton, H. Choset, Generating gaits for snake robots: annealed
+chain fitting and keyframe wave extraction, Autonomous Robots 28, 2010.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
+
+from config.errors import InputError
+from config.robot import RobotConfig
+
+Floats = NDArray[np.float64]
+
+SAMPLES_A_LINK = 24
+ROUNDS = 40
+STEP_RAD = 0.3
+"""The most that an angle moves in a round."""
+STIFF_M_RAD = 1e-5
+"""Distance that is given up rather than bend a joint by a radian: picks one of many fits."""
+DONE = 1e-7
+"""Metres and radians of a round that is the last."""
+
+
+@dataclass(frozen=True, slots=True)
+class BackboneFit:
+    """A chain on a curve."""
+
+    joint_rad: Floats
+    """(J,)"""
+    head_m: Floats
+    """(3,) tip of the head."""
+    head_rotation: Floats
+    """(3, 3) columns: the head's forward, left and up."""
+    points_m: Floats
+    """(J + 2, 3) head's tip, joints, tail's end: exactly a link apart."""
+    distance_m: Floats
+    """(J + 2,) of each from the curve: the residual."""
+
+    @property
+    def residual_m(self) -> float:
+        """Largest distance from the curve."""
+        return float(self.distance_m.max())
+
+
+def fit_backbone(
+    robot: RobotConfig, curve_m: ArrayLike, roll_rad: float = 0.0, *, refine: bool = True
+) -> BackboneFit:
+    """Lay the chain on a curve given by points (N, 3) from the head backwards.
+
+    Args:
+        robot: its joints decide what can be met: yaw joints alone a plane curve only.
+        curve_m: at least as long as the robot; points need not be spaced evenly.
+        roll_rad: turn of the body about the curve: 0 has its up axis as close to z as it gets.
+        refine: False stops after the first step.
+
+    Raises:
+        InputError: fewer than four points, a curve shorter than the robot, points on each other.
+
+    """
+    curve = _Curve(robot, curve_m)
+    rotation, joints = _seed(robot, curve, roll_rad)
+    limit = np.array(robot.limit_rad)
+    joints = np.clip(joints, -limit, limit)
+    tip = curve.points_m[0].copy()
+    for _ in range(ROUNDS if refine else 0):
+        points, axes = chain_points_m(robot, joints, tip, rotation)
+        near_m, along = curve.nearest(points)
+        away = points - near_m
+        across = np.eye(3) - along[:, :, None] * along[:, None, :]
+        across[0] = np.eye(3)  # the head's tip stays at the curve's beginning
+        miss = np.einsum("nij,nj->ni", across, away).ravel()
+        slopes = np.einsum("nij,njk->nik", across, _slopes(points, axes)).reshape(len(miss), -1)
+        free = np.ones(slopes.shape[1], dtype=bool)
+        rows = np.vstack([slopes, STIFF_M_RAD * np.eye(len(free))[6:]])
+        change = np.zeros(len(free))
+        for _ in range(3):  # joints that would pass their limit stop there, the others go on
+            right = np.concatenate([-miss, -STIFF_M_RAD * joints]) - rows[:, ~free] @ change[~free]
+            change[free] = np.linalg.lstsq(rows[:, free], right, rcond=None)[0]
+            wanted = joints + change[6:]
+            beyond = np.abs(wanted) > limit
+            if not beyond.any():
+                break
+            change[6:][beyond] = np.clip(wanted, -limit, limit)[beyond] - joints[beyond]
+            free[6:] &= ~beyond
+        change *= min(1.0, STEP_RAD / max(float(np.abs(change[3:]).max()), 1e-12))
+        tip = tip + change[:3]
+        rotation = _turn(change[3:6]) @ rotation
+        joints = np.clip(joints + change[6:], -limit, limit)
+        if np.abs(change).max() < DONE:
+            break
+    points, _ = chain_points_m(robot, joints, tip, rotation)
+    away_m = np.linalg.norm(points - curve.nearest(points)[0], axis=1)
+    return BackboneFit(joints, tip, rotation, points, away_m)
+
+
+def chain_points_m(
+    robot: RobotConfig, joint_rad: Floats, head_m: Floats, head_rotation: Floats
+) -> tuple[Floats, Floats]:
+    """(J + 2, 3) head's tip, joints and tail's end, and (J, 3) the joints' axes, in the world.
+
+    An axis is that about which a positive angle turns everything *behind* the joint.
+    """
+    points, axes = [head_m, head_m - robot.link_length_m * head_rotation[:, 0]], []
+    frame = head_rotation
+    for axis, angle in zip(robot.joint_axes, joint_rad, strict=True):
+        about = -frame[:, 2] if axis == "y" else frame[:, 1]
+        frame = _turn(angle * about) @ frame
+        axes.append(about)
+        points.append(points[-1] - robot.link_length_m * frame[:, 0])
+    return np.array(points), np.array(axes)
+
+
+def _slopes(points: Floats, axes: Floats) -> Floats:
+    """(J + 2, 3, 6 + J) how the points move with the head's tip, its turn, and each joint."""
+    count = len(points)
+    out = np.zeros((count, 3, 6 + len(axes)))
+    out[:, :, :3] = np.eye(3)
+    out[:, :, 3:6] = np.cross(np.eye(3)[None], (points - points[0])[:, None]).transpose(0, 2, 1)
+    for j, axis in enumerate(axes):
+        behind = slice(j + 2, count)
+        out[behind, :, 6 + j] = np.cross(axis, points[behind] - points[j + 1])
+    return out
+
+
+def _seed(robot: RobotConfig, curve: "_Curve", roll_rad: float) -> tuple[Floats, Floats]:
+    """Rotation of the head and bends of the joints, from the curve's bends in its own frame."""
+    forward = -curve.tangents
+    up = np.array([0.0, 0.0, 1.0])
+    if abs(forward[0] @ up) > 0.99:
+        up = np.array([-1.0, 0.0, 0.0])
+    up = up - (up @ forward[0]) * forward[0]
+    up /= np.linalg.norm(up)
+    up = np.cos(roll_rad) * up - np.sin(roll_rad) * np.cross(up, forward[0])
+    bend = np.zeros((len(forward), 2))  # summed up to here: to the left, upwards
+    for k in range(1, len(forward)):
+        left = np.cross(up, forward[k - 1])
+        change = forward[k - 1] - forward[k]
+        bend[k] = bend[k - 1] + (change @ left, change @ up)
+        up = up - (up @ forward[k]) * forward[k]
+        up /= np.linalg.norm(up)
+        if k == 1:
+            first = up
+    joints = np.zeros(robot.joint_count)
+    for column, own in ((0, robot.yaw_joints), (1, robot.pitch_joints)):
+        if not own:
+            continue
+        at = np.array(own) + 1.0
+        apart = float(at[-1] - at[0]) / max(len(own) - 1, 1) or 1.0
+        reach = at[:, None] + 0.5 * apart * np.array([-1.0, 1.0])
+        ends = np.interp(reach * robot.link_length_m, curve.run_m, bend[:, column])
+        joints[list(own)] = ends[:, 1] - ends[:, 0]
+    start = forward[: SAMPLES_A_LINK + 1].mean(axis=0)
+    start /= np.linalg.norm(start)
+    top = first - (first @ start) * start
+    top /= np.linalg.norm(top)
+    return np.stack([start, np.cross(top, start), top], axis=1), joints
+
+
+class _Curve:
+    """A curve by arc length, densely sampled."""
+
+    def __init__(self, robot: RobotConfig, curve_m: ArrayLike) -> None:
+        points = np.asarray(curve_m, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4:
+            raise InputError(f"a backbone curve has four points (x, y, z) or more: {points.shape}")
+        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        if not np.isfinite(points).all() or steps.min() <= 0.0:
+            raise InputError("a backbone curve's points are finite, no two in a row the same")
+        spline = CubicSpline(np.concatenate([[0.0], steps.cumsum()]), points)
+        fine = np.linspace(0.0, spline.x[-1], 20 * len(points) + 2000)
+        way = np.linalg.norm(np.diff(spline(fine), axis=0), axis=1)
+        run = np.concatenate([[0.0], way.cumsum()])
+        if run[-1] < robot.length_m * (1.0 - 1e-6):
+            raise InputError(
+                f"the curve is {run[-1]:.3f} m long; robot {robot.name} has {robot.length_m:.3f} m"
+            )
+        count = int(np.ceil(run[-1] / robot.link_length_m * SAMPLES_A_LINK)) + 1
+        self.run_m = np.linspace(0.0, run[-1], count)
+        at = np.interp(self.run_m, run, fine)
+        self.points_m: Floats = np.asarray(spline(at))
+        self._by_run = CubicSpline(self.run_m, self.points_m)
+        tangents = self._by_run(self.run_m, 1)
+        self.tangents: Floats = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
+        self._tree = cKDTree(self.points_m)
+
+    def nearest(self, points: Floats) -> tuple[Floats, Floats]:
+        """Nearest points of the curve to points (N, 3), and the tangents there, (N, 3) each."""
+        run = self.run_m[self._tree.query(points)[1]]
+        for _ in range(2):
+            along = self._by_run(run, 1)
+            run = run + ((points - self._by_run(run)) * along).sum(axis=1)
+            run = np.clip(run, 0.0, self.run_m[-1])
+        along = self._by_run(run, 1)
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        return np.asarray(self._by_run(run)), np.asarray(along)
+
+
+def _turn(vector: Floats) -> Floats:
+    """(3, 3) rotation about ``vector`` by its length."""
+    angle = float(np.linalg.norm(vector))
+    if angle < 1e-15:
+        return np.eye(3)
+    x, y, z = vector / angle
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k)

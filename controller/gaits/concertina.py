@@ -1,0 +1,46 @@
+"""Concertina: a part of the body folds, and the fold runs from the tail to the head."""
+
+import numpy as np
+from pydantic import Field
+
+from config.robot import RobotConfig
+from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
+from controller.gaits.wave import TURN, bends_rad, group_places
+
+EDGE = 0.7
+"""Share of the folded part over which the folds grow and vanish."""
+
+
+class ConcertinaParameters(GaitParameters):
+    """The fold."""
+
+    winding_rad: float = Field(1.0, ge=0.0, le=1.5, description="folds against the body's axis")
+    folds: float = Field(2.0, ge=1.0, le=6.0, description="that a body has room for")
+    share: float = Field(0.8, ge=0.2, le=1.0, description="of the body that is folded at a time")
+
+
+class Concertina(Gait):
+    """Less than half of the body moves at a time; the rest holds it by friction of any kind."""
+
+    name = "concertina"
+    title = "a folded part runs from tail to head; each part is drawn up while the rest holds"
+    source = (
+        "B. C. Jayne, Kinematics of terrestrial snake locomotion, Copeia 1986; "
+        "H. Marvi, D. L. Hu, Friction enhancement in concertina locomotion, "
+        "J. R. Soc. Interface 9, 2012"
+    )
+    needs = Needs(yaw=True)
+    model = ConcertinaParameters
+
+    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+        p, yaw = self.params, robot.yaw_joints
+        joints = np.zeros((len(phase_rad), robot.joint_count))
+        at = group_places(robot, yaw)
+        half = 0.5 * p.share
+        turn = np.mod(phase_rad, TURN) / TURN
+        centre = (1.0 + half - turn * (1.0 + p.share))[:, None]
+        edge = np.clip((1.0 - np.abs(at - centre) / half) / EDGE, 0.0, 1.0)
+        window = edge * edge * (3.0 - 2.0 * edge)
+        headings = p.winding_rad * window * np.sin(TURN * p.folds * at)
+        joints[:, yaw] = bends_rad(robot, yaw, headings)
+        return joints

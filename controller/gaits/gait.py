@@ -1,0 +1,119 @@
+"""What a gait is: joint angles over a phase, what it needs of a robot, and where it comes from."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from config.base import Strict
+from config.errors import InputError
+from config.loader import checked
+from config.robot import RobotConfig
+
+Floats = NDArray[np.float64]
+CYCLE_SAMPLES = 129
+"""Phases at which a cycle is looked at; the first and the last are the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """What a motion asks of the robot."""
+
+    yaw: bool = False
+    pitch: bool = False
+    wheels: bool = False
+    """Whether it advances only on a belly that slides along easily and across badly."""
+
+    def check(self, robot: RobotConfig, what: str) -> None:
+        """Refuse a robot that lacks the joints.
+
+        Raises:
+            InputError: one line.
+
+        """
+        for wanted, have, axis in (
+            (self.yaw, robot.yaw_joints, "yaw"),
+            (self.pitch, robot.pitch_joints, "pitch"),
+        ):
+            if wanted and not have:
+                raise InputError(
+                    f"{what} needs {axis} joints; robot {robot.name} has none "
+                    f"(joint_axes {robot.joint_axes})"
+                )
+
+
+class GaitParameters(Strict):
+    """What every gait has."""
+
+    frequency_hz: float = Field(0.5, ge=0.0, le=2.0, description="cycles a second")
+    mirror: bool = Field(False, description="left and right exchanged")
+
+
+class Gait(ABC):
+    """Pure and periodic: ``joints_rad`` of a phase; time is given to it by a ``GaitMotion``.
+
+    A subclass states the class variables and ``_shape_rad``.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    """One line: what the body does."""
+    source: ClassVar[str]
+    """Who described it."""
+    needs: ClassVar[Needs]
+    world: ClassVar[str] = "isotropic"
+    """Shipped world that it is run in where none is asked for."""
+    p_gain: ClassVar[int | None] = None
+    """Register 84 of every servo where the robot's own would squeeze too hard."""
+    model: ClassVar[type[GaitParameters]] = GaitParameters
+
+    def __init__(self, params: GaitParameters | None = None) -> None:
+        self.params: Any = self.model() if params is None else params
+        """An instance of ``model``."""
+
+    @classmethod
+    def of(cls, values: dict[str, Any] | None = None, source: str = "") -> Self:
+        """Make the gait with ``values`` in place of defaults.
+
+        Raises:
+            ConfigError: unknown parameters or values out of range, one line each.
+
+        """
+        return cls(checked(cls.model, dict(values or {}), source or f"gait {cls.name}"))
+
+    def joints_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+        """(T, J) joint angles at phases (T,), period 2 pi.
+
+        Raises:
+            InputError: the robot lacks joints that the gait needs.
+
+        """
+        self.needs.check(robot, f"gait {self.name}")
+        joints = self._shape_rad(robot, np.atleast_1d(np.asarray(phase_rad, dtype=float)))
+        if self.params.mirror:
+            joints[:, robot.yaw_joints] *= -1.0
+        return joints
+
+    def check(self, robot: RobotConfig) -> None:
+        """Refuse a robot that lacks joints, or whose joints do not bend so far.
+
+        Raises:
+            InputError: one line a fault.
+
+        """
+        joints = self.joints_rad(robot, np.linspace(0.0, 2.0 * np.pi, CYCLE_SAMPLES))
+        reach, limit = np.abs(joints).max(axis=0), np.array(robot.limit_rad)
+        beyond = np.flatnonzero(reach > limit + 1e-9)
+        if len(beyond):
+            worst = int(beyond[np.argmax((reach - limit)[beyond])])
+            raise InputError(
+                f"gait {self.name}: joint {worst + 1} would bend to {reach[worst]:.2f} rad; "
+                f"its limit is {limit[worst]:.2f}"
+            )
+
+    @abstractmethod
+    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+        """(T, J), a fresh array, before mirroring and limits."""

@@ -1,0 +1,128 @@
+"""A helix that rolls: round a pole, and inside a pipe.
+
+The backbone is a helix of radius ``a`` and rise angle ``g``: curvature ``cos^2 g / a``, torsion
+``sin g cos g / a``. Its bend turns about the body along the body (``torsion``) and, as the phase
+grows, with time: the body rolls about its own line and the helix stays. Where it rolls without
+slipping on what it holds, a body of radius r goes ``2 pi r cos g`` along the axis in a cycle.
+"""
+
+import math
+from typing import ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from config.robot import RobotConfig
+from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
+from controller.gaits.wave import places
+
+SOURCE = (
+    "M. Tesch et al., Parameterized and scripted gaits for modular snake robots, Advanced "
+    "Robotics 23, 2009 (rolling helix); curve: H. Yamada, S. Hirose, Study of active cord "
+    "mechanism: approximations to continuous curves of a multi-joint body, J. RSJ 26, 2008"
+)
+
+
+def helix_joints_rad(
+    robot: RobotConfig, phase_rad: Floats, radius_m: float, rise_rad: float, hand: int
+) -> Floats:
+    """(T, J) of a helix about whose line the body has turned by phases (T,).
+
+    A joint takes the bend of the body half a spacing of its axis before and behind it, exactly
+    integrated: ``k_axis(s) = k cos(torsion s + phase)`` over that stretch.
+
+    Args:
+        robot: yaw and pitch joints.
+        phase_rad: turn of the bend's direction about the body, from left to up.
+        radius_m: of the centre line; may be ``inf`` for a straight body.
+        rise_rad: angle of the line against a plane across the axis.
+        hand: 1 a right-handed helix, -1 a left-handed one.
+
+    """
+    curvature = math.cos(rise_rad) ** 2 / radius_m
+    torsion = hand * math.sin(rise_rad) * math.cos(rise_rad) / radius_m
+    joints = np.zeros((len(phase_rad), robot.joint_count))
+    for own, lead in ((robot.yaw_joints, 0.0), (robot.pitch_joints, -0.5 * np.pi)):
+        if not own:
+            continue
+        apart = (own[-1] - own[0]) / max(len(own) - 1, 1)
+        stretch_m = robot.link_length_m * max(apart, 1.0)
+        bend = curvature * stretch_m * np.sinc(0.5 * torsion * stretch_m / np.pi)
+        angle = lead - torsion * robot.length_m * places(robot, own)
+        joints[:, own] = bend * np.cos(phase_rad[:, None] + angle)
+    return joints
+
+
+class HelixPoleParameters(GaitParameters):
+    """What is held, and how tightly."""
+
+    frequency_hz: float = Field(0.2, ge=0.0, le=2.0, description="turns of the body a second")
+    pole_radius_m: float = Field(0.09, ge=0.02, le=1.0, description="of the pole")
+    body_radius_m: float = Field(0.03, ge=0.002, le=0.5, description="of the robot")
+    grip_m: float = Field(0.012, ge=-0.05, le=0.2, description="helix tighter than the pole by")
+    rise_rad: float = Field(0.3, ge=0.05, le=1.2, description="of the helix")
+    left_handed: bool = Field(False, description="helix; right-handed otherwise")
+    backward: bool = Field(False, description="tail first")
+
+
+class HelixPipeParameters(GaitParameters):
+    """What is pressed against, and how hard."""
+
+    frequency_hz: float = Field(0.2, ge=0.0, le=2.0, description="turns of the body a second")
+    pipe_radius_m: float = Field(0.15, ge=0.04, le=1.0, description="inner")
+    body_radius_m: float = Field(0.03, ge=0.002, le=0.5, description="of the robot")
+    press_m: float = Field(0.025, ge=-0.05, le=0.3, description="helix wider than the pipe by")
+    rise_rad: float = Field(0.35, ge=0.05, le=1.2, description="of the helix")
+    left_handed: bool = Field(False, description="helix; right-handed otherwise")
+    backward: bool = Field(False, description="tail first")
+
+
+class _Helix(Gait):
+    """Common to both: the sides of the body that touch are opposite, so it rolls the other way."""
+
+    source = SOURCE
+    needs = Needs(yaw=True, pitch=True)
+    p_gain = 300
+    inside: ClassVar[bool]
+
+    def _radius_m(self) -> float:
+        raise NotImplementedError
+
+    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+        p = self.params
+        hand = -1 if p.left_handed else 1
+        way = hand * (-1 if p.backward else 1) * (-1 if self.inside else 1)
+        return helix_joints_rad(robot, way * phase_rad, self._radius_m(), p.rise_rad, hand)
+
+    def advance_m(self) -> float:
+        """Along the axis in a cycle, without slip: ``2 pi r cos g``."""
+        p = self.params
+        return float(2.0 * np.pi * p.body_radius_m * math.cos(p.rise_rad))
+
+
+class HelixPole(_Helix):
+    """Curls round a pole and rolls up it."""
+
+    name = "helix-pole"
+    title = "wound round a pole, the body rolls about its own line and climbs"
+    model = HelixPoleParameters
+    world = "pole"
+    inside = False
+
+    def _radius_m(self) -> float:
+        p = self.params
+        return float(max(p.pole_radius_m + p.body_radius_m - p.grip_m, 1e-3))
+
+
+class HelixPipe(_Helix):
+    """Presses outwards against a pipe and rolls up it."""
+
+    name = "helix-pipe"
+    title = "coiled inside a pipe, the body presses outwards, rolls and climbs"
+    model = HelixPipeParameters
+    world = "pipe"
+    inside = True
+
+    def _radius_m(self) -> float:
+        p = self.params
+        return float(max(p.pipe_radius_m - p.body_radius_m + p.press_m, 1e-3))

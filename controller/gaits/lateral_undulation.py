@@ -1,0 +1,37 @@
+"""Lateral undulation: a serpenoid wave in the plane, which wheels or scales turn into thrust."""
+
+import numpy as np
+from pydantic import Field
+
+from config.robot import RobotConfig
+from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
+from controller.gaits.wave import joint_amplitude_rad, travelling
+
+
+class LateralUndulationParameters(GaitParameters):
+    """Hirose's serpenoid curve."""
+
+    winding_rad: float = Field(0.7, ge=0.0, le=1.4, description="body against its axis: alpha")
+    waves: float = Field(1.2, ge=0.5, le=3.0, description="on the body")
+    turn_rad: float = Field(
+        0.0, ge=-2.5, le=2.5, description="bend of the axis over the body; positive turns left"
+    )
+
+
+class LateralUndulation(Gait):
+    """``q_j = A sin(phase - 2 pi k s_j) + turn / n`` on the yaw joints."""
+
+    name = "lateral-undulation"
+    title = "a wave in the plane runs to the tail, the body goes forward along itself"
+    source = "S. Hirose, Biologically Inspired Robots, Oxford University Press, 1993: serpenoid"
+    needs = Needs(yaw=True, wheels=True)
+    world = "flat"
+    model = LateralUndulationParameters
+
+    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+        p, yaw = self.params, robot.yaw_joints
+        joints = np.zeros((len(phase_rad), robot.joint_count))
+        amplitude = joint_amplitude_rad(robot, yaw, p.winding_rad, p.waves)
+        wave = travelling(robot, yaw, phase_rad, p.waves, 0.0)
+        joints[:, yaw] = amplitude * wave + p.turn_rad / len(yaw)
+        return joints

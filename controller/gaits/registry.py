@@ -1,0 +1,53 @@
+"""The gaits by name."""
+
+from typing import Any
+
+from config.errors import InputError
+from controller.gaits.compound_serpenoid import CompoundSerpenoid
+from controller.gaits.concertina import Concertina
+from controller.gaits.gait import Gait
+from controller.gaits.helix import HelixPipe, HelixPole
+from controller.gaits.lateral_undulation import LateralUndulation
+from controller.gaits.rectilinear import Rectilinear
+from controller.gaits.rolling import Rolling
+from controller.gaits.sidewinding import Sidewinding
+from controller.gaits.spine import (
+    Anguilliform,
+    Carangiform,
+    Dolphin,
+    Subcarangiform,
+    Thunniform,
+)
+from controller.gaits.turn_in_place import TurnInPlace
+
+GAITS: dict[str, type[Gait]] = {
+    gait.name: gait
+    for gait in (
+        LateralUndulation,
+        Sidewinding,
+        Rolling,
+        TurnInPlace,
+        Rectilinear,
+        Concertina,
+        CompoundSerpenoid,
+        HelixPole,
+        HelixPipe,
+        Anguilliform,
+        Subcarangiform,
+        Carangiform,
+        Thunniform,
+        Dolphin,
+    )
+}
+
+
+def make_gait(name: str, values: dict[str, Any] | None = None, source: str = "") -> Gait:
+    """Make a gait by its name with parameters in place of defaults.
+
+    Raises:
+        InputError: no such gait, unknown parameters, values out of range; one line each.
+
+    """
+    if name not in GAITS:
+        raise InputError(f"{name}: no such gait; there are {', '.join(GAITS)}")
+    return GAITS[name].of(values, source)

@@ -1,0 +1,35 @@
+"""Rolling: the body lies in an arc and turns about its own line."""
+
+import numpy as np
+from pydantic import Field
+
+from config.robot import RobotConfig
+from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
+
+
+class RollingParameters(GaitParameters):
+    """One bend that goes round."""
+
+    bend_rad: float = Field(1.2, ge=0.1, le=5.0, description="of the whole body")
+
+
+class Rolling(Gait):
+    """All yaw joints together, all pitch joints a quarter behind; no wave along the body."""
+
+    name = "rolling"
+    title = "the body lies in an arc and rolls sideways like a log"
+    source = (
+        "M. Tesch et al., Parameterized and scripted gaits for modular snake robots, "
+        "Advanced Robotics 23, 2009: rolling"
+    )
+    needs = Needs(yaw=True, pitch=True)
+    model = RollingParameters
+
+    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+        joints = np.zeros((len(phase_rad), robot.joint_count))
+        for own, wave in (
+            (robot.yaw_joints, np.cos(phase_rad)),
+            (robot.pitch_joints, np.sin(phase_rad)),
+        ):
+            joints[:, own] = self.params.bend_rad / len(own) * wave[:, None]
+        return joints

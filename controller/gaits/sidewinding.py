@@ -1,0 +1,43 @@
+"""Sidewinding: a wave in the plane and one in height, a quarter apart: the body goes sideways."""
+
+import numpy as np
+from pydantic import Field
+
+from config.robot import RobotConfig
+from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
+from controller.gaits.wave import joint_amplitude_rad, travelling
+
+
+class SidewindingParameters(GaitParameters):
+    """Two waves of the same length."""
+
+    winding_rad: float = Field(0.7, ge=0.0, le=1.4, description="body against its axis, in plan")
+    lift_rad: float = Field(0.12, ge=0.0, le=0.8, description="body against its axis, in height")
+    waves: float = Field(1.5, ge=0.75, le=3.0, description="on the body")
+    lead_rad: float = Field(
+        float(np.pi / 2), ge=-np.pi, le=np.pi, description="of the wave in height: sign is side"
+    )
+    turn_rad: float = Field(0.0, ge=-1.5, le=1.5, description="bend of the axis over the body")
+
+
+class Sidewinding(Gait):
+    """Parts of the body lie still on the ground while the parts between are lifted across."""
+
+    name = "sidewinding"
+    title = "two waves a quarter apart carry the body sideways over ground of any friction"
+    source = (
+        "J. W. Burdick, J. Radford, G. S. Chirikjian, A sidewinding locomotion gait for "
+        "hyper-redundant robots, 1993; as compound serpenoid: Tesch et al., IROS 2009"
+    )
+    needs = Needs(yaw=True, pitch=True)
+    model = SidewindingParameters
+
+    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+        p, yaw, pitch = self.params, robot.yaw_joints, robot.pitch_joints
+        joints = np.zeros((len(phase_rad), robot.joint_count))
+        plan = joint_amplitude_rad(robot, yaw, p.winding_rad, p.waves)
+        lift = joint_amplitude_rad(robot, pitch, p.lift_rad, p.waves)
+        joints[:, yaw] = plan * travelling(robot, yaw, phase_rad, p.waves, 0.0)
+        joints[:, yaw] += p.turn_rad / len(yaw)
+        joints[:, pitch] = lift * travelling(robot, pitch, phase_rad, p.waves, p.lead_rad)
+        return joints

@@ -1,0 +1,171 @@
+"""Swimming with the spine: four modes of fish, as a wave that travels from head to tail.
+
+[GC] writes a standing wave (Eq. 11), which pushes no more forward than back; the same table of
+modes drives Lighthill's travelling form here, and the printed form stays as the parameter
+``standing``.
+Amplitudes are printed without a unit: taken in that of ``u``, of which a body is 2 pi long.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from config.robot import RobotConfig
+from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
+from controller.gaits.wave import TURN
+
+SAMPLES = 257
+"""Of the spine, before it is divided into equal links."""
+SOURCE = (
+    "G. Gonzalez Castro, M. Athanasopoulos, H. Ugail et al., Cyclic animation using partial "
+    "differential equations, The Visual Computer 26, 2010, Table 1; travelling form: "
+    "M. J. Lighthill, Annual Review of Fluid Mechanics 1, 1969"
+)
+
+
+class SpineParameters(GaitParameters):
+    """One row of the table."""
+
+    nose: float = Field(0.0, ge=0.0, le=1.5, description="amplitude at the head, body = 2 pi")
+    tail: float = Field(0.3, ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")
+    waves: float = Field(1.5, ge=0.1, le=3.0, description="on the body: alpha")
+    phase_rad: float = Field(
+        float(np.pi / 2), ge=-np.pi, le=np.pi, description="of the standing form only: phi"
+    )
+    standing: bool = Field(False, description="Eq. 11 as printed: no thrust")
+    turn_rad: float = Field(0.0, ge=-2.5, le=2.5, description="bend over the body; positive: left")
+
+
+def spine_bends_rad(
+    phase_rad: Floats, joints: int, p: SpineParameters, edges: Floats | None = None
+) -> Floats:
+    """(T, joints) bends of a chain of ``joints + 1`` links laid along the spine at phases (T,).
+
+    The spine ``y(u)``, u from 0 at the head to 2 pi, is divided into parts of equal arc length (or
+    at the shares ``edges`` of it) before its headings are read: they are those of rigid links, not
+    of slices in u.
+    """
+    u = np.linspace(0.0, TURN, SAMPLES)
+    y = offset(u, phase_rad, p)
+    run = np.zeros_like(y)
+    run[:, 1:] = np.hypot(np.diff(u), np.diff(y, axis=1)).cumsum(axis=1)
+    shares = np.linspace(0.0, 1.0, joints + 2) if edges is None else edges
+    headings = np.empty((len(y), len(shares) - 1))
+    for t, (way, side) in enumerate(zip(run, y, strict=True)):
+        at = shares * way[-1]
+        back, left = np.interp(at, way, u), np.interp(at, way, side)
+        headings[t] = np.arctan2(-np.diff(left), np.diff(back))  # of travel: towards the head
+    return np.asarray(headings[:, :-1] - headings[:, 1:])
+
+
+def offset(u: Floats, phase_rad: Floats, p: SpineParameters) -> Floats:
+    """(T, U) of the spine to its left, in the unit of ``u``; the phase is ``2 pi omega t``."""
+    size = p.nose + (p.tail - p.nose) * u / TURN
+    phase = phase_rad[:, None]
+    if p.standing:
+        return np.asarray(size * np.cos(p.waves * u + p.phase_rad) * np.sin(phase))
+    return np.asarray(size * np.sin(p.waves * u - phase))
+
+
+class SpineGait(Gait):
+    """A mode; subclasses name its row of the table."""
+
+    source = SOURCE
+    needs = Needs(yaw=True)
+    model = SpineParameters
+    world = "pool"
+    vertical: ClassVar[bool] = False
+
+    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+        p = self.params
+        own = robot.pitch_joints if self.vertical else robot.yaw_joints
+        edges = np.concatenate([[0.0], (np.array(own) + 1.0) / (robot.joint_count + 1), [1.0]])
+        joints = np.zeros((len(phase_rad), robot.joint_count))
+        joints[:, own] = spine_bends_rad(phase_rad, len(own), p, edges)
+        if robot.yaw_joints:
+            joints[:, robot.yaw_joints] += p.turn_rad / len(robot.yaw_joints)
+        return joints
+
+
+class AnguilliformParameters(SpineParameters):
+    """Eel: Omega = 0.3 u / 2 pi, alpha 1.5, omega 1."""
+
+    frequency_hz: float = Field(1.0, ge=0.0, le=2.0, description="cycles a second")
+
+
+class Anguilliform(SpineGait):
+    """The whole body takes part."""
+
+    name = "anguilliform"
+    title = "swims as an eel does: one and a half waves, growing to the tail"
+    model = AnguilliformParameters
+
+
+class SubcarangiformParameters(SpineParameters):
+    """Trout: Omega = u / 2 pi, alpha 0.75, omega 2."""
+
+    frequency_hz: float = Field(2.0, ge=0.0, le=2.0, description="cycles a second")
+    tail: float = Field(1.0, ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")
+    waves: float = Field(0.75, ge=0.1, le=3.0, description="on the body: alpha")
+
+
+class Subcarangiform(SpineGait):
+    """The rear two thirds do most."""
+
+    name = "subcarangiform"
+    title = "swims as a trout does: three quarters of a wave, growing to the tail"
+    model = SubcarangiformParameters
+
+
+class CarangiformParameters(SpineParameters):
+    """Tropical fish: Omega = 0.1, alpha 1, omega 2."""
+
+    frequency_hz: float = Field(2.0, ge=0.0, le=2.0, description="cycles a second")
+    nose: float = Field(0.1, ge=0.0, le=1.5, description="amplitude at the head, body = 2 pi")
+    tail: float = Field(0.1, ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")
+    waves: float = Field(1.0, ge=0.1, le=3.0, description="on the body: alpha")
+
+
+class Carangiform(SpineGait):
+    """As printed with the same small amplitude everywhere."""
+
+    name = "carangiform"
+    title = "swims as a tropical fish does: one small wave of even amplitude"
+    model = CarangiformParameters
+
+
+class ThunniformParameters(SpineParameters):
+    """Shark: Omega = u / 2 pi, alpha 0.25, phi 0, omega 1."""
+
+    frequency_hz: float = Field(1.0, ge=0.0, le=2.0, description="cycles a second")
+    tail: float = Field(1.0, ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")
+    waves: float = Field(0.25, ge=0.1, le=3.0, description="on the body: alpha")
+    phase_rad: float = Field(0.0, ge=-np.pi, le=np.pi, description="of the standing form only: phi")
+
+
+class Thunniform(SpineGait):
+    """A quarter of a wave: nearly a swinging tail."""
+
+    name = "thunniform"
+    title = "swims as a shark does: a quarter of a wave, mostly tail"
+    model = ThunniformParameters
+
+
+class DolphinParameters(SpineParameters):
+    """Dolphin: Omega = 1, alpha 0.75, omega 1.3; up and down."""
+
+    frequency_hz: float = Field(1.3, ge=0.0, le=2.0, description="cycles a second")
+    nose: float = Field(1.0, ge=0.0, le=1.5, description="amplitude at the head, body = 2 pi")
+    tail: float = Field(1.0, ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")
+    waves: float = Field(0.75, ge=0.1, le=3.0, description="on the body: alpha")
+
+
+class Dolphin(SpineGait):
+    """The other thunniform row of the table; whales and dolphins beat up and down."""
+
+    name = "thunniform-dolphin"
+    title = "swims as a dolphin does: three quarters of a wave, up and down"
+    needs = Needs(pitch=True)
+    model = DolphinParameters
+    vertical = True

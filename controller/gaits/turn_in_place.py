@@ -1,0 +1,39 @@
+"""Turn in place: sidewinding whose two halves go opposite ways."""
+
+import numpy as np
+from pydantic import Field
+
+from config.robot import RobotConfig
+from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
+from controller.gaits.wave import joint_amplitude_rad, places, travelling
+
+
+class TurnInPlaceParameters(GaitParameters):
+    """As sidewinding, the lift growing from the middle to both ends with opposite signs."""
+
+    winding_rad: float = Field(0.7, ge=0.0, le=1.4, description="body against its axis, in plan")
+    lift_rad: float = Field(0.1, ge=0.0, le=0.8, description="at the ends, in height")
+    waves: float = Field(1.5, ge=0.75, le=3.0, description="on the body")
+
+
+class TurnInPlace(Gait):
+    """The head half sidewinds to one side, the tail half to the other."""
+
+    name = "turn-in-place"
+    title = "the halves sidewind to opposite sides, the body turns about its middle"
+    source = (
+        "M. Tesch et al., Parameterized and scripted gaits for modular snake robots, "
+        "Advanced Robotics 23, 2009: amplitude modulated along the body"
+    )
+    needs = Needs(yaw=True, pitch=True)
+    model = TurnInPlaceParameters
+
+    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+        p, yaw, pitch = self.params, robot.yaw_joints, robot.pitch_joints
+        joints = np.zeros((len(phase_rad), robot.joint_count))
+        plan = joint_amplitude_rad(robot, yaw, p.winding_rad, p.waves)
+        lift = joint_amplitude_rad(robot, pitch, p.lift_rad, p.waves)
+        share = np.sign(1.0 - 2.0 * places(robot, pitch))
+        joints[:, yaw] = plan * travelling(robot, yaw, phase_rad, p.waves, 0.0)
+        joints[:, pitch] = lift * share * travelling(robot, pitch, phase_rad, p.waves, np.pi / 2)
+        return joints

@@ -1,0 +1,177 @@
+"""Joining one motion to another without a step.
+
+What the joints do at the moment of the join differs from what the new source does by an error in
+angle and in speed. The new source runs from then on, and the error dies out along a polynomial that
+begins with exactly that angle and speed: the sum is C1 whatever the two sources are. Where the sum
+would be too fast the new source starts at a slower rate, down to rest, and speeds up meanwhile:
+
+    q(t) = target(s(t)) + e(t),   s' = r0 + (1 - r0) S((x - d) / (1 - d)),   x = t / T
+    e(t) = e0 + v0 B(t) - (e0 + v0 T_b / 2) P(x),   P(x) = 10 x^3 - 15 x^4 + 6 x^5
+
+with S(y) = 3 y^2 - 2 y^3, 0 below 0 and 1 above 1, and d = ``DELAY``. B brakes the error's speed
+within ``T_b``. T is the shortest for which the largest speed and acceleration that the target
+states, and those of the error, keep together within the limits.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.motion.source import MotionSource, Pace
+from controller.runtime.body import BodyView
+
+Floats = NDArray[np.float64]
+
+RATES = (1.0, 0.7, 0.4, 0.0)
+"""Rates at which the target may start; slower ones are tried where faster ones take too long."""
+PATIENCE_S = (0.5, 1.0, 1.6, np.inf)
+"""How long a join may take for each."""
+DURATIONS_S = np.geomspace(0.25, 32.0, 36)
+BRAKE_SHARE = 0.4
+"""Of the acceleration limit, for the brake of the error's speed."""
+TOLERANCE = 0.02
+"""A target at its limits and the last of an error add up to a little more than a limit."""
+DELAY = 0.3
+"""Share of a join before a slowed target speeds up: most of the error should be gone by then."""
+_X = np.linspace(0.0, 1.0, 25)
+
+
+@dataclass(frozen=True, slots=True)
+class Join:
+    """Numbers of one join."""
+
+    rate: float
+    """r0"""
+    duration_s: float
+    brake_s: float
+    error_rad: Floats
+    """(J,) e0"""
+    error_rad_s: Floats
+    """(J,) v0"""
+
+    def source_time_s(self, t_s: float) -> float:
+        """How far the target has gone by ``t_s``."""
+        x = min(t_s / self.duration_s, 1.0) if self.duration_s > 0.0 else 1.0
+        y = max(0.0, (x - DELAY) / (1.0 - DELAY))
+        sped_up = (1.0 - self.rate) * (1.0 - DELAY) * (y**3 - 0.5 * y**4)
+        blended = self.duration_s * (self.rate * x + sped_up)
+        return float(blended + max(t_s - self.duration_s, 0.0))
+
+    def source_rate(self, t_s: float) -> float:
+        """Rate s' of the target at ``t_s``."""
+        x = min(t_s / self.duration_s, 1.0) if self.duration_s > 0.0 else 1.0
+        y = max(0.0, (x - DELAY) / (1.0 - DELAY))
+        return float(self.rate + (1.0 - self.rate) * y * y * (3.0 - 2.0 * y))
+
+    def error_at(self, t_s: float) -> tuple[Floats, Floats]:
+        """(J,) what is left of the error in angle and in speed."""
+        if t_s >= self.duration_s:
+            zero = np.zeros(len(self.error_rad))
+            return zero, zero
+        x = t_s / self.duration_s
+        y = min(t_s / self.brake_s, 1.0)
+        braked_s = min(t_s, self.brake_s) - self.brake_s * (y**3 - 0.5 * y**4)
+        left = 1.0 - y * y * (3.0 - 2.0 * y)
+        total = self.error_rad + 0.5 * self.brake_s * self.error_rad_s
+        p = x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+        dp = 30.0 * x * x * (1.0 - x) ** 2 / self.duration_s
+        return (
+            self.error_rad + self.error_rad_s * braked_s - total * p,
+            self.error_rad_s * left - total * dp,
+        )
+
+
+def plan_join(angle_rad: Floats, speed_rad_s: Floats, target: MotionSource, limit: Pace) -> Join:
+    """Choose rate and duration of a join from joints at an angle and speed (J,) to ``target``.
+
+    Raises:
+        ValueError: the target itself asks for more than ``limit``.
+
+    """
+    error = angle_rad - target.goal_rad()
+    velocity, pace = target.velocity_rad_s(), target.pace()
+    for rate, patience_s in zip(RATES, PATIENCE_S, strict=True):
+        error_speed = speed_rad_s - rate * velocity
+        if rate == 1.0 and max(np.abs(error).max(), np.abs(error_speed).max()) < 1e-9:
+            return Join(1.0, 0.0, 0.0, error, error_speed)
+        fits = np.flatnonzero(_within(rate, error, error_speed, pace, limit))
+        if len(fits) and (duration_s := float(DURATIONS_S[fits[0]])) <= patience_s:
+            brake = float(_brake_s(error_speed, limit, DURATIONS_S[fits[0]]))
+            return Join(rate, duration_s, brake, error, error_speed)
+    raise ValueError("a motion cannot be joined: it asks for more than the robot's limits")
+
+
+def _brake_s(error_speed: Floats, limit: Pace, duration_s: Floats) -> Floats:
+    """Time of the brake for each duration: by acceleration, at most half of the join."""
+    needed = (1.5 * np.abs(error_speed) / (BRAKE_SHARE * limit.acceleration_rad_s2)).max()
+    return np.asarray(np.minimum(0.5 * duration_s, max(float(needed), 0.02)))
+
+
+def _within(
+    rate: float, error: Floats, error_speed: Floats, pace: Pace, limit: Pace
+) -> NDArray[np.bool_]:
+    """For each of ``DURATIONS_S``: whether speed and acceleration stay within the limits."""
+    duration = DURATIONS_S[:, None]
+    brake = _brake_s(error_speed, limit, duration)
+    z = np.maximum(0.0, (_X - DELAY) / (1.0 - DELAY))
+    r = rate + (1.0 - rate) * z * z * (3.0 - 2.0 * z)
+    dr = (1.0 - rate) * 6.0 * z * (1.0 - z) / ((1.0 - DELAY) * duration)
+    dp = 30.0 * _X**2 * (1.0 - _X) ** 2 / duration
+    ddp = 60.0 * _X * (1.0 - _X) * (1.0 - 2.0 * _X) / duration**2
+    y = np.minimum(_X * duration / brake, 1.0)
+    left = 1.0 - y * y * (3.0 - 2.0 * y)
+    dleft = -6.0 * y * (1.0 - y) / brake
+    good = np.ones(len(DURATIONS_S), dtype=bool)
+    for j in range(len(error)):
+        total = error[j] + 0.5 * brake * error_speed[j]
+        speed = r * pace.speed_rad_s[j] + np.abs(error_speed[j] * left - total * dp)
+        acceleration = (
+            dr * pace.speed_rad_s[j]
+            + r * r * pace.acceleration_rad_s2[j]
+            + np.abs(error_speed[j] * dleft - total * ddp)
+        )
+        most, hardest = limit.speed_rad_s[j], limit.acceleration_rad_s2[j]
+        good &= (speed <= (1.0 + TOLERANCE) * most).all(axis=1)
+        good &= (acceleration <= (1.0 + TOLERANCE) * hardest).all(axis=1)
+    return good
+
+
+class Blend:
+    """A target while it is being joined, and after."""
+
+    def __init__(
+        self, angle_rad: Floats, speed_rad_s: Floats, target: MotionSource, limit: Pace
+    ) -> None:
+        """Join joints at an angle and a speed (J,) to ``target``.
+
+        Raises:
+            ValueError: the target itself asks for more than ``limit``.
+
+        """
+        self.target = target
+        self.join = plan_join(angle_rad, speed_rad_s, target, limit)
+        self._t_s = 0.0
+
+    @property
+    def over(self) -> bool:
+        """Whether only the target is left."""
+        return self._t_s >= self.join.duration_s
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return np.asarray(self.target.goal_rad() + self.join.error_at(self._t_s)[0])
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        rate = self.join.source_rate(self._t_s)
+        return np.asarray(rate * self.target.velocity_rad_s() + self.join.error_at(self._t_s)[1])
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Go on by ``dt_s`` and return the new targets (J,)."""
+        if self.over:
+            return self.target.step(dt_s, view)
+        before_s = self.join.source_time_s(self._t_s)
+        self._t_s += dt_s
+        goal = self.target.step(self.join.source_time_s(self._t_s) - before_s, view)
+        return np.asarray(goal + self.join.error_at(self._t_s)[0])

@@ -1,0 +1,105 @@
+"""The head looks where it is asked to while the body moves: the neck undoes what the body does."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import RobotConfig
+from controller.gaits.gait import Needs
+from controller.motion.follow import Follower
+from controller.motion.source import MotionSource, Pace
+from controller.runtime.body import BodyView
+
+Floats = NDArray[np.float64]
+LEAD_S = 0.12
+"""How far the swing of the body is foreseen: the servos' lag and the follower's."""
+RANGE_SHARE = 0.9
+"""Of the neck joints' range."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A heading in the world, or a point in it to look at."""
+
+    heading_rad: float | None = None
+    point_m: tuple[float, float] | None = None
+
+    def heading_from(self, head_m: Floats) -> float:
+        """Heading wanted of a head at (2,) or (3,)."""
+        if self.point_m is not None:
+            x, y = self.point_m
+            return float(np.arctan2(y - head_m[1], x - head_m[0]))
+        return 0.0 if self.heading_rad is None else self.heading_rad
+
+
+class HeadSteering:
+    """Another source with its first yaw joints, the neck, taken over."""
+
+    def __init__(
+        self, source: MotionSource, robot: RobotConfig, look: Look, neck_joints: int = 2
+    ) -> None:
+        """Take over the first ``neck_joints`` yaw joints of ``source``.
+
+        Raises:
+            InputError: the robot has no yaw joint, or lacks what the source needs.
+
+        """
+        self.needs = Needs(yaw=True, pitch=source.needs.pitch, wheels=source.needs.wheels)
+        self.needs.check(robot, "head steering")
+        self.source, self.look = source, look
+        self._neck = np.array(robot.yaw_joints[:neck_joints])
+        self._robot = robot
+        self._reach = RANGE_SHARE * robot.yaw_limit_rad
+        self._follower = Follower(
+            source.goal_rad()[self._neck],
+            robot.joint_speed_limit_rad_s,
+            robot.joint_acceleration_limit_rad_s2,
+        )
+        self._last_rad: float | None = None
+        self._swing_rad_s = 0.0
+
+    @property
+    def done(self) -> bool:
+        """Whether the body is done."""
+        return self.source.done
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return self._with_neck(self.source.goal_rad(), self._follower.angle_rad)
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        return self._with_neck(self.source.velocity_rad_s(), self._follower.speed_rad_s)
+
+    def pace(self) -> Pace:
+        """The source's, and all that the robot allows in the neck."""
+        pace, limit = self.source.pace(), Pace.limit(self._robot)
+        return Pace(
+            self._with_neck(pace.speed_rad_s, limit.speed_rad_s[self._neck]),
+            self._with_neck(pace.acceleration_rad_s2, limit.acceleration_rad_s2[self._neck]),
+        )
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Go on by ``dt_s``; the neck makes up for the heading of the link behind it."""
+        goal = self.source.step(dt_s, view)
+        shoulders = float(view.headings_rad[self._neck[-1] + 1])
+        if self._last_rad is not None and dt_s > 0.0:
+            turn = _wrapped(shoulders - self._last_rad)
+            share = min(1.0, dt_s / 0.06)
+            self._swing_rad_s += share * (turn / dt_s - self._swing_rad_s)
+        self._last_rad = shoulders
+        wanted = _wrapped(self.look.heading_from(view.link_m[0]) - shoulders)
+        each = (wanted - LEAD_S * self._swing_rad_s) / len(self._neck)
+        each = min(max(each, -self._reach), self._reach)
+        angles = self._follower.step(dt_s, np.full(len(self._neck), each))
+        return self._with_neck(goal, angles)
+
+    def _with_neck(self, joints: Floats, neck: Floats) -> Floats:
+        together = np.array(joints, dtype=float)
+        together[self._neck] = neck
+        return together
+
+
+def _wrapped(angle_rad: float) -> float:
+    return float((angle_rad + np.pi) % (2.0 * np.pi) - np.pi)

@@ -1,0 +1,155 @@
+"""A live operator as a motion source: keys change a gait's parameters, the gait itself, its rate.
+
+Keys come as names from a keyboard, a gamepad or a test; what they do goes through the same joins as
+any other change of motion, so nothing that an operator presses can make a step.
+"""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.errors import InputError
+from config.robot import RobotConfig
+from controller.gaits.gait import Needs
+from controller.gaits.ranges import Range, ranges
+from controller.gaits.registry import GAITS, make_gait
+from controller.motion.gait_motion import GaitMotion
+from controller.motion.source import Pace
+from controller.runtime.body import BodyView
+
+Floats = NDArray[np.float64]
+KEYS = {
+    "up": "the parameter before",
+    "down": "the next parameter",
+    "left": "less of it",
+    "right": "more of it",
+    "n": "next gait",
+    "p": "gait before",
+    "m": "mirror",
+    "d": "defaults",
+    "space": "halt, go on",
+    "q": "stop",
+}
+HALT_S = 0.5
+
+
+class Operator:
+    """Runs a gait as keys tell."""
+
+    def __init__(
+        self,
+        motion: GaitMotion,
+        robot: RobotConfig,
+        keys: Callable[[], Iterable[str]],
+        say: Callable[[str, str], None],
+    ) -> None:
+        """Put ``keys`` in charge of ``motion``.
+
+        Args:
+            motion: the gait to begin with.
+            robot: for the gaits to change to.
+            keys: names of ``KEYS`` pressed since the last call; others are ignored.
+            say: told ("operator", text) of what was done or refused.
+
+        """
+        self.motion = motion
+        self._robot, self._keys, self._say = robot, keys, say
+        self._chosen = 0
+        self._halted = False
+        self._rate = 1.0
+
+    @property
+    def needs(self) -> Needs:
+        """Those of the gait that runs."""
+        return self.motion.needs
+
+    @property
+    def done(self) -> bool:
+        """Whether the operator, or the gait's duration, has stopped it."""
+        return self.motion.done
+
+    @property
+    def selected(self) -> str:
+        """Parameter that left and right change."""
+        return list(self._ranges())[self._chosen]
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return self.motion.goal_rad()
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        return self._rate * self.motion.velocity_rad_s()
+
+    def pace(self) -> Pace:
+        """The robot's limits: what the operator will do is not known."""
+        return Pace.limit(self._robot)
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Do what the keys say, then go on by ``dt_s``."""
+        for key in self._keys():
+            self._press(key)
+        change = dt_s / HALT_S
+        before = self._rate
+        wanted = 0.0 if self._halted and not self.motion.stopping else 1.0
+        self._rate += min(max(wanted - self._rate, -change), change)
+        return self.motion.step(0.5 * (before + self._rate) * dt_s, view)
+
+    def _press(self, key: str) -> None:
+        if key in {"up", "down"}:
+            self._chosen = (self._chosen + (1 if key == "down" else -1)) % len(self._ranges())
+            self._tell(f"{self.selected} = {getattr(self.motion.gait.params, self.selected)}")
+        elif key in {"left", "right"}:
+            self._nudge(self.selected, 1.0 if key == "right" else -1.0)
+        elif key in {"n", "p"}:
+            self._other(1 if key == "n" else -1)
+        elif key == "m":
+            self._change(mirror=not self.motion.gait.params.mirror)
+        elif key == "d":
+            self._become(self.motion.gait.name)
+        elif key == "space":
+            self._halted = not self._halted
+            self._tell("halt" if self._halted else "go on")
+        elif key == "q":
+            self.motion.stop()
+            self._tell("stop")
+
+    def _nudge(self, name: str, sign: float) -> None:
+        span = self._ranges()[name]
+        value = getattr(self.motion.gait.params, name) + sign * span.step
+        value = min(max(value, span.low), span.high)
+        self._change(**{name: span.kind(round(value, 6))})
+
+    def _change(self, **values: float) -> None:
+        try:
+            self.motion.change(**values)
+        except InputError as error:
+            self._tell(f"refused: {error.faults[0]}")
+        else:
+            self._tell(", ".join(f"{name} = {value}" for name, value in values.items()))
+
+    def _other(self, step: int) -> None:
+        names = list(GAITS)
+        at = names.index(self.motion.gait.name) if self.motion.gait.name in names else 0
+        for away in range(1, len(names)):
+            if self._become(names[(at + step * away) % len(names)], quietly=True):
+                return
+        self._tell("refused: no other gait suits this robot")
+
+    def _become(self, name: str, *, quietly: bool = False) -> bool:
+        try:
+            self.motion.become(make_gait(name))
+        except InputError as error:
+            if not quietly:
+                self._tell(f"refused: {error.faults[0]}")
+            return False
+        self._chosen = 0
+        self._tell(f"gait {name}")
+        return True
+
+    def _ranges(self) -> dict[str, Range]:
+        return ranges(self.motion.gait.model)
+
+    def _tell(self, text: str) -> None:
+        self._say("operator", text)

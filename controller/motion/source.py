@@ -1,0 +1,95 @@
+"""The one interface of everything that moves joints: walker, gait, recording, live operator."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import RobotConfig
+from controller.gaits.gait import Needs
+from controller.runtime.body import BodyView
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How fast joints go at most: what a source will ask, or what a robot may be asked."""
+
+    speed_rad_s: Floats
+    """(J,)"""
+    acceleration_rad_s2: Floats
+    """(J,)"""
+
+    @staticmethod
+    def limit(robot: RobotConfig) -> "Pace":
+        """Return what a plan may ask of ``robot``."""
+        ones = np.ones(robot.joint_count)
+        return Pace(
+            robot.joint_speed_limit_rad_s * ones, robot.joint_acceleration_limit_rad_s2 * ones
+        )
+
+    @staticmethod
+    def still(joints: int) -> "Pace":
+        """Return the pace of joints that do not move."""
+        return Pace(np.zeros(joints), np.zeros(joints))
+
+
+class MotionSource(Protocol):
+    """Joint targets with time. A source keeps within the robot's limits by itself.
+
+    ``step`` with a shorter time is the same motion at a slower rate: joins and derating use that.
+    """
+
+    @property
+    def needs(self) -> Needs:
+        """What it asks of the robot."""
+        ...
+
+    @property
+    def done(self) -> bool:
+        """Whether it has come to its end and rests."""
+        ...
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        ...
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        ...
+
+    def pace(self) -> Pace:
+        """How fast they will move at most, from now on."""
+        ...
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Go on by ``dt_s`` (0 or more) and return the new targets (J,)."""
+        ...
+
+
+class Hold:
+    """Joints that stay where they are."""
+
+    needs = Needs()
+    done = True
+
+    def __init__(self, joint_rad: Floats) -> None:
+        self._joint_rad = np.array(joint_rad, dtype=float)
+
+    def goal_rad(self) -> Floats:
+        """(J,) as given."""
+        return self._joint_rad
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) zeros."""
+        return np.zeros(len(self._joint_rad))
+
+    def pace(self) -> Pace:
+        """None."""
+        return Pace.still(len(self._joint_rad))
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Stay."""
+        return self._joint_rad

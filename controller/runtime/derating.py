@@ -1,0 +1,149 @@
+"""Slowing down before a servo trips: heat, current and supply against the safety limits.
+
+The rate is 1 while everything is well and falls to ``LEAST`` where a limit would be reached, so a
+motion goes on slower, cooler and with less current instead of stopping. It falls quickly and comes
+back slowly. Safety below stays as it is: what gets worse all the same still trips.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.run import SafetyConfig
+from drivers.types import JointState
+
+Floats = NDArray[np.float64]
+
+LEAST = 0.25
+"""Of the rate; a motion that stood still could not be told from one that hangs."""
+HEAT_BAND_C = 10.0
+"""From so far below the limit on, down to ``HEAT_EDGE_C`` below it."""
+HEAT_EDGE_C = 2.0
+CURRENT_START, CURRENT_END = 0.75, 0.98
+"""Shares of the current limit."""
+VOLTAGE_BAND_V = 0.8
+"""Above the least supply."""
+VOLTAGE_EDGE_V = 0.2
+FALL_S, RISE_S = 0.4, 6.0
+"""Time constants of the rate."""
+CURRENT_S = 0.2
+"""Over which current is averaged: a peak is no load."""
+SAY_BELOW, SAY_ABOVE = 0.95, 0.99
+
+
+@dataclass(frozen=True, slots=True)
+class Allowed:
+    """What a state allows."""
+
+    rate: float
+    """1 down to ``LEAST``."""
+    reason: str
+    """What limits it, one line; empty at 1."""
+
+
+PLENTY = Allowed(1.0, "")
+
+
+_FULL = Allowed(1.0, "")
+
+
+def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allowed:
+    """Judge a state; temperatures and voltages that were not read yet (NaN) limit nothing.
+
+    Args:
+        state: of the servos.
+        current_a: (J,) averaged magnitudes.
+        safety: the limits at which servos are stopped.
+
+    """
+    heat, amps, volts = state.temperature_c, current_a, state.voltage_v
+    limit_c, limit_a, least_v = (
+        safety.temperature_limit_c,
+        safety.current_limit_a,
+        safety.voltage_min_v,
+    )
+    if (  # as nearly always; a comparison with a NaN counts as none, and is left to what follows
+        np.fmax.reduce(heat) <= limit_c - HEAT_BAND_C
+        and np.maximum.reduce(amps) <= CURRENT_START * limit_a
+        and np.fmin.reduce(volts) >= least_v + VOLTAGE_BAND_V
+    ):
+        return PLENTY
+    # All is well in nearly every cycle: find that out at a tenth of the cost
+    if not any(
+        np.count_nonzero(bad)
+        for bad in (
+            heat > limit_c - HEAT_BAND_C,
+            amps > CURRENT_START * limit_a,
+            volts < least_v + VOLTAGE_BAND_V,
+        )
+    ):
+        return _FULL
+    judged = (
+        (_falling(heat, limit_c - HEAT_BAND_C, limit_c - HEAT_EDGE_C), heat, "{:.0f} C", limit_c),
+        (
+            _falling(amps, CURRENT_START * limit_a, CURRENT_END * limit_a),
+            amps,
+            "{:.2f} A",
+            limit_a,
+        ),
+        (
+            _falling(-volts, -least_v - VOLTAGE_BAND_V, -least_v - VOLTAGE_EDGE_V),
+            volts,
+            "{:.1f} V",
+            least_v,
+        ),
+    )
+    rates, values, unit, limit = min(judged, key=lambda each: float(each[0].min()))
+    joint = int(np.argmin(rates))
+    rate = LEAST + (1.0 - LEAST) * float(rates[joint])
+    if rate >= 1.0:
+        return PLENTY
+    text = f"joint {joint + 1} at {unit.format(values[joint])}, limit {unit.format(limit)}"
+    return Allowed(rate, text)
+
+
+def _falling(values: Floats, start: float, end: float) -> Floats:
+    """1 up to ``start``, 0 from ``end`` on, a line between; 1 for NaN."""
+    share = np.clip((end - values) / (end - start), 0.0, 1.0)
+    return np.asarray(np.where(np.isfinite(values), share, 1.0))
+
+
+class Derating:
+    """Call ``update`` in every cycle; multiplies the rate of whatever moves."""
+
+    def __init__(self, safety: SafetyConfig) -> None:
+        self.rate = 1.0
+        self.least = 1.0
+        """Lowest rate so far."""
+        self._safety = safety
+        self._current_a: Floats | None = None
+        self._said = False
+        self._news: list[str] = []
+
+    def update(self, state: JointState, dt_s: float) -> float:
+        """Take in a state and return the rate, LEAST to 1."""
+        amps = np.abs(state.current_a)
+        if self._current_a is None:
+            self._current_a = np.zeros(len(amps))
+        self._current_a = self._current_a + min(1.0, dt_s / CURRENT_S) * (amps - self._current_a)
+        now = allowed(state, self._current_a, self._safety)
+        if now.rate == self.rate:
+            return self.rate
+        time_s = FALL_S if now.rate < self.rate else RISE_S
+        self.rate += min(1.0, dt_s / time_s) * (now.rate - self.rate)
+        if now.rate == 1.0 and self.rate > 0.999:
+            self.rate = 1.0
+        self.least = min(self.least, self.rate)
+        if not self._said and self.rate < SAY_BELOW:
+            self._said = True
+            self._news.append(f"slowing down: {now.reason}")
+        elif self._said and self.rate > SAY_ABOVE:
+            self._said = False
+            self._news.append("at full rate again")
+        return self.rate
+
+    def news(self) -> list[str]:
+        """Lines for the operator since the last call."""
+        news, self._news = self._news, []
+        return news
