@@ -11,13 +11,16 @@ from controller.capture.kinds import KNOWN
 from controller.capture.track import Track
 
 
-def load_track(name_or_path: str, rate_hz: float | None = None) -> Track:
+def load_track(
+    name_or_path: str, rate_hz: float | None = None, least_score: float | None = None
+) -> Track:
     """Load a shipped recording by name, or a file by path.
 
     Args:
         name_or_path: a name of ``EMBEDDED``; or figures in a ``.toml`` (``RecordingConfig``); or a
             file of one of the kinds of ``kinds.KNOWN``.
         rate_hz: frames a second of a file, taken instead of what it (or its kind) says.
+        least_score: keypoints of a file whose score is below it count as missing.
 
     Raises:
         InputError: neither name nor file, no known format, or a fault inside it.
@@ -27,6 +30,10 @@ def load_track(name_or_path: str, rate_hz: float | None = None) -> Track:
     made = name_or_path in EMBEDDED or path.suffix == ".toml"
     if made and rate_hz is not None:
         raise InputError(f"{name_or_path}: its figures hold the frame rate; give one for files")
+    if made and least_score:
+        raise InputError(
+            f"{name_or_path}: is made from figures and has no scores; give one for files"
+        )
     if name_or_path in EMBEDDED:
         return embedded(name_or_path)
     if not path.exists():
@@ -36,7 +43,7 @@ def load_track(name_or_path: str, rate_hz: float | None = None) -> Track:
         )
     if path.suffix == ".toml":
         return generate(load(path, RecordingConfig))
-    return load_file(path, rate_hz)
+    return load_file(path, rate_hz, least_score)
 
 
 def track_beside(name_or_path: str, folder: Path | None) -> str:

@@ -1,4 +1,4 @@
-"""Recordings as tables: midlines point by point, and SLEAP keypoints frame by frame."""
+"""Recordings as tables: midlines point by point, keypoints frame by frame."""
 
 import csv
 from pathlib import Path
@@ -7,17 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
+from controller.capture.deeplabcut import is_deeplabcut, load_rows
 from controller.capture.kinds import KNOWN
+from controller.capture.sleap import load_table
 from controller.capture.track import Track, track_from_points
 
 Floats = NDArray[np.float64]
-SLEAP_RATE_HZ = 30.0
-"""Taken when nobody says otherwise: SLEAP's tables hold no frame rate."""
 _MIDLINE = {("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0}
 
 
-def load_csv(file: Path, rate_hz: float | None) -> Track:
-    """Load either table; see ``formats.load_file``."""
+def load_csv(file: Path, rate_hz: float | None, least_score: float | None = None) -> Track:
+    """Load any of the tables; see ``formats.load_file``."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
             rows = [row for row in csv.reader(stream) if row]
@@ -25,6 +25,8 @@ def load_csv(file: Path, rate_hz: float | None) -> Track:
         raise InputError(f"{file}: is no recording; known: {KNOWN}") from None
     if len(rows) < 2:
         raise InputError(f"{file}: expected a line of column names, then rows of numbers")
+    if is_deeplabcut(rows):
+        return load_rows(file, rows, rate_hz, least_score)
     column = {name.strip(): index for index, name in enumerate(rows[0])}
     for pair, scale_m in _MIDLINE.items():
         if {"t", "frame", "point", *pair} <= column.keys():
@@ -32,10 +34,11 @@ def load_csv(file: Path, rate_hz: float | None) -> Track:
             return _midline(file, _numbers(file, rows, wanted), scale_m, rate_hz)
     keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
     if keypoints and "frame_idx" in column:
-        return _sleap(file, rows, column, keypoints, rate_hz)
+        return _sleap(file, rows, column, keypoints, rate_hz, least_score)
     raise InputError(
-        f"{file}: expected the columns t, frame, point, x_m, y_m (or x_mm, y_mm; mxmm, mymm), or "
-        f"SLEAP's frame_idx and <keypoint>.x, <keypoint>.y; found {', '.join(rows[0][:6])[:80]}"
+        f"{file}: expected the columns t, frame, point, x_m, y_m (or x_mm, y_mm; mxmm, mymm), "
+        "SLEAP's frame_idx and <keypoint>.x, <keypoint>.y, or DeepLabCut's scorer, bodyparts and "
+        f"coords in the first lines; found {', '.join(rows[0][:6])[:80]}"
     )
 
 
@@ -87,20 +90,12 @@ def _sleap(
     column: dict[str, int],
     keypoints: list[str],
     rate_hz: float | None,
+    least_score: float | None,
 ) -> Track:
     """One row a frame, keypoints in the table's order, head first, in pixels."""
     wanted = [column["frame_idx"], *(column[f"{k}.{axis}"] for k in keypoints for axis in "xy")]
     table = _numbers(file, rows, wanted)
-    if not np.isfinite(table[:, 0]).all():
-        raise InputError(f"{file}: frame_idx must be given in every row")
-    if len(np.unique(table[:, 0])) < len(table):
-        raise InputError(f"{file}: more than one animal in a frame; export one track")
-    table = table[np.argsort(table[:, 0], kind="stable")]
-    points = table[:, 1:].reshape(len(table), len(keypoints), 2) * [1.0, -1.0]  # rows count down
-    return track_from_points(
-        file.stem,
-        points,
-        SLEAP_RATE_HZ if rate_hz is None else rate_hz,
-        frame=table[:, 0].astype(np.int64),
-        rate_assumed=rate_hz is None,
-    )
+    marks = [column[f"{k}.score"] for k in keypoints if f"{k}.score" in column]
+    scores = _numbers(file, rows, marks) if len(marks) == len(keypoints) else None
+    xy = table[:, 1:].reshape(len(table), len(keypoints), 2)
+    return load_table(file, table[:, 0], xy, scores, rate_hz, least_score)

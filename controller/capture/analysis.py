@@ -1,0 +1,150 @@
+"""The animal's motion in numbers: wave, pulse speed, sliding, amplitudes, energy in the state."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.errors import InputError
+from controller.capture.pulse_speed import NEIGHBOURS, PulseSpeed, measure_pulse_speed
+from controller.capture.track import Track
+from controller.capture.undulation import (
+    Undulation,
+    along_speed,
+    even_points,
+    measure_undulation,
+)
+from controller.capture.wave import Wave, measure_wave
+from controller.shape.states import StateRange, energy_kept, state_range, to_states
+
+Floats = NDArray[np.float64]
+WANTED_SHIFT = 4.0
+"""Points that the pattern should move between the frames that are compared."""
+COEFFICIENTS = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """What ``snakewalk analyse`` tells."""
+
+    track: Track
+    wave: Wave
+    pulse: PulseSpeed
+    undulation: Undulation
+    advance: Floats | None
+    """(S, N) speed of each point along the body's tangent, points a frame, at ``pulse.frame``; None
+    where the recording does not hold places."""
+    energy: Floats
+    """(T,) share of each shape's energy in seven coefficients, [PT] 2.5."""
+    states: StateRange
+    """Between which random states are drawn for the graph, [PT] Eq. 1."""
+
+    @property
+    def pulse_body_lengths_s(self) -> float:
+        """Median pulse speed."""
+        return float(self.pulse.typical * self.track.rate_hz / self.track.angles_rad.shape[1])
+
+    @property
+    def travel(self) -> float | None:
+        """Speed of the points along the body over the pulse speed, where both are known.
+
+        1: every point passes where the head passed. 0: the wave runs on the spot.
+        """
+        if self.advance is None:
+            return None
+        both = np.isfinite(self.pulse.points_per_frame)
+        weight = self.pulse.slope[both] ** 2
+        moved = float((weight * self.pulse.points_per_frame[both]).sum())
+        if abs(moved) < 1e-9:
+            return None
+        return float((weight * self.advance[both]).sum()) / moved
+
+    @property
+    def sliding(self) -> float | None:
+        """w_d of [PT] 2.6.4 as the synthesis takes it: the share of the advance not shifted.
+
+        0: no sliding. Up to 1: the body glides on in its shape. Below 0: the body advances less
+        than its wave runs back, so it slips.
+        """
+        travel = self.travel
+        return None if travel is None or abs(travel) < 1e-3 else 1.0 - 1.0 / travel
+
+    def facts(self) -> dict[str, Any]:
+        """Plain numbers, for the table and JSON."""
+        track, wave, pulse = self.track, self.wave, self.pulse
+        u = pulse.points_per_frame
+        known = np.isfinite(u)
+        scale = track.rate_hz / track.angles_rad.shape[1]
+        spread = np.percentile(u[known], [25.0, 75.0]) * scale if known.any() else [np.nan] * 2
+        angle, lateral = self.undulation.angle_rad, self.undulation.lateral
+        at = [0, 25, 50, 75, 99]
+        return {
+            "recording": track.name,
+            "frames": track.frames,
+            "frames_left_out": track.dropped,
+            "rate_hz": round(track.rate_hz, 3),
+            "rate_assumed": track.rate_assumed,
+            "length_m": None if track.length_m is None else round(track.length_m, 6),
+            "frequency_hz": round(wave.frequency_hz, 3),
+            "waves_on_body": round(wave.waves, 3),
+            "wavelength_body_lengths": round(1.0 / max(wave.waves, 1e-9), 3),
+            "wave_number_rad_per_body_length": round(2.0 * np.pi * wave.waves, 3),
+            "wave_towards_tail": wave.towards_tail,
+            "wave_share": round(wave.share, 3),
+            "time_towards_head": round(wave.headward, 3),
+            "pulse_body_lengths_s": _number(self.pulse_body_lengths_s, 4),
+            "pulse_quartiles_body_lengths_s": [_number(float(q), 4) for q in spread],
+            "pulse_points_per_frame": _number(pulse.typical, 3),
+            "pulse_frames_compared": pulse.step,
+            "pulse_measured_share": round(float(known.mean()), 3),
+            "wave_speed_body_lengths_s": round(wave.pulse_body_lengths_s, 4),
+            "travel": _number(self.travel, 3),
+            "sliding_weight": _number(self.sliding, 3),
+            "angle_amplitude_rad": [round(float(angle[k]), 3) for k in at],
+            "lateral_amplitude_body_lengths": [round(float(lateral[k]), 4) for k in [*at[:4], -1]],
+            "bend_k_rad": round(float(np.median(track.bend_rad)), 3),
+            "energy_kept": round(float(self.energy.mean()), 5),
+            "energy_kept_least": round(float(self.energy.min()), 5),
+            "state_amplitudes_rad": np.round(self.states.amplitude_rad(), 3).tolist(),
+        }
+
+
+def analyse(track: Track) -> Analysis:
+    """Measure a recording.
+
+    Raises:
+        InputError: nothing moves, or too few frames follow each other.
+
+    """
+    if track.frames < 4:
+        raise InputError(f"{track.name}: an analysis needs 4 or more frames, not {track.frames}")
+    if float(np.ptp(track.angles_rad, axis=0).max()) < 1e-6:
+        raise InputError(f"{track.name}: no motion: the shape is the same in all frames")
+    wave = measure_wave(track)
+    number = np.rint(track.time_s * track.rate_hz).astype(np.int64)
+    segments = track.angles_rad.shape[1]
+    expected = abs(wave.pulse_body_lengths_s) * segments / track.rate_hz
+    step = int(np.clip(round(WANTED_SHIFT / max(expected, 1e-9)), 1, max(1, track.frames // 8)))
+    half = int(0.45 * segments / max(wave.waves, 0.5))
+    room = (segments - NEIGHBOURS) // 3
+    most = max(2, min(max(12, int(np.ceil(2.0 * expected * step))), half, room))
+    body = even_points(track)
+    pulse = measure_pulse_speed(
+        track.angles_rad, number, step, most, heading_known=body is not None
+    )
+    if len(pulse.frame) == 0:
+        raise InputError(f"{track.name}: too few frames follow each other to compare them")
+    return Analysis(
+        track=track,
+        wave=wave,
+        pulse=pulse,
+        undulation=measure_undulation(track, wave.frequency_hz),
+        advance=None if body is None else along_speed(body, number, step)[0],
+        energy=energy_kept(track.angles_rad, COEFFICIENTS),
+        states=state_range(to_states(track.angles_rad, COEFFICIENTS)),
+    )
+
+
+def _number(value: float | None, digits: int) -> float | None:
+    return None if value is None or not np.isfinite(value) else round(value, digits)

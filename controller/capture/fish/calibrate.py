@@ -1,0 +1,109 @@
+"""The model's size and sections from the film itself, [TH] 3.2.3, without a fish that holds still.
+
+The text films a straight fish and grows a small model until it fits best. Here the posture is
+searched in a few frames, the width is read off the silhouettes along the found spines, and length
+and width are grown to the largest V; twice.
+"""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from config.errors import InputError
+from controller.capture.fish.climb import climb
+from controller.capture.fish.first_frame import rough_midline, starts
+from controller.capture.fish.matching import EDGE_WEIGHT, Seen, Target
+from controller.capture.fish.model import STATIONS, FishModel
+from controller.capture.fish.top_view import Match, TopView, search, window_of
+
+Floats = NDArray[np.float64]
+SHORTEST_PX = 20.0
+
+
+def calibrate(
+    model: FishModel, sample: list[Seen], weight: float = EDGE_WEIGHT, name: str = "film"
+) -> FishModel:
+    """Fit the build to a few frames of one fish.
+
+    Args:
+        model: the build to begin with; its length is not used.
+        sample: frames, best of different postures.
+        weight: W of Eq. 3.
+        name: of the film, for faults.
+
+    Raises:
+        InputError: no frame holds a silhouette of a body, or the body is below 20 px.
+
+    """
+    reasons = sorted({seen.reason for seen in sample if seen.reason})
+    midlines = [None if seen.reason else rough_midline(seen.mask) for seen in sample]
+    seen_by = [
+        (seen, line) for seen, line in zip(sample, midlines, strict=True) if line is not None
+    ]
+    if not seen_by:
+        why = f" ({'; '.join(reasons)})" if reasons else ""
+        raise InputError(
+            f"{name}: no silhouette of one body in {len(sample)} frames{why}; a fish that hardly "
+            "moves needs --background, a picture of the empty scene"
+        )
+    lengths = [float(np.hypot(*np.diff(line, axis=0).T).sum()) for _, line in seen_by]
+    length = float(np.median(lengths))
+    if length < SHORTEST_PX:
+        raise InputError(f"{name}: the body is {length:.0f} px long; at least {SHORTEST_PX:.0f}")
+    model = model.sized(length)
+    for measured in (True, True):
+        found: list[tuple[Seen, Match]] = []
+        for seen, line in seen_by:
+            match = search(seen, model, starts(model, line), weight=weight)
+            if match is not None and np.isfinite(match.value):
+                found.append((seen, match))
+        if not found:
+            raise InputError(f"{name}: no posture of the model fits any of {len(sample)} frames")
+        found.sort(key=lambda pair: -pair[1].value)
+        good = found[: max(1, (len(found) + 1) // 2)]
+        if measured:
+            model = replace(model, half_width=_widths(model, good))
+        sizes = np.array([_size(model, seen, match, weight) for seen, match in good])
+        grown = np.median(sizes, axis=0)
+        model = model.sized(model.length_px * float(grown[0]), width=float(grown[1]))
+    return model
+
+
+def _widths(model: FishModel, good: list[tuple[Seen, Match]]) -> Floats:
+    """(STATIONS,) half widths in body lengths: median over frames of the silhouette's depth."""
+    rows = []
+    for seen, match in good:
+        at = match.parameters
+        deep = cv2.distanceTransform(seen.mask.astype(np.uint8), cv2.DIST_L2, 5)
+        line = model.midline(at[:2], float(at[2]), at[3:])
+        column = np.clip(np.rint(line[:, 0]), 0, deep.shape[1] - 1).astype(int)
+        row = np.clip(np.rint(-line[:, 1]), 0, deep.shape[0] - 1).astype(int)
+        rows.append(deep[row, column])
+    half_px = np.maximum(np.median(np.array(rows), axis=0), 0.5)
+    soft = np.convolve(np.pad(half_px, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
+    soft[[0, -1]] = np.minimum(soft[[0, -1]], 0.02 * model.length_px)
+    return np.asarray(soft[:STATIONS] / model.length_px)
+
+
+def _size(model: FishModel, seen: Seen, match: Match, weight: float) -> tuple[float, float]:
+    """Factors of length and width of the largest V, the fish free to slide along its head."""
+    scale = min(1.0, 200.0 / model.length_px)
+    window = window_of(seen, model, match.parameters[:2], scale)
+    if window is None:
+        return 1.0, 1.0
+    target = Target(seen, window, 3)
+    ahead = np.array([np.cos(match.parameters[2]), np.sin(match.parameters[2])])
+
+    def value(size: Floats) -> float:
+        if size[0] < 0.5 or size[1] < 0.3:
+            return float("-inf")
+        grown = model.sized(model.length_px * float(size[0]), width=float(size[1]))
+        at = match.parameters.copy()
+        at[:2] += ahead * size[2]
+        return TopView(target, grown, 0.0, weight).value(at)
+
+    first = np.array([0.05, 0.1, 0.03 * model.length_px])
+    found, _ = climb(value, np.array([1.0, 1.0, 0.0]), first, halvings=4, evaluations=200)
+    return float(found[0]), float(found[1])

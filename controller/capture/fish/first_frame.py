@@ -1,0 +1,105 @@
+"""Where the first posture comes from: the silhouette's skeleton, tried both ways round.
+
+[TH] 3.3.1 takes the way of the silhouette's centre from the first frame to the second for the
+direction of the head. A fish at rest has no such way, and one that backs has the wrong one, so the
+build decides: both ways are matched, and the better one is kept.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from skimage.morphology import skeletonize
+
+from controller.capture.fish.model import FishModel
+from controller.capture.fish.postures import midline_angles
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+_AROUND = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)]
+
+
+def rough_midline(mask: Bools, size_px: float = 120.0) -> Floats | None:
+    """Longest way through the skeleton of a mask: (P, 2), x right, y up, ends at the body's rim.
+
+    None where the mask holds no body of 8 pixels length. The mask is reduced to ``size_px`` first.
+    """
+    rows, columns = np.nonzero(mask)
+    if len(rows) < 8:
+        return None
+    top, left = int(rows.min()), int(columns.min())
+    part = mask[top : rows.max() + 1, left : columns.max() + 1].astype(np.uint8) * 255
+    scale = min(1.0, size_px / max(part.shape))
+    shape = (max(1, round(part.shape[1] * scale)), max(1, round(part.shape[0] * scale)))
+    small = np.pad(cv2.resize(part, shape, interpolation=cv2.INTER_AREA) > 127, 2)
+    bones = np.asarray(
+        skeletonize(cv2.medianBlur(small.astype(np.uint8), 3) > 0),  # type: ignore[no-untyped-call]
+        dtype=np.bool_,
+    )
+    way = _longest(bones)
+    if way is None or len(way) < 8:
+        return None
+    depth = cv2.distanceTransform(small.astype(np.uint8), cv2.DIST_L2, 5)
+    points = np.column_stack([way[:, 1], -way[:, 0]]).astype(float)
+    soft = 3
+    smooth = np.stack(
+        [points[max(0, k - soft) : k + soft + 1].mean(axis=0) for k in range(len(points))]
+    )
+    ends = [_beyond(smooth, float(depth[tuple(way[0])])),
+            _beyond(smooth[::-1], float(depth[tuple(way[-1])]))]  # fmt: skip
+    whole = np.concatenate([ends[0][None], smooth[::4], smooth[-1:], ends[1][None]])
+    return np.asarray((whole + np.array([-1.5, 1.5])) / scale + np.array([left - 0.5, -top + 0.5]))
+
+
+def starts(model: FishModel, midline: Floats) -> list[Floats]:
+    """Parameters (3 + J,) base x, base y, head, angles of a midline, read both ways."""
+    found = []
+    for points in (midline, midline[::-1]):
+        head, angles = midline_angles(points, model.joints_at)
+        chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        at = model.joints_at[0] * chord[-1]
+        base = [np.interp(at, chord, points[:, k]) for k in range(2)]
+        found.append(np.array([*base, head, *angles]))
+    return found
+
+
+def _beyond(points: Floats, reach: float) -> Floats:
+    """Where the body ends before the first point."""
+    step = points[0] - points[min(4, len(points) - 1)]
+    return np.asarray(points[0] + step / max(float(np.hypot(*step)), 1e-9) * reach)
+
+
+def _longest(bones: Bools) -> NDArray[np.int64] | None:
+    """Pixels (P, 2), row and column, of the longest shortest way in the largest skeleton part."""
+    pixels = {(int(r), int(c)) for r, c in np.argwhere(bones)}
+    best: list[tuple[int, int]] = []
+    while pixels:
+        first = next(iter(pixels))
+        reached = _walk(first, pixels)
+        end = reached[-1][0]
+        before = dict(_walk(end, pixels))
+        way: list[tuple[int, int]] = []
+        step: tuple[int, int] | None = list(before)[-1]
+        while step is not None:
+            way.append(step)
+            step = before[step]
+        best = max(best, way, key=len)
+        pixels -= set(before)
+    return np.array(best, dtype=np.int64) if best else None
+
+
+def _walk(
+    start: tuple[int, int], pixels: set[tuple[int, int]]
+) -> list[tuple[tuple[int, int], tuple[int, int] | None]]:
+    """Pixels in the order in which they are reached, each with the one before it."""
+    before: dict[tuple[int, int], tuple[int, int] | None] = {start: None}
+    ring = [start]
+    while ring:
+        further = []
+        for r, c in ring:
+            for dr, dc in _AROUND:
+                there = (r + dr, c + dc)
+                if there in pixels and there not in before:
+                    before[there] = (r, c)
+                    further.append(there)
+        ring = further
+    return list(before.items())

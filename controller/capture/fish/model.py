@@ -1,0 +1,129 @@
+"""The deformable fish: a rigid head, a spine of a few angles, an elliptic section at each place.
+
+[TH] 3.2.2 has five skeleton pieces, the angles A0..A3 between them, and a skin of NURBS.
+Here each angle is spread evenly over the piece length around its joint: the tangent of a quadratic
+B-spline on that skeleton, but of constant length and linear in the angles.
+"""
+
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.errors import InputError
+
+Floats = NDArray[np.float64]
+STATIONS = 41
+"""Places along the body at which its sections are given, both ends included."""
+_CARP = ((0.0, 0.01), (0.03, 0.035), (0.1, 0.06), (0.22, 0.085), (0.33, 0.09), (0.5, 0.075),
+         (0.7, 0.042), (0.83, 0.022), (0.9, 0.012), (1.0, 0.006))  # fmt: skip
+_CARP_HIGH = ((0.0, 0.015), (0.05, 0.06), (0.2, 0.12), (0.35, 0.145), (0.5, 0.125), (0.7, 0.07),
+              (0.82, 0.045), (0.9, 0.085), (0.97, 0.12), (1.0, 0.1))  # fmt: skip
+_EEL = ((0.0, 0.012), (0.03, 0.024), (0.1, 0.034), (0.3, 0.036), (0.6, 0.03), (0.85, 0.018),
+        (1.0, 0.004))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FishModel:
+    """Size and build of one fish; all but ``length_px`` in body lengths, snout to tail."""
+
+    length_px: float
+    """Length of the straight fish in the top view."""
+    joints_at: tuple[float, ...]
+    """(J,) where the spine bends; the first is the base of the head and the fish's position."""
+    half_width: Floats
+    """(STATIONS,) half width in the top view."""
+    half_height: Floats
+    """(STATIONS,) half height in the side view."""
+    _turns: Floats = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_turns", turn_shares(self.joints_at, STATIONS - 1))
+
+    @property
+    def joints(self) -> int:
+        """J, spine angles."""
+        return len(self.joints_at)
+
+    def sized(self, length_px: float, width: float = 1.0, height: float = 1.0) -> Self:
+        """Return the same build at another length, with sections scaled."""
+        return replace(
+            self,
+            length_px=length_px,
+            half_width=self.half_width * width,
+            half_height=self.half_height * height,
+        )
+
+    def tangents_rad(self, head_rad: float, angles_rad: Floats) -> Floats:
+        """(STATIONS - 1,) direction of travel of each piece of the midline, head first."""
+        return np.asarray(head_rad - self._turns @ angles_rad)
+
+    def midline(
+        self, base_px: Floats, head_rad: float, angles_rad: Floats, pitch_rad: float = 0.0
+    ) -> Floats:
+        """(STATIONS, 3) points of the spine, snout first: x, y of the top view, and height.
+
+        ``base_px`` (2,) or (3,) is where the base of the head is; pitch lifts the head, and turns
+        the whole fish about its base.
+        """
+        tangents = self.tangents_rad(head_rad, angles_rad)
+        piece = self.length_px / (STATIONS - 1)
+        points = np.zeros((STATIONS, 3))
+        points[1:, 0] = -np.cumsum(np.cos(tangents)) * piece
+        points[1:, 1] = -np.cumsum(np.sin(tangents)) * piece
+        at = self.joints_at[0] * (STATIONS - 1)
+        low = int(at)
+        points -= points[low] * (low + 1 - at) + points[low + 1] * (at - low)
+        if pitch_rad:
+            ahead = np.array([np.cos(head_rad), np.sin(head_rad)])
+            along = points[:, :2] @ ahead
+            points[:, :2] += np.outer(along * (np.cos(pitch_rad) - 1.0), ahead)
+            points[:, 2] = along * np.sin(pitch_rad)
+        points[:, : len(base_px)] += base_px
+        return points
+
+    def outline(self, midline_px: Floats) -> Floats:
+        """(2 STATIONS, 2) outline in the top view of a midline (STATIONS, 2 or 3)."""
+        flat = midline_px[:, :2]
+        along = np.empty_like(flat)
+        along[1:-1] = flat[:-2] - flat[2:]
+        along[0], along[-1] = flat[0] - flat[1], flat[-2] - flat[-1]
+        along /= np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)[:, None]
+        left = np.column_stack([-along[:, 1], along[:, 0]])
+        left *= (self.half_width * self.length_px)[:, None]
+        return np.asarray(np.concatenate([flat + left, (flat - left)[::-1]]))
+
+
+def turn_shares(joints_at: tuple[float, ...], pieces: int) -> Floats:
+    """(pieces, J) share of each spine angle that has been turned at the middle of each piece."""
+    at = np.array(joints_at)
+    spread = np.gradient(at) if len(at) > 1 else np.array([0.2])
+    middle = (np.arange(pieces) + 0.5) / pieces
+    return np.asarray(np.clip((middle[:, None] - at) / spread + 0.5, 0.0, 1.0))
+
+
+def fish_model(build: str, length_px: float = 1.0) -> FishModel:
+    """Return a build by name: ``carp`` ([TH]: A0..A3 behind a rigid head) or ``eel`` (8 angles).
+
+    [TH] 3.3.1 cuts the skeleton into seven equal parts and joins points 2, 3, 4, 5 and the ends.
+    An eel bends from its head on; 4 angles leave 6 to 10 degrees of real midlines unexplained (rms,
+    lamprey and prickleback), 8 leave 2 to 3.
+
+    Raises:
+        InputError: no such build.
+
+    """
+    stations = np.linspace(0.0, 1.0, STATIONS)
+
+    def profile(knots: tuple[tuple[float, float], ...]) -> Floats:
+        at, size = np.array(knots).T
+        return np.asarray(np.interp(stations, at, size))
+
+    if build == "carp":
+        at = tuple(k / 7 for k in range(2, 6))
+        return FishModel(length_px, at, profile(_CARP), profile(_CARP_HIGH))
+    if build == "eel":
+        at = tuple(k / 9 for k in range(1, 9))
+        return FishModel(length_px, at, profile(_EEL), profile(_EEL) * 1.3)
+    raise InputError(f"{build}: no such build of a fish; there are carp and eel")

@@ -1,0 +1,196 @@
+"""New motion from segments: at random ([TH] 4.2.2), or through control points ([TH] 5)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.errors import InputError
+from controller.capture.fish.joining import Repertoire, placed
+from controller.capture.fish.postures import Postures
+from controller.motion.junction import join
+
+Floats = NDArray[np.float64]
+BLEND_S = 0.25
+_BEAM = 40
+_DEPTH = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """Pieces in order."""
+
+    order: tuple[int, ...]
+    forced: int
+    """Joins that no rule permits, made because nothing else was left."""
+    reached_s: tuple[float, ...] = ()
+    """When each control point was reached."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Node:
+    """A way that may be taken: where it ends, and what it has passed."""
+
+    order: tuple[int, ...]
+    base: Floats
+    head_rad: float
+    samples: int
+    forced: int
+    reached_at: tuple[int, ...]
+
+    @property
+    def last(self) -> int:
+        return self.order[-1]
+
+
+def at_random(pieces: Repertoire, seconds: float, rng: np.random.Generator) -> Sequence:
+    """Follow permitted pieces, each as likely as the other, for at least ``seconds``."""
+    every = range(len(pieces.pieces))
+    order = [int(rng.choice(sorted(pieces.lasting) or list(every)))]
+    lasts, forced = _seconds(pieces, order[0]), 0
+    while lasts < seconds:
+        choice, by_rule = pieces.next(order[-1])
+        forced += not by_rule
+        order.append(int(rng.choice(choice)))
+        lasts += _seconds(pieces, order[-1])
+    return Sequence(tuple(order), forced)
+
+
+def through(
+    pieces: Repertoire,
+    points: Floats,
+    *,
+    radius: float,
+    limit_s: float = 120.0,
+    depth: int = _DEPTH,
+) -> Sequence:
+    """Swim through control points in order, from the origin along x.
+
+    The text takes the piece that ends nearest to the point; with turns of one size that can circle
+    a point for ever. Here the best of many ways of ``depth`` pieces is sought, and its first piece
+    taken. A point counts as reached when the base of the head comes within ``radius``, on the way
+    as well as at an end.
+
+    Args:
+        pieces: what can be done.
+        points: (n, 2) in the recording's unit, from where the motion starts, x along the head.
+        radius: how near is near enough.
+        limit_s: for all points together.
+        depth: pieces to look ahead; 1 is the printed rule.
+
+    Raises:
+        InputError: a point was not reached in time.
+
+    """
+    begin = _Node((), np.zeros(2), 0.0, 0, 0, ())
+    here = begin
+    while len(here.reached_at) < len(points):
+        if here.samples / pieces.rate_hz > limit_s:
+            x, y = points[len(here.reached_at)]
+            turns = [np.degrees(piece.head_rad[-1]) for piece in pieces.pieces]
+            raise InputError(
+                f"control point {len(here.reached_at) + 1} at {x:g},{y:g} is not reached within "
+                f"{limit_s:g} s: the segments turn from {min(turns):.0f} to {max(turns):.0f} "
+                "degrees; give a larger --radius, other points, or --mirror"
+            )
+        here = _ahead(pieces, here, points, radius, depth)
+    reached = tuple(k / pieces.rate_hz for k in here.reached_at)
+    return Sequence(here.order, here.forced, reached)
+
+
+def compose(pieces: Repertoire, sequence: Sequence, blend_s: float = BLEND_S) -> Postures:
+    """Lay the pieces end to end; angles, direction and way blended at every junction."""
+    parts = [pieces.pieces[k] for k in sequence.order]
+    base, head = [], []
+    origin, direction = np.zeros(2), 0.0
+    for part in parts:
+        base.append(placed(part.base, origin, direction))
+        head.append(part.head_rad + direction)
+        origin, direction = base[-1][-1], float(head[-1][-1])
+    samples = max(1, round(blend_s * pieces.rate_hz))
+    return Postures(
+        base=join(base, samples),
+        head_rad=join([one[:, None] for one in head], samples)[:, 0],
+        angles_rad=join([part.angles_rad for part in parts], samples),
+        joints_at=pieces.joints_at,
+        rate_hz=pieces.rate_hz,
+        length_m=pieces.length_m,
+    )
+
+
+def junctions(pieces: Repertoire, sequence: Sequence) -> list[int]:
+    """Frames of the composed motion at which a new piece begins."""
+    lengths = [len(pieces.pieces[k].head_rad) - 1 for k in sequence.order]
+    return [int(at) for at in np.cumsum(lengths[:-1])]
+
+
+def _seconds(pieces: Repertoire, piece: int) -> float:
+    return (len(pieces.pieces[piece].head_rad) - 1) / pieces.rate_hz
+
+
+def _ahead(pieces: Repertoire, here: _Node, points: Floats, radius: float, depth: int) -> _Node:
+    """Take the first piece of the best way found."""
+    wanted = len(here.reached_at)
+    beam, best, first = [here], None, len(here.order)
+    for level in range(depth):
+        grown = [
+            _take(pieces, node, k, by_rule, points, radius)
+            for node in beam
+            for choice, by_rule in [_choice(pieces, node)]
+            for k in choice
+        ]
+        grown.sort(key=lambda node: _cost(node, points))
+        beam = grown[:_BEAM]
+        if best is None or _cost(beam[0], points) < _cost(best, points):
+            best = beam[0]
+        if level + 1 < depth and len(beam[0].reached_at) > wanted:
+            break
+    if best is None:
+        raise ValueError("depth must be 1 or more")
+    node = here
+    for k in best.order[first : first + 1]:
+        node = _take(pieces, node, k, _is_by_rule(pieces, node, k), points, radius)
+    return node
+
+
+def _choice(pieces: Repertoire, node: _Node) -> tuple[list[int], bool]:
+    if node.order:
+        return pieces.next(node.last)
+    return sorted(pieces.lasting) or list(range(len(pieces.pieces))), True
+
+
+def _is_by_rule(pieces: Repertoire, node: _Node, piece: int) -> bool:
+    return not node.order or piece in pieces.permitted(node.last)
+
+
+def _take(
+    pieces: Repertoire, node: _Node, piece: int, by_rule: bool, points: Floats, radius: float
+) -> _Node:
+    part = pieces.pieces[piece]
+    way = placed(part.base, node.base, node.head_rad)
+    reached, at = node.reached_at, 1
+    while len(reached) < len(points):
+        near = np.flatnonzero(np.hypot(*(way[at:] - points[len(reached)]).T) <= radius)
+        if not len(near):
+            break
+        at += int(near[0])
+        reached = (*reached, node.samples + at)
+    return replace(
+        node,
+        order=(*node.order, piece),
+        base=way[-1],
+        head_rad=node.head_rad + float(part.head_rad[-1]),
+        samples=node.samples + len(way) - 1,
+        forced=node.forced + (not by_rule),
+        reached_at=reached,
+    )
+
+
+def _cost(node: _Node, points: Floats) -> tuple[int, float]:
+    """More points first, then nearer to the next one; after the last, sooner."""
+    if len(node.reached_at) == len(points):
+        return -len(points), float(node.reached_at[-1])
+    away = points[len(node.reached_at)] - node.base
+    far = float(np.hypot(*away))
+    off = float(np.abs(np.angle(np.exp(1j * (np.arctan2(away[1], away[0]) - node.head_rad)))))
+    return -len(node.reached_at), far + 0.2 * far * off + 1e-3 * node.samples

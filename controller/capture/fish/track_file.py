@@ -1,0 +1,53 @@
+"""A synthesised motion as a recording for a run, with the joints of one robot beside."""
+
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.capture.fish.joining import Repertoire
+from controller.capture.fish.postures import Postures, tangents
+from controller.capture.fish.synthesis import BLEND_S, Sequence
+from controller.motion.junction import join
+from controller.motion.retarget import Retarget
+
+Floats = NDArray[np.float64]
+
+
+def joint_pieces(pieces: Repertoire, sequence: Sequence, retarget: Retarget) -> list[Floats]:
+    """Each piece as joint angles (n, joints of the robot), not yet joined."""
+    return [
+        retarget.joints_rad(tangents(part.head_rad, part.angles_rad, pieces.joints_at))
+        for part in (pieces.pieces[k] for k in sequence.order)
+    ]
+
+
+def joint_motion(
+    pieces: Repertoire, sequence: Sequence, retarget: Retarget, blend_s: float = BLEND_S
+) -> Floats:
+    """(T, joints) the whole motion, joined with a blend at the joint layer."""
+    samples = max(1, round(blend_s * pieces.rate_hz))
+    return join(joint_pieces(pieces, sequence, retarget), samples)
+
+
+def save_motion(
+    path: Path | BinaryIO, postures: Postures, joints_rad: Floats, robot: str, sequence: Sequence
+) -> None:
+    """Write a motion; ``controller.capture.load.load_track`` reads it as any recording."""
+    np.savez_compressed(
+        path,
+        points=postures.points(),
+        rate_hz=postures.rate_hz,
+        length_m=np.nan if postures.length_m is None else postures.length_m,
+        base=postures.base,
+        head_rad=postures.head_rad,
+        angles_rad_spine=postures.angles_rad,
+        joints_at=postures.joints_at,
+        joints_rad=joints_rad,
+        robot=robot,
+        segments=np.array(sequence.order),
+        name=postures.name,
+        source=postures.source,
+        licence=postures.licence,
+    )

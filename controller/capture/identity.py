@@ -1,0 +1,116 @@
+"""Head and tail keep their identity over time, and which end the head is.
+
+From frame to frame the body is compared with itself and with itself reversed; over a gap its
+thickness along the body decides as well. Which end leads is said by the user, or found from the way
+that the body travels, the way that its wave runs, or at last its taper.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.capture.medial_axis import Skeleton
+from controller.capture.verdict import Verdict
+
+Floats = NDArray[np.float64]
+_SURE = 0.2  # margin from which one frame is enough to tell the ends apart
+_GAP = 3  # frames without a skeleton after which the place alone is no longer trusted
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """Skeletons of one animal, the same end first in all."""
+
+    skeletons: tuple[Skeleton, ...]
+    margin: Floats
+    """(T,) how much better the frame fits as it is than reversed, -1 to 1; NaN where there is no
+    skeleton, 1 at the first one. Below 0 thickness overruled the place."""
+
+
+def margin_of(body: Skeleton, before: Skeleton) -> float:
+    """1: fits ``before`` exactly as it is; -1: fits exactly reversed; 0: cannot be told.
+
+    Places count, not only shapes, but a common shift of all points does not.
+    """
+    here = body.points_px - body.points_px.mean(axis=0)
+    there = before.points_px - before.points_px.mean(axis=0)
+    same = float(np.sqrt(((here - there) ** 2).sum(axis=1)).mean())
+    other = float(np.sqrt(((here[::-1] - there) ** 2).sum(axis=1)).mean())
+    return (other - same) / max(other + same, 1e-9)
+
+
+def same_way(body: Skeleton, before: Skeleton) -> Skeleton:
+    """The body with the end first that was first ``before``; both must be good."""
+    return body.reversed() if margin_of(body, before) < 0.0 else body
+
+
+def follow(skeletons: Sequence[Skeleton]) -> Followed:
+    """Put the same end first in every frame; the end of the first skeleton is kept."""
+    out = list(skeletons)
+    margin = np.full(len(out), np.nan)
+    good = [k for k, one in enumerate(out) if one.verdict is Verdict.GOOD]
+    profile = np.zeros(0)
+    for number, k in enumerate(good):
+        if number == 0:
+            margin[k] = 1.0
+            profile = _lopsided(out[k])
+            continue
+        before = good[number - 1]
+        here = margin_of(out[k], out[before])
+        if abs(here) < _SURE or k - before > _GAP:
+            thick = _agree(_lopsided(out[k]), profile)
+            here = here if abs(here) > 2.0 * abs(thick) else thick
+        if here < 0.0:
+            out[k] = out[k].reversed()
+        margin[k] = margin_of(out[k], out[before])
+        profile = profile + (_lopsided(out[k]) - profile) / min(number + 1, 200)
+    return Followed(tuple(out), margin)
+
+
+def _lopsided(body: Skeleton) -> Floats:
+    """(50,) thickness from the first end minus that from the other, of the mean thickness."""
+    radius = body.radius_px / body.radius_px.mean()
+    return np.asarray((radius - radius[::-1])[:50])
+
+
+def _agree(one: Floats, other: Floats) -> float:
+    """-1 to 1: whether two bodies are thick at the same end; about 0 where neither end is."""
+    scale = float(np.abs(other).mean())
+    product = float((one * other).sum() / max(np.hypot(*_norms(one, other)) ** 2 / 2.0, 1e-12))
+    return product * min(1.0, scale / 0.1)
+
+
+def _norms(one: Floats, other: Floats) -> tuple[float, float]:
+    return float(np.linalg.norm(one)), float(np.linalg.norm(other))
+
+
+def travel_of(points_px: Floats, step: int) -> float:
+    """Whether the first end leads, -1 to 1: travel along the body's direction over all travel.
+
+    Args:
+        points_px: (T, P, 2), NaN where the body was not seen.
+        step: frames over which travel is measured, long against the shaking of a frame.
+
+    Returns:
+        0 where the body does not travel by more than a hundredth of its length in a step.
+
+    """
+    ahead = points_px[:, 0] - points_px[:, -1]
+    unit = ahead / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    middle = points_px.mean(axis=1)
+    moved = middle[step:] - middle[:-step]
+    along = (moved * unit[:-step]).sum(axis=1)
+    whole = np.hypot(*moved.T)
+    long = np.nanmedian(np.hypot(*np.diff(points_px, axis=1).transpose(2, 0, 1)).sum(axis=1))
+    use = np.isfinite(along) & (whole > 0.01 * long)
+    return float(along[use].sum() / whole[use].sum()) if use.any() else 0.0
+
+
+def taper_of(radius_px: Floats) -> float:
+    """How much thicker the first fifth (without the tip) is than the last one, of the mean."""
+    mean = np.nanmean(radius_px, axis=0)
+    count = len(mean)
+    one, other = mean[count // 20 : count // 5], mean[::-1][count // 20 : count // 5]
+    return float((one.mean() - other.mean()) / mean.mean())

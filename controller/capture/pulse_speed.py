@@ -1,0 +1,141 @@
+"""Pulse speed: how many points the pattern of angles moves down the body in a frame ([PT] 2.4).
+
+``Theta(n, t) = Theta(n - u, t - 1) + w (Theta(n + 1 - u, t - 1) - Theta(n - u, t - 1))`` with a
+whole u and 0 <= w < 1 looks up the place ``n - (u - w)``. Correction: so the pulse speed is
+``U = u - w``, where the text prints ``u + w``. Both come from least squares over nine points.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+NEIGHBOURS = 9
+"""Points that decide together, [PT] 2.4."""
+LEAST_SLOPE = 0.2
+"""Of the recording's usual slope along the body: a flatter neighbourhood shows no shift."""
+_EDGE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class PulseSpeed:
+    """U(n, t) of a recording."""
+
+    points_per_frame: Floats
+    """(S, N) positive towards the tail; NaN where the neighbourhood is too flat, or where the
+    pattern would have come from beyond the body's end."""
+    slope: Floats
+    """(S, N) root mean square of Theta_n over the neighbourhood, rad a point: the weight."""
+    error_rad: Floats
+    """(S, N) root mean square of what the shifted angles leave over."""
+    frame: NDArray[np.int64]
+    """(S,) index of the later frame of each pair."""
+    step: int
+    """Frames from the earlier to the later of a pair; speeds are divided by it."""
+
+    @property
+    def typical(self) -> float:
+        """Median of U, points a frame; NaN if nothing was measured."""
+        known = np.isfinite(self.points_per_frame)
+        return float(np.median(self.points_per_frame[known])) if known.any() else float("nan")
+
+
+def measure_pulse_speed(
+    angles_rad: Floats,
+    number: NDArray[np.int64],
+    step: int = 1,
+    most: int = 12,
+    *,
+    heading_known: bool = True,
+) -> PulseSpeed:
+    """Measure U(n, t).
+
+    A slow pulse is compared over ``step`` frames, or noise hides it: a shift of a few points is
+    found to a few hundredths. ``most`` must stay below half a wavelength, or a shift is mistaken
+    for the next wave's.
+
+    Args:
+        angles_rad: (T, N) tangent angles, head first, unwrapped along the body.
+        number: (T,) frame numbers, increasing; only frames ``step`` apart are compared.
+        step: frames between those compared.
+        most: points, the largest shift looked for, either way.
+        heading_known: False where each frame was turned to a heading of its own (recordings of
+            joint angles): one turn of the whole body a frame is then fitted first.
+
+    Raises:
+        ValueError: ``step`` or ``most`` below 1, or too few points for such a shift.
+
+    """
+    points = angles_rad.shape[1]
+    if step < 1 or most < 1 or points < NEIGHBOURS + 2 * most:
+        raise ValueError(f"cannot look for shifts of {most} points over {step} frames on {points}")
+    later, earlier = _pairs(number, step)
+    now, before = angles_rad[later], angles_rad[earlier]
+    if not heading_known:
+        before = before + _turn(now, before)[:, None]
+    best = np.full(now.shape, np.inf)
+    shift = np.full(now.shape, np.nan)
+    for u in range(1 - most, most + 1):
+        w, error = _fit(now, before, u)
+        better = error < best
+        best = np.where(better, error, best)
+        shift = np.where(better, u - w, shift)
+    slope = np.sqrt(_sums(np.diff(before, axis=1) ** 2) / NEIGHBOURS)
+    slope = np.pad(slope, ((0, 0), (4, 5)), mode="edge")
+    usual = np.sqrt((np.diff(before, axis=1) ** 2).mean()) if before.size else 0.0
+    # a best shift at the end of what can be looked up is no minimum: the pattern came from beyond
+    # the head or the tail, or moved more than was looked for
+    n = np.arange(points)
+    ahead, behind = n - NEIGHBOURS // 2 - 1 - shift, points - 2 - NEIGHBOURS // 2 - n + shift
+    inside = (ahead > _EDGE) & (behind > _EDGE) & (np.abs(shift) < most - 0.5)
+    known = inside & (slope > LEAST_SLOPE * usual) & np.isfinite(best)
+    return PulseSpeed(
+        points_per_frame=np.where(known, shift, np.nan) / step,
+        slope=slope,
+        error_rad=np.sqrt(np.where(known, best, np.nan) / NEIGHBOURS),
+        frame=later,
+        step=step,
+    )
+
+
+def _pairs(number: NDArray[np.int64], step: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Indices of later and earlier frames that are ``step`` apart."""
+    at = np.searchsorted(number, number - step)
+    later = np.flatnonzero(number[at] == number - step)
+    return later, at[later]
+
+
+def _fit(now: Floats, before: Floats, u: int) -> tuple[Floats, Floats]:
+    """Best w in 0..1 and the squares left over, (S, N), for the whole shift u; inf where unseen."""
+    points = now.shape[1]
+    w, error = np.full(now.shape, np.nan), np.full(now.shape, np.inf)
+    first, last = max(0, u), min(points, points - 1 + u)  # n with n - u and n + 1 - u on the body
+    if last - first < NEIGHBOURS:
+        return w, error
+    start = before[:, first - u : last - u]
+    rise = before[:, first - u + 1 : last - u + 1] - start
+    off = now[:, first:last] - start
+    square, cross = _sums(rise**2), _sums(rise * off)
+    share = np.clip(cross / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    middle = slice(first + NEIGHBOURS // 2, last - NEIGHBOURS // 2)
+    w[:, middle] = share
+    left = _sums(off**2) - 2.0 * share * cross + share**2 * square
+    error[:, middle] = np.maximum(left, 0.0)
+    return w, error
+
+
+def _sums(values: Floats) -> Floats:
+    """Sums over nine neighbours: (S, M) to (S, M - 8)."""
+    return np.asarray(sliding_window_view(values, NEIGHBOURS, axis=1).sum(axis=-1))
+
+
+def _turn(now: Floats, before: Floats) -> Floats:
+    """Turn of the whole body (S,) that, with one shift for all of it, explains a frame best."""
+    slope = np.gradient(before, axis=1)
+    change = now - before
+    flat = slope - slope.mean(axis=1, keepdims=True)
+    spread = (flat**2).sum(axis=1)
+    pulse = (flat * change).sum(axis=1) / np.where(spread > 0.0, spread, 1.0)
+    return np.asarray((change - pulse[:, None] * slope).mean(axis=1))

@@ -1,0 +1,73 @@
+"""Metres in a pixel: from the animal's own length, a printed marker, or two places."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from config.errors import InputError
+
+Image = NDArray[np.uint8]
+_FAMILIES = (
+    cv2.aruco.DICT_4X4_50,
+    cv2.aruco.DICT_5X5_50,
+    cv2.aruco.DICT_6X6_50,
+    cv2.aruco.DICT_ARUCO_ORIGINAL,
+    cv2.aruco.DICT_APRILTAG_36h11,
+)
+
+
+def scale_of_length(length_m: float, length_px: NDArray[np.float64]) -> float:
+    """Metres a pixel of an animal that is ``length_m`` long, from its length in every frame.
+
+    Raises:
+        InputError: not a length.
+
+    """
+    if not 0.0 < length_m < float("inf"):
+        raise InputError(f"--length-m: the animal must be longer than 0 m, not {length_m}")
+    return length_m / float(np.nanmedian(length_px))
+
+
+def scale_of_marker(marker: str, image: Image) -> float:
+    """Metres a pixel from a marker of known size.
+
+    Args:
+        marker: ``SIDE``, m, of a square ArUco or AprilTag marker that is in the image; or
+            ``X0,Y0,X1,Y1,METRES``: two places in the image and how far apart they are.
+        image: a frame or the background, (H, W[, 3]).
+
+    Raises:
+        InputError: neither, or no marker in the image.
+
+    """
+    try:
+        said = [float(part) for part in marker.split(",")]
+    except ValueError:
+        said = []
+    if len(said) not in {1, 5} or not np.isfinite(said).all() or said[-1] <= 0.0:
+        raise InputError(
+            f"--marker {marker}: expected the SIDE in metres of a printed marker in view, or "
+            "X0,Y0,X1,Y1,METRES for two places in the image"
+        )
+    if len(said) == 5:
+        apart = float(np.hypot(said[2] - said[0], said[3] - said[1]))
+        if apart < 1.0:
+            raise InputError(f"--marker {marker}: the two places must be apart")
+        return said[4] / apart
+    sides = _sides(image)
+    if not sides:
+        raise InputError(f"--marker {marker}: no ArUco or AprilTag marker in the image")
+    return said[0] / float(np.median(sides))
+
+
+def _sides(image: Image) -> list[float]:
+    """Lengths in pixels of the sides of all markers of the first family that is seen."""
+    for family in _FAMILIES:
+        settings = cv2.aruco.DetectorParameters()
+        settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(family), settings)
+        corners, _, _ = detector.detectMarkers(image)
+        if len(corners):
+            square = np.concatenate(corners)
+            return [float(v) for v in np.hypot(*(square - np.roll(square, 1, 1)).T).ravel()]
+    return []
