@@ -1,0 +1,196 @@
+"""Many bodies at once, compiled: body frames, link centres, bridges, level of detail ([YT] 4)."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from controller.repertoire.frame import Frame
+from controller.repertoire.repertoire import Repertoire
+from controller.repertoire.warp import bridge_frames, tip_way_m
+
+Floats = NDArray[np.float64]
+Whole = NDArray[np.int32]
+LANES = 8
+"""Links are padded to a multiple of this, so that a vector unit takes them without a rest."""
+
+
+class Crowd:
+    """N bodies of one repertoire, each with its own place, segment, frame and size.
+
+    ``link_m(k)`` of a body that is not ``visible`` is stale: only its body frame goes on.
+    """
+
+    def __init__(self, repertoire: Repertoire, bodies: int, *, largest_tip_m: float = 0.02) -> None:
+        """Put all bodies at the origin, at the beginning of the first segment."""
+        segments = repertoire.segments
+        lengths = np.array([segment.frames for segment in segments])
+        self._first = np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int32)
+        self._last = (np.cumsum(lengths) - 1).astype(np.int32)
+        self._turn = np.concatenate([segment.turn for segment in segments]).reshape(-1, 9)
+        self._move = np.concatenate([segment.move_m for segment in segments])
+        shape = np.concatenate([segment.link_m for segment in segments])
+        self._links = shape.shape[1]
+        padded = -(-self._links // LANES) * LANES
+        self._shape = np.zeros((len(shape), 3, padded), dtype=np.float32)
+        self._shape[:, :, : self._links] = shape.transpose(0, 2, 1)
+        self._bridge = np.array(
+            [
+                [
+                    bridge_frames(tip_way_m(a.link_m[-1], b.link_m[0]), largest_tip_m)
+                    for b in segments
+                ]
+                for a in segments
+            ],
+            dtype=np.int32,
+        )
+        self.rotation: Floats = np.tile(np.eye(3).ravel(), (bodies, 1))
+        """(N, 9) row-major axes of the body frames."""
+        self.origin_m: Floats = np.zeros((bodies, 3))
+        """(N, 3)"""
+        self.scale: Floats = np.ones(bodies)
+        """(N,) size over that of the recorded body."""
+        self.visible: NDArray[np.bool_] = np.ones(bodies, dtype=np.bool_)
+        """(N,)"""
+        self.segment: Whole = np.zeros(bodies, dtype=np.int32)
+        """(N,) wanted: taken up when a cycle ends."""
+        self.cycles: Whole = np.zeros(bodies, dtype=np.int32)
+        """(N,) cycles of the segment since it was taken up."""
+        self._playing: Whole = np.zeros(bodies, dtype=np.int32)
+        self._next: Whole = np.zeros(bodies, dtype=np.int32)
+        self._ended: NDArray[np.bool_] = np.zeros(bodies, dtype=np.bool_)
+        self._begun: Whole = np.zeros(bodies, dtype=np.int32)
+        self._whole: Whole = np.zeros(bodies, dtype=np.int32)
+        self._left: Whole = np.zeros(bodies, dtype=np.int32)
+        self._points = np.zeros((bodies, 3, padded), dtype=np.float32)
+
+    @property
+    def playing(self) -> Whole:
+        """(N,) segment of each body now."""
+        return self._playing
+
+    def put(self, body: int, frame: Frame, *, segment: int = 0, scale: float = 1.0) -> None:
+        """Place a body so that its next frame is the first of ``segment``."""
+        self.rotation[body] = frame.rotation.ravel()
+        self.origin_m[body] = frame.origin_m
+        self.scale[body] = scale
+        self.segment[body] = self._playing[body] = segment
+        self._next[body] = self._first[segment]
+        self._left[body] = self.cycles[body] = 0
+        self._ended[body] = False
+
+    def stagger(self, seed: int = 0) -> None:
+        """Give each body a random moment of its cycle."""
+        first, last = self._first[self._playing], self._last[self._playing]
+        self._next[:] = np.random.default_rng(seed).integers(first, last + 1)
+
+    def link_m(self, body: int) -> Floats:
+        """(L, 3) centres of a body's links in the world, single precision."""
+        return np.asarray(self._points[body, :, : self._links].T, dtype=np.float64)
+
+    def step(self, frames: int = 1) -> None:
+        """Go on by ``frames`` frames."""
+        for _ in range(frames):
+            _step(
+                self._turn, self._move, self._shape, self._first, self._last, self._bridge,
+                self.rotation, self.origin_m, self.scale, self.visible, self.segment, self.cycles,
+                self._playing, self._next, self._ended, self._begun, self._whole, self._left,
+                self._points,
+            )  # fmt: skip
+
+
+@njit(cache=True, fastmath=True, error_model="numpy")
+def _square(r):  # type: ignore[no-untyped-def]
+    """Take rounding out of the axes: x keeps its direction, y and z are made anew."""
+    size = 1.0 / np.sqrt(r[0] * r[0] + r[3] * r[3] + r[6] * r[6])
+    r[0], r[3], r[6] = r[0] * size, r[3] * size, r[6] * size
+    along = r[0] * r[1] + r[3] * r[4] + r[6] * r[7]
+    r[1], r[4], r[7] = r[1] - along * r[0], r[4] - along * r[3], r[7] - along * r[6]
+    size = 1.0 / np.sqrt(r[1] * r[1] + r[4] * r[4] + r[7] * r[7])
+    r[1], r[4], r[7] = r[1] * size, r[4] * size, r[7] * size
+    r[2] = r[3] * r[7] - r[6] * r[4]
+    r[5] = r[6] * r[1] - r[0] * r[7]
+    r[8] = r[0] * r[4] - r[3] * r[1]
+
+
+@njit(cache=True, fastmath=True, error_model="numpy")
+def _step(  # type: ignore[no-untyped-def]  # noqa: PLR0915
+    turn, move, shape, first, last, bridge, rotation, origin, scale, visible, wanted,
+    cycles, playing, following, ended, begun, whole, left, points,
+):  # fmt: skip
+    """One frame of every body; plain numbers, for a slice in this loop costs more than its work."""
+    lanes = shape.shape[2]
+    for b in range(len(following)):
+        if ended[b]:
+            ended[b] = False
+            cycles[b] += 1
+            _square(rotation[b])
+            new = wanted[b]
+            if new != playing[b]:
+                begun[b] = last[playing[b]]
+                whole[b] = left[b] = bridge[playing[b], new]
+                playing[b] = new
+                cycles[b] = 0
+                following[b] = first[new]
+        at, s, seen = following[b], scale[b], visible[b]
+        a, share = at, 0.0
+        r00, r01, r02 = rotation[b, 0], rotation[b, 1], rotation[b, 2]
+        r10, r11, r12 = rotation[b, 3], rotation[b, 4], rotation[b, 5]
+        r20, r21, r22 = rotation[b, 6], rotation[b, 7], rotation[b, 8]
+        x, y, z = origin[b, 0], origin[b, 1], origin[b, 2]
+        if seen and left[b] > 0:  # the shape goes over, the body frame stays
+            a, share = begun[b], (whole[b] - left[b] + 1.0) / (whole[b] + 1.0)
+            left[b] -= 1
+        else:
+            left[b] = 0
+            u, v, w = s * move[at, 0], s * move[at, 1], s * move[at, 2]
+            x += r00 * u + r01 * v + r02 * w
+            y += r10 * u + r11 * v + r12 * w
+            z += r20 * u + r21 * v + r22 * w
+            t00, t01, t02 = turn[at, 0], turn[at, 1], turn[at, 2]
+            t10, t11, t12 = turn[at, 3], turn[at, 4], turn[at, 5]
+            t20, t21, t22 = turn[at, 6], turn[at, 7], turn[at, 8]
+            r00, r01, r02 = (
+                r00 * t00 + r01 * t10 + r02 * t20,
+                r00 * t01 + r01 * t11 + r02 * t21,
+                r00 * t02 + r01 * t12 + r02 * t22,
+            )
+            r10, r11, r12 = (
+                r10 * t00 + r11 * t10 + r12 * t20,
+                r10 * t01 + r11 * t11 + r12 * t21,
+                r10 * t02 + r11 * t12 + r12 * t22,
+            )
+            r20, r21, r22 = (
+                r20 * t00 + r21 * t10 + r22 * t20,
+                r20 * t01 + r21 * t11 + r22 * t21,
+                r20 * t02 + r21 * t12 + r22 * t22,
+            )
+            rotation[b, 0], rotation[b, 1], rotation[b, 2] = r00, r01, r02
+            rotation[b, 3], rotation[b, 4], rotation[b, 5] = r10, r11, r12
+            rotation[b, 6], rotation[b, 7], rotation[b, 8] = r20, r21, r22
+            origin[b, 0], origin[b, 1], origin[b, 2] = x, y, z
+            if at == last[playing[b]]:
+                ended[b] = True
+                following[b] = first[playing[b]]
+            else:
+                following[b] = at + 1
+        if not seen:
+            continue
+        x0, y0, z0 = np.float32(x), np.float32(y), np.float32(z)
+        f00, f01, f02 = np.float32(s * r00), np.float32(s * r01), np.float32(s * r02)
+        f10, f11, f12 = np.float32(s * r10), np.float32(s * r11), np.float32(s * r12)
+        f20, f21, f22 = np.float32(s * r20), np.float32(s * r21), np.float32(s * r22)
+        if share == 0.0:
+            for k in range(lanes):
+                dx, dy, dz = shape[a, 0, k], shape[a, 1, k], shape[a, 2, k]
+                points[b, 0, k] = x0 + f00 * dx + f01 * dy + f02 * dz
+                points[b, 1, k] = y0 + f10 * dx + f11 * dy + f12 * dz
+                points[b, 2, k] = z0 + f20 * dx + f21 * dy + f22 * dz
+        else:
+            p, q = np.float32(1.0 - share), np.float32(share)
+            for k in range(lanes):
+                dx = p * shape[a, 0, k] + q * shape[at, 0, k]
+                dy = p * shape[a, 1, k] + q * shape[at, 1, k]
+                dz = p * shape[a, 2, k] + q * shape[at, 2, k]
+                points[b, 0, k] = x0 + f00 * dx + f01 * dy + f02 * dz
+                points[b, 1, k] = y0 + f10 * dx + f11 * dy + f12 * dz
+                points[b, 2, k] = z0 + f20 * dx + f21 * dy + f22 * dz

@@ -1,0 +1,147 @@
+"""A sequence of recorded actions as joint goals: the repertoire on the bus."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from config.robot import RobotConfig
+from controller.gaits.gait import Needs
+from controller.motion.relay import Relay
+from controller.motion.source import Pace
+from controller.repertoire.repertoire import Repertoire
+from controller.repertoire.segment import Segment
+from controller.runtime.body import BodyView
+
+Floats = NDArray[np.float64]
+STOP_S = 1.0
+Choose = Callable[[BodyView], int | None]
+"""Told where the body is when a cycle ends; returns the next action, or None to come to rest."""
+
+
+class SegmentCycle:
+    """The joint goals of one segment, over and over."""
+
+    done = False
+
+    def __init__(self, segment: Segment, robot: RobotConfig) -> None:
+        goals = np.concatenate([segment.goal_rad, segment.goal_rad[:1]])
+        time_s = segment.frame_s * np.arange(len(goals))
+        self._spline = CubicSpline(time_s, goals, bc_type="periodic")
+        self.duration_s = segment.duration_s
+        fine = np.linspace(0.0, self.duration_s, 4 * len(goals))
+        self._pace = Pace(
+            np.abs(self._spline(fine, 1)).max(axis=0), np.abs(self._spline(fine, 2)).max(axis=0)
+        )
+        self.needs = Needs(
+            yaw=bool(np.any(segment.goal_rad[:, robot.yaw_joints])),
+            pitch=bool(np.any(segment.goal_rad[:, robot.pitch_joints])),
+            wheels=True,
+        )
+        self.gone_s = 0.0
+        """Since its beginning, over all cycles."""
+
+    @property
+    def cycles(self) -> float:
+        """Gone through so far."""
+        return self.gone_s / self.duration_s
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return np.asarray(self._spline(self.gone_s % self.duration_s), dtype=float)
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        return np.asarray(self._spline(self.gone_s % self.duration_s, 1), dtype=float)
+
+    def pace(self) -> Pace:
+        """Largest over a cycle."""
+        return self._pace
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Go on by ``dt_s``."""
+        self.gone_s += dt_s
+        return self.goal_rad()
+
+
+class RepertoireMotion:
+    """Asks for an action whenever a cycle ends; changes are joined C1 within the limits."""
+
+    def __init__(
+        self, repertoire: Repertoire, robot: RobotConfig, first: int, choose: Choose
+    ) -> None:
+        """Begin with action ``first`` at rest.
+
+        Raises:
+            InputError: the robot has other joints.
+
+        """
+        repertoire.check(robot)
+        self._repertoire, self._robot, self._choose = repertoire, robot, choose
+        self.action = first
+        self._cycle = SegmentCycle(repertoire.segments[first], robot)
+        self._relay = Relay(robot, self._cycle)
+        self._ends = 1
+        self._stopping_s: float | None = None
+
+    @property
+    def needs(self) -> Needs:
+        """Those of the action."""
+        return self._cycle.needs
+
+    @property
+    def done(self) -> bool:
+        """Whether it has come to rest."""
+        return self._stopping_s is not None and self._stopping_s >= STOP_S
+
+    @property
+    def stopping(self) -> bool:
+        """Whether it is coming to rest, or has."""
+        return self._stopping_s is not None
+
+    def stop(self) -> None:
+        """Come to rest within ``STOP_S``."""
+        if self._stopping_s is None:
+            self._stopping_s = 0.0
+
+    @property
+    def _rate(self) -> float:
+        if self._stopping_s is None:
+            return 1.0
+        x = min(self._stopping_s / STOP_S, 1.0)
+        return 1.0 - x * x * (3.0 - 2.0 * x)
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return self._relay.goal_rad()
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        return self._rate * self._relay.velocity_rad_s()
+
+    def pace(self) -> Pace:
+        """The robot's limits: actions follow each other."""
+        return Pace.limit(self._robot)
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Go on by ``dt_s`` and return the new targets (J,)."""
+        if self._stopping_s is None and self._cycle.cycles >= self._ends - 1e-6:
+            self._next(view)
+        part_s = dt_s
+        if self._stopping_s is not None:
+            before = self._rate
+            self._stopping_s += dt_s
+            part_s = 0.5 * (before + self._rate) * dt_s
+        return self._relay.step(part_s, view)
+
+    def _next(self, view: BodyView) -> None:
+        chosen = self._choose(view)
+        if chosen is None:
+            self.stop()
+        elif chosen == self.action:
+            self._ends += 1
+        else:
+            self.action, self._ends = chosen, 1
+            self._cycle = SegmentCycle(self._repertoire.segments[chosen], self._robot)
+            self._relay.join(self._cycle)

@@ -1,0 +1,103 @@
+"""The actions of one robot on one ground, and their file."""
+
+import json
+import zipfile
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from config.errors import InputError
+from config.robot import RobotConfig
+from controller.repertoire.segment import Segment
+
+FORMAT = "snakewalk-repertoire-1"
+_HEAD = ("robot", "joint_axes", "world", "length_m")
+_ARRAYS = ("turn", "move_m", "link_m", "link_rotation", "goal_rad", "joint_rad")
+_PLAIN = tuple(f.name for f in fields(Segment) if f.name not in _ARRAYS)
+
+
+@dataclass(frozen=True, slots=True)
+class Repertoire:
+    """Segments with one frame time and one number of links."""
+
+    robot: str
+    joint_axes: str
+    """Of the recorded robot, as in its configuration."""
+    world: str
+    length_m: float
+    """Of the recorded body: another body is scaled by the ratio of lengths."""
+    segments: tuple[Segment, ...]
+
+    @property
+    def frame_s(self) -> float:
+        """Time of a frame."""
+        return self.segments[0].frame_s
+
+    def index(self, name: str) -> int:
+        """Return the place of the segment ``name``.
+
+        Raises:
+            InputError: there is none.
+
+        """
+        names = [segment.name for segment in self.segments]
+        if name not in names:
+            raise InputError(f"{name}: no such action; there are {', '.join(names)}")
+        return names.index(name)
+
+    def check(self, robot: RobotConfig) -> None:
+        """Refuse a robot with other joints.
+
+        Raises:
+            InputError: one line.
+
+        """
+        if self.joint_axes != robot.joint_axes:
+            raise InputError(
+                f"repertoire of {self.robot}: joints {self.joint_axes}; "
+                f"robot {robot.name} has {robot.joint_axes}"
+            )
+
+    def save(self, path: Path) -> None:
+        """Write an NPZ file: arrays by ``number/name``, the rest as JSON under ``about``."""
+        about = {
+            "format": FORMAT,
+            **{key: getattr(self, key) for key in _HEAD},
+            "segments": [{key: getattr(s, key) for key in _PLAIN} for s in self.segments],
+        }
+        arrays = {
+            f"{k}/{name}": getattr(segment, name)
+            for k, segment in enumerate(self.segments)
+            for name in _ARRAYS
+        }
+        with path.open("wb") as file:
+            np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
+
+
+def load_repertoire(path: Path) -> Repertoire:
+    """Read what ``Repertoire.save`` wrote.
+
+    Raises:
+        InputError: no such file, or none of ours.
+
+    """
+    if not path.is_file():
+        raise InputError(
+            f"{path}: no such file; make one by: snakewalk repertoire record -o {path}"
+        )
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            about = json.loads(str(file["about"]))
+            if about.get("format") != FORMAT:
+                raise InputError(f"{path}: format {about.get('format')}; expected {FORMAT}")
+            about = {key: about[key] for key in (*_HEAD, "segments")}
+            segments = tuple(
+                Segment(**plain, **{name: file[f"{k}/{name}"] for name in _ARRAYS})
+                for k, plain in enumerate(about["segments"])
+            )
+    except (KeyError, TypeError, AttributeError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: not a repertoire ({error})") from None
+    if not segments:
+        raise InputError(f"{path}: a repertoire without actions")
+    return Repertoire(**{key: about[key] for key in _HEAD}, segments=segments)

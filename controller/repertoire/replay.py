@@ -1,0 +1,70 @@
+"""Exact kinematic replay of segments from any pose ([YT] 4.1, Eq. 10-12, corrected)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.repertoire.frame import Frame
+from controller.repertoire.segment import Segment
+from controller.repertoire.warp import bridge
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """A body's way, frame by frame; the start is not among the frames."""
+
+    rotation: Floats
+    """(T, 3, 3) of the body frame in the world."""
+    origin_m: Floats
+    """(T, 3)"""
+    link_m: Floats
+    """(T, L, 3) centres of the links in the world."""
+
+    @property
+    def end(self) -> Frame:
+        """The last body frame."""
+        return Frame(self.rotation[-1], self.origin_m[-1])
+
+
+def replay(segment: Segment, start: Frame, scale: float = 1.0) -> Replayed:
+    """Play one cycle from ``start``.
+
+    ``scale`` is the ratio of this body's size to the recorded one's. It scales the shape (Eq. 12)
+    and the way too: a body twice as long that made the recorded steps would slip.
+    """
+    turned, gone_m = segment.travel()
+    rotation = start.rotation @ turned[1:]
+    origin = start.origin_m + scale * gone_m[1:] @ start.rotation.T
+    link = np.einsum("tij,tlj->tli", rotation, scale * segment.link_m) + origin[:, None]
+    return Replayed(rotation, origin, link)
+
+
+def replay_all(
+    segments: Sequence[Segment], start: Frame, scale: float = 1.0, largest_tip_m: float = 0.02
+) -> Replayed:
+    """Play segments one after the other, with bridges in which the body frame stays.
+
+    ``largest_tip_m``: way of the tail, in the body frame of the recorded size, in a frame.
+    """
+    parts: list[Replayed] = []
+    at = start
+    for k, segment in enumerate(segments):
+        if k:
+            shapes = scale * bridge(segments[k - 1].link_m[-1], segment.link_m[0], largest_tip_m)
+            count = len(shapes)
+            if count:
+                still = np.repeat(at.rotation[None], count, axis=0)
+                stays = np.repeat(at.origin_m[None], count, axis=0)
+                parts.append(Replayed(still, stays, at.world_m(shapes)))
+        parts.append(replay(segment, at, scale))
+        at = parts[-1].end
+    return Replayed(
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("rotation", "origin_m", "link_m")
+        )
+    )
