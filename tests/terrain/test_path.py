@@ -54,3 +54,10 @@ def test_a_lap_passes_its_waypoints_in_order_and_its_start_again_at_the_end() ->
     assert at == sorted(at)
     assert at[-1] == pytest.approx(path.length_m)
     np.testing.assert_allclose(path.position(at), SQUARE, atol=0.01)
+
+
+def test_gap_is_the_distance_from_the_nearest_mark() -> None:
+    path = SplinePath([(0.0, 0.0), (2.0, 1.0), (4.0, 0.0)])
+    for point in np.random.default_rng(3).uniform(-1.0, 5.0, (20, 2)):
+        s_m = path.nearest(point, 0.0, window_m=9.0)
+        assert path.gap_m(point, s_m) == pytest.approx(np.hypot(*(path.position(s_m) - point)))

@@ -1,7 +1,12 @@
 """``snakewalk plan``: a run on paper."""
 
 import math
+from pathlib import Path
+from typing import Annotated
 
+import typer
+
+from config.errors import InputError
 from controller.app.commands.common import (
     DEFAULT_RUN,
     Json,
@@ -22,9 +27,38 @@ def plan(
     track: TrackFile = None,
     seed: Seed = None,
     motion: Motion = None,
+    with_: Annotated[
+        str | None, typer.Option("--with", help="repertoire: search over recorded actions")
+    ] = None,
+    repertoire: Annotated[
+        Path | None, typer.Option(help="file of actions; default: repertoire-ROBOT-WORLD.npz")
+    ] = None,
+    beam: Annotated[int, typer.Option(min=1, max=100_000, help="sequences kept a round")] = 400,
+    physics: Annotated[
+        int, typer.Option(min=0, help="candidates to run on the physics, for the ratio")
+    ] = 0,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="write the sequence, as JSON")
+    ] = None,
+    carry: Annotated[bool, typer.Option("--run", help="run it in the simulator")] = False,
+    force: Annotated[bool, typer.Option("--force", help="overwrite files")] = False,
     as_json: Json = False,
 ) -> None:
     """Judge a run on paper: library, path and joint limits, with no servo and no simulator."""
+    if with_ not in {None, "repertoire"}:
+        raise InputError(f"--with {with_}: no such planner; there is: repertoire")
+    if with_ is not None:
+        from controller.app.commands.repertoire import plan_with_repertoire  # noqa: PLC0415
+
+        if motion is not None or track is not None or seed is not None:
+            raise InputError("--with repertoire: takes no --motion, --track or --seed")
+        plan_with_repertoire(
+            run, repertoire=repertoire, robot=robot, world=world, beam=beam, physics=physics,
+            out=out, carry=carry, force=force, as_json=as_json,
+        )  # fmt: skip
+        return
+    if repertoire is not None or out is not None or carry or physics:
+        raise InputError("--repertoire, --out, --run and --physics belong to --with repertoire")
     from controller.app.prepare import prepare  # noqa: PLC0415  heavy; --help stays quick
     from controller.terrain.summary import path_relief  # noqa: PLC0415
 

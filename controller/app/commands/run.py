@@ -27,6 +27,9 @@ def run(
     track: TrackFile = None,
     seed: Seed = None,
     motion: Motion = None,
+    pose: Annotated[
+        str | None, typer.Option(help="what measures the head: simulator, camera or joints")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="folder for log and summary")] = None,
     film: Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")] = True,
     as_json: Json = False,
@@ -37,14 +40,16 @@ def run(
     from controller.app.progress import PathProgress  # noqa: PLC0415
     from controller.app.report.leave import leave_report  # noqa: PLC0415
 
-    prepared = prepare(run, seed=seed, motion=motion, robot=robot, world=world, track=track)
+    prepared = prepare(
+        run, seed=seed, motion=motion, robot=robot, world=world, track=track, pose=pose
+    )
     changed = [Path(each).stem for each in (robot, world, track) if each is not None]
     parts = [prepared.run.name, *changed, prepared.run.motion, f"seed{prepared.run.seed}"]
     name = "-".join(parts)
     folder = out if out is not None else Path("runs") / name
     with PathProgress(prepared.path.length_m, len(prepared.run.waypoints_m)) as progress:
         asks = _confirm if sys.stdin.isatty() else None
-        finished = execute(prepared, folder, port, (progress,), asks)
+        finished = execute(prepared, folder, port, (progress,), asks, progress.note)
     outcome = finished.outcome
     left = leave_report(finished.log, folder, film=film)
     for line in left.notes:
