@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,10 @@ from config.robot import RobotConfig
 Floats = NDArray[np.float64]
 CYCLE_SAMPLES = 129
 """Phases at which a cycle is looked at; the first and the last are the same."""
+
+
+Aim = Literal["way", "climb", "turn"]
+"""Ground covered, height won, or the heading turned."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +72,8 @@ class Gait(ABC):
     """Shipped world that it is run in where none is asked for."""
     p_gain: ClassVar[int | None] = None
     """Register 84 of every servo where the robot's own would squeeze too hard."""
+    aim: ClassVar[Aim] = "way"
+    """What it is there for, and judged by."""
     model: ClassVar[type[GaitParameters]] = GaitParameters
 
     def __init__(self, params: GaitParameters | None = None) -> None:

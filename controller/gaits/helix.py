@@ -82,6 +82,7 @@ class _Helix(Gait):
 
     source = SOURCE
     needs = Needs(yaw=True, pitch=True)
+    aim = "climb"
     p_gain = 300
     inside: ClassVar[bool]
 

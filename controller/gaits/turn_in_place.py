@@ -25,6 +25,7 @@ class TurnInPlace(Gait):
         "M. Tesch et al., Parameterized and scripted gaits for modular snake robots, "
         "Advanced Robotics 23, 2009: amplitude modulated along the body"
     )
+    aim = "turn"
     needs = Needs(yaw=True, pitch=True)
     model = TurnInPlaceParameters
 

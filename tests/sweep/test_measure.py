@@ -48,7 +48,7 @@ def test_unmeasured_points_never_win(missing: str) -> None:
     from controller.app.sweep.tune import loss
 
     row = {"ended": "ran to its end", "speed_m_s": 1.0, "climb_m_s": 0.0, "least_rate": 1.0}
-    good = loss(row, "speed", turns=False, least=0.5)
+    good = loss(row, "speed", goal="way", least=0.5)
     assert good == -1.0
-    assert loss(row | {missing: None}, "speed", turns=False, least=0.5) > good
-    assert loss(row | {"least_rate": 0.9}, "speed", turns=False, least=0.5) > good
+    assert loss(row | {missing: None}, "speed", goal="way", least=0.5) > good
+    assert loss(row | {"least_rate": 0.9}, "speed", goal="way", least=0.5) > good

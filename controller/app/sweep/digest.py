@@ -3,6 +3,10 @@
 import math
 
 from controller.app.sweep.table import number
+from controller.gaits.gait import Aim
+from controller.gaits.registry import GAITS
+
+UNITS: dict[Aim, str] = {"way": "m/s", "climb": "m/s up", "turn": "rad/s"}
 
 
 def digest(rows: list[dict[str, str]]) -> list[dict[str, object]]:
@@ -20,8 +24,9 @@ def digest(rows: list[dict[str, str]]) -> list[dict[str, object]]:
                 "tripped": len(some) - len(ran),
                 "default_bl_cycle": _round(math.nan if first is None else way_bl(first), 3),
                 "most_bl_cycle": _round(_most([way_bl(row) for row in ran]), 3),
-                "fastest_m_s": _round(_most([pace_m_s(row) for row in ran]), 3),
-                "most_turn_rad_cycle": _round(_peak(ran, "turn_rad_cycle"), 2),
+                "default_pace": _round(math.nan if first is None else pace(first), 3),
+                "most_pace": _round(_most([pace(row) for row in ran]), 3),
+                "pace": UNITS[GAITS[gait].aim],
                 "default_cost": _round(_of(first, "cost_of_transport"), 2),
                 "least_cost": _round(-_most([-number(r, "cost_of_transport") for r in ran]), 2),
                 "peak_torque_n_m": _round(_peak(ran, "peak_torque_n_m"), 2),
@@ -32,9 +37,12 @@ def digest(rows: list[dict[str, str]]) -> list[dict[str, object]]:
     return found
 
 
-def pace_m_s(row: dict[str, str]) -> float:
-    """Speed over ground and upwards together, m/s."""
-    return math.hypot(number(row, "speed_m_s"), number(row, "climb_m_s"))
+def pace(row: dict[str, str]) -> float:
+    """How fast the gait does what it is there for: m/s over ground or upwards, rad/s turned."""
+    aim = GAITS[row["gait"]].aim
+    if aim == "turn":
+        return abs(number(row, "turn_rad_cycle")) * number(row, "ran_hz")
+    return abs(number(row, "climb_m_s" if aim == "climb" else "speed_m_s"))
 
 
 def way_bl(row: dict[str, str]) -> float:

@@ -4,9 +4,11 @@ from pathlib import Path
 
 import matplotlib
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
-from controller.app.sweep.digest import pace_m_s
+from controller.app.sweep.digest import UNITS, pace
 from controller.app.sweep.table import number
+from controller.gaits.registry import GAITS
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -28,17 +30,18 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
     for panel, gait in zip(axes.flat, gaits, strict=False):
         for colour, robot in zip(_COLOURS, robots, strict=False):
             some = [r for r in rows if (r["gait"], r["robot"]) == (gait, robot) and r["cycles"]]
-            way = [pace_m_s(row) for row in some]
+            way = [pace(row) for row in some]
             cost = [number(r, "cost_of_transport") for r in some]
             panel.scatter(way, cost, s=9, color=colour, alpha=0.75, linewidths=0, label=robot)
             for r, x, y in zip(some, way, cost, strict=True):
                 if r["number"] == "0":
                     panel.scatter([x], [y], s=60, facecolors="none", edgecolors=colour)
         panel.set_title(gait, fontsize=10)
+        panel.set_xlabel(UNITS[GAITS[gait].aim], fontsize=8)
+        panel.xaxis.set_major_locator(MaxNLocator(4))
         panel.set_yscale("log")
         panel.tick_params(labelsize=7)
         panel.spines[["top", "right"]].set_visible(False)
-    figure.supxlabel("speed, m/s", fontsize=9)
     figure.supylabel("cost of transport (log); rings: defaults", fontsize=9)
     handles = [
         Line2D([], [], marker="o", ls="", color=colour, label=robot)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,9 @@ def points_of(
     place = (gait.name, robot.name, gait.world)
     found = [Point(*place, 0, seed, seconds)]
     refused = 0
-    sobol = qmc.Sobol(len(space.spans), rng=np.random.default_rng(seed))
+    sobol = qmc.Sobol(
+        len(space.spans), rng=np.random.default_rng([seed, crc32(gait.name.encode())])
+    )
     draws = sobol.random_base2(int(np.ceil(np.log2(count * _TRIES))))
     for unit in draws:
         if len(found) >= count:

@@ -20,6 +20,7 @@ from config.errors import InputError
 from config.loader import load_robot
 from controller.app.sweep.measure import Row, measure
 from controller.app.sweep.points import Point, Space
+from controller.gaits.gait import Aim as Goal
 from controller.gaits.registry import make_gait
 
 Floats = NDArray[np.float64]
@@ -57,25 +58,25 @@ class Tuned:
         return int((better if self.aim == "speed" else ~better).sum())
 
 
-def pace(row: Row, turns: bool) -> float:
-    """Speed over ground and upwards, m/s; rad/s where a gait is there to turn."""
+def pace(row: Row, goal: Goal) -> float:
+    """How fast it does what it is there for, m/s or rad/s; 0 where it did not run to its end."""
     if row.get("ended") != "ran to its end" or row.get("speed_m_s") is None:
         return 0.0
-    if turns:
+    if goal == "turn":
         return abs(_value(row, "turn_rad_cycle")) * _value(row, "ran_hz")
-    return math.hypot(_value(row, "speed_m_s"), _value(row, "climb_m_s"))
+    return abs(_value(row, "climb_m_s" if goal == "climb" else "speed_m_s"))
 
 
-def loss(row: Row, aim: Aim, turns: bool, least: float) -> float:
+def loss(row: Row, aim: Aim, goal: Goal, least: float) -> float:
     """What is made small; a gait that trips, is derated, or hardly moves is no answer."""
-    speed = pace(row, turns)
+    speed = pace(row, goal)
     if speed <= 0.0 or _value(row, "least_rate") < 1.0:
         return _WORST
     if aim == "speed":
         return -speed
     if speed < LAGGARD * least:
         return _WORST * (1.0 - speed / max(least, 1e-9))
-    return _value(row, "power_w") / speed if turns else _value(row, "cost_of_transport")
+    return _cost(row, goal)
 
 
 def tune(
@@ -100,13 +101,13 @@ def tune(
     kind = type(make_gait(gait))
     kind().check(body)
     space = Space.of(kind)
-    turns = gait == "turn-in-place"
+    goal = kind.aim
     start = Point(gait, body.name, kind.world, 0, seed, seconds)
     default = kind().params.model_dump()
     # fresh interpreters: forked ones would share MuJoCo's and numba's threads
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         first = measure(start)
-        least = pace(first, turns)
+        least = pace(first, goal)
         if least <= 0.0:
             raise InputError(f"{gait} on {robot}: the defaults do not move it: {first['ended']}")
         done = 1
@@ -123,7 +124,7 @@ def tune(
         dimensions = len(space.spans)
         people = max(5, _GENERATION)
         found = differential_evolution(
-            partial(_rated, start=start, aim=aim, turns=turns, least=least),
+            partial(_rated, start=start, aim=aim, goal=goal, least=least),
             Bounds([0.0] * dimensions, [1.0] * dimensions),
             x0=space.unit(default),
             init=_around(space.unit(default), people, np.random.default_rng(seed)),
@@ -139,7 +140,7 @@ def tune(
         values = space.values(found.x)
         tuned = replace(start, number=1, parameters=values)
         others = range(seed + 1, seed + 1 + seeds)
-        one = partial(_scored, aim=aim, turns=turns)
+        one = partial(_scored, aim=aim, goal=goal)
         before = tuple(pool.map(partial(one, start), others))
         after = tuple(pool.map(partial(one, tuned), others))
     return Tuned(gait, body.name, aim, values, done, before, after)
@@ -152,19 +153,26 @@ def _around(centre: Floats, people: int, rng: np.random.Generator) -> Floats:
     return np.vstack([near, far])
 
 
-def _rated(unit: Floats, *, start: Point, aim: Aim, turns: bool, least: float) -> float:
+def _rated(unit: Floats, *, start: Point, aim: Aim, goal: Goal, least: float) -> float:
     values = Space.of(type(make_gait(start.gait))).values(unit)
     row = measure(replace(start, parameters=values))
-    return loss(row, aim, turns, least)
+    return loss(row, aim, goal, least)
 
 
-def _scored(point: Point, vary: int, *, aim: Aim, turns: bool) -> float:
+def _scored(point: Point, vary: int, *, aim: Aim, goal: Goal) -> float:
     row = measure(point, vary=vary)
     if aim == "speed":
-        return pace(row, turns)
-    if pace(row, turns) <= 0.0:
+        return pace(row, goal)
+    if pace(row, goal) <= 0.0:
         return math.inf
-    return _value(row, "power_w") / pace(row, turns) if turns else _value(row, "cost_of_transport")
+    return _cost(row, goal)
+
+
+def _cost(row: Row, goal: Goal) -> float:
+    """Cost of transport, or joules a radian."""
+    if goal == "turn":
+        return _value(row, "power_w") / pace(row, goal)
+    return _value(row, "cost_of_transport")
 
 
 def _value(row: Row, key: str) -> float:
