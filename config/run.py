@@ -7,8 +7,9 @@ from pydantic import Field, model_validator
 from config.base import Strict
 from config.camera import CameraConfig, PoseName
 from config.gait import GaitConfig
+from config.playback import PlaybackConfig
 
-MotionName = Literal["walk", "walk-printed", "walk-blind", "serpenoid", "gait", "repertoire"]
+MotionName = Literal["walk", "walk-printed", "walk-blind", "serpenoid", "gait", "playback", "repertoire"]
 
 
 class StatesConfig(Strict):
@@ -30,6 +31,9 @@ class WalkConfig(Strict):
     heading_tolerance_rad: float = Field(0.5, gt=0.0)
     ramp_limit_rad: float = Field(0.8, ge=0.0)
     nearest_count: int = Field(12, ge=1, description="taken when no state is within tolerance")
+    fallback: bool = Field(
+        True, description="after a waypoint was passed by, go on as a serpenoid until it is reached"
+    )
 
 
 class BehaviourConfig(Strict):
@@ -82,6 +86,7 @@ class RunConfig(Strict):
     behaviour: BehaviourConfig = BehaviourConfig()
     safety: SafetyConfig = SafetyConfig()
     gait: GaitConfig | None = None
+    playback: PlaybackConfig | None = None
     pose: PoseName | None = Field(
         None, description="what measures the head; default: the simulator, on servos the joints"
     )
@@ -91,6 +96,6 @@ class RunConfig(Strict):
     def _motion_has_its_table(self) -> Self:
         if self.motion == "gait" and self.gait is None:
             raise ValueError("motion gait needs a table [gait] with its name")
-        if self.motion != "gait" and not self.waypoints_m:
+        if self.motion not in {"gait", "playback"} and not self.waypoints_m:
             raise ValueError("waypoints_m: at least one is needed")
         return self

@@ -16,6 +16,7 @@ from config.robot import RobotConfig
 from config.run import RunConfig, WalkConfig
 from config.world import WorldConfig
 from controller.capture.load import load_track, track_beside
+from controller.motion.fallback import Fallback
 from controller.motion.joint_track import JointTrack
 from controller.motion.lift import Lift
 from controller.motion.pulse import Pulse
@@ -133,6 +134,7 @@ class Prepared:
             ),
             plan=self.planner,
             lift=None if level or self.ground is None else self.lift,
+            fall_back=source.fall_back if isinstance(source, Fallback) else lambda lost: None,
             start_m=np.array(run.start_m),
             waypoints_m=run.waypoints_m,
             length_m=robot.length_m,
@@ -194,7 +196,8 @@ class Prepared:
                 nearest_count=walk.nearest_count,
             )
         order = np.random.default_rng(self.run.seed).permutation(len(self.library.shapes_rad))
-        return Walker(self.library.shapes_rad[order], walk, self._usable)
+        walker = Walker(self.library.shapes_rad[order], walk, self._usable)
+        return Fallback(walker) if self.run.motion == "walk" and walk.fallback else walker
 
     def _usable(self, body_rad: Floats) -> bool:
         """Whether a body between two shapes can be made, does not touch itself, and pushes."""

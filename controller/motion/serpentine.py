@@ -25,12 +25,27 @@ class SerpentineParameters:
 class Serpentine:
     """Appends short pieces of a travelling sine whose mean line turns towards the aim."""
 
-    def __init__(self, points: int, parameters: SerpentineParameters | None = None) -> None:
+    def __init__(
+        self,
+        points: int,
+        parameters: SerpentineParameters | None = None,
+        track: AngleTrack | None = None,
+    ) -> None:
         self._p = parameters or SerpentineParameters()
         self._base_rad = 0.0
-        self._at = points  # samples so far
+        self._at = float(points)  # of the wave's next sample
         self._points = points
-        self.track = AngleTrack(self._wave(np.arange(points))[::-1])
+        self.track = track or AngleTrack(self._wave(np.arange(points))[::-1])
+
+    def take_over(self) -> None:
+        """Go on from a track that others have grown: at its last angle, bending the same way."""
+        p, track = self._p, self.track
+        recent = track.at_rad(np.arange(track.end - self._points, track.end, dtype=float))
+        phase = np.arcsin(np.clip((recent[-1] - recent.mean()) / p.amplitude_rad, -0.95, 0.95))
+        if recent[-1] < recent[-2]:
+            phase = np.pi - phase
+        self._base_rad = float(recent[-1] - p.amplitude_rad * np.sin(phase))
+        self._at = float(phase) * self._points / (2.0 * np.pi * p.waves) + 1.0
 
     def decide(self, offset_rad: float, aim_rad: float) -> Decision:
         """Append the next piece; same contract as ``Walker.decide``."""

@@ -70,9 +70,13 @@ class Walker:
             self._failures[self._current] += 1  # left for a state already visited (corrected F)
         self._visits[state] += 1
         self._current = state
-        visited = int(np.count_nonzero(self._visits))
         ramp = self._ramp(error[state])
-        return Decision(state, float(error[state]), ramp, len(near), visited)
+        return Decision(state, float(error[state]), ramp, len(near), self.visited)
+
+    @property
+    def visited(self) -> int:
+        """Distinct states visited so far."""
+        return int(np.count_nonzero(self._visits))
 
     def _choose(self, pool: NDArray[np.intp], placed_rad: Floats, error_rad: Floats) -> int:
         """First of ``pool`` in the order of W whose body is acceptable; the very first if none."""

@@ -54,6 +54,7 @@ class Pilot:
         *,
         plan: Planner,
         lift: Lift | None = None,
+        fall_back: Callable[[bool], None] = lambda lost: None,
         start_m: Floats,
         waypoints_m: Sequence[tuple[float, float]],
         length_m: float,
@@ -66,6 +67,7 @@ class Pilot:
         self._pulse = pulse
         self._plan = plan
         self._lift = lift
+        self._fall_back = fall_back
         self._pitch_rad: Floats | None = None
         self._waypoints_m = np.asarray(waypoints_m, float)
         self._along_m = self._head_along_m = 0.0
@@ -146,8 +148,10 @@ class Pilot:
             return
         if math.dist(self._waypoints_m[self.reached], centre_m) <= self._radius_m:
             self.reached += 1
+            self._fall_back(False)
         elif self._feedback and self.head >= self._patience and self._astray(centre_m):
             self.missed += 1
+            self._fall_back(True)
             self._patience = self.head + _PATIENCE_BODIES * self._source.track.points
             with suppress(InputError):  # from here no safe way leads back: the old path stays
                 self._lay_path(head_m, self.reached)
