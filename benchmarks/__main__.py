@@ -17,7 +17,15 @@ from benchmarks.rows import Row
 
 MODULES = tuple(
     name
-    for name in ("hil_loop", "cycle_codec", "frames", "walk_step", "capture", "repertoire")
+    for name in (
+        "hil_loop",
+        "cycle_codec",
+        "frames",
+        "walk_step",
+        "capture",
+        "overhead",
+        "repertoire",
+    )
     if find_spec(f"benchmarks.{name}") is not None
 )
 

@@ -23,8 +23,9 @@ TITLE = "Capture: image to skeleton on one core, and its error on rendered films
 PAPER_S = 45.0
 WANTED_S = 0.05
 CAMERA_S = 1.0 / 30.0
+_SMALL_PX = 100.0  # longer bodies swim in a larger picture
 SIZES_PX = (20.0, 50.0, 150.0, 400.0)
-PLAIN = Scene(frames=60, wave_hz=0.6)
+PLAIN = Scene(rows=240, columns=320, frames=24, wave_hz=0.6)
 CONDITIONS: dict[str, dict[str, Any]] = {
     "plain": {},
     "noise 8": {"noise": 8.0},
@@ -82,9 +83,11 @@ def _errors() -> list[Row]:
     for name, change in CONDITIONS.items():
         for length_px in SIZES_PX:
             scene = replace(PLAIN, length_px=length_px, **change)
+            if length_px > _SMALL_PX:
+                scene = replace(scene, rows=480, columns=640)
             truth = true_midlines(scene)
             images = list(film(scene))
-            seen = capture(images, open_eye(images[::5]), scene.rate_hz)
+            seen = capture(images, open_eye(images[::3]), scene.rate_hz)
             good = np.flatnonzero(seen.good)
             away = float(np.median([distance(seen.points_px[k], truth[k]) for k in good]))
             frames += len(good)

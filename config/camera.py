@@ -34,6 +34,9 @@ class CameraConfig(Strict):
     corners_m: tuple[Place, Place, Place, Place] | None = Field(
         None, description="the same on the floor; with them the camera may look aslant"
     )
+    shade: float = Field(
+        0.35, ge=0.0, le=0.9, description="part of the floor's light that a shadow may take away"
+    )
     device: str | None = Field(
         None, description="of a real camera: a number, a device or an address that OpenCV opens"
     )

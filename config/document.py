@@ -100,6 +100,8 @@ def _kind(annotation: Any) -> str:
         )
     if get_origin(annotation) is dict:
         return "table"
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return "table"
     names = {float: "number", int: "whole number", str: "text", bool: "true or false"}
     return names.get(annotation, str(annotation))
 

@@ -1,10 +1,20 @@
 """Which gait moves, with what parameters: a run's table, and the shipped sets of parameters."""
 
-from pydantic import Field
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
 
 from config.base import Strict
 
 Parameters = dict[str, bool | int | float]
+
+
+class GaitChange(Strict):
+    """Another gait at a time."""
+
+    at_s: float = Field(gt=0.0, description="since the beginning")
+    name: str
+    parameters: Parameters = Field({}, description="by name; the rest keep their defaults")
 
 
 class GaitConfig(Strict):
@@ -15,6 +25,19 @@ class GaitConfig(Strict):
     duration_s: float = Field(20.0, gt=0.0, le=3600.0, description="then it comes to rest")
     look_heading_rad: float | None = Field(None, description="world heading that the head keeps")
     look_at_m: tuple[float, float] | None = Field(None, description="point that the head looks at")
+    then: tuple[GaitChange, ...] = Field(
+        (), description="other gaits at rising times: tables of `at_s`, `name`, `parameters`"
+    )
+    by: Literal["blend", "cpg"] = Field(
+        "blend", description="how gaits change: by a C1 join, or by coupled oscillators"
+    )
+
+    @model_validator(mode="after")
+    def _times_rise(self) -> Self:
+        times = [change.at_s for change in self.then]
+        if times != sorted(set(times)) or (times and times[-1] >= self.duration_s):
+            raise ValueError(f"then: times rise and lie before duration_s {self.duration_s:g}")
+        return self
 
 
 class GaitSetConfig(Strict):

@@ -9,7 +9,9 @@ from config.camera import CameraConfig, PoseName
 from config.gait import GaitConfig
 from config.playback import PlaybackConfig
 
-MotionName = Literal["walk", "walk-printed", "walk-blind", "serpenoid", "gait", "playback", "repertoire"]
+MotionName = Literal[
+    "walk", "walk-printed", "walk-blind", "serpenoid", "gait", "playback", "repertoire"
+]
 
 
 class StatesConfig(Strict):

@@ -9,6 +9,7 @@ from drivers.bus import DynamixelBus
 from drivers.clock import Clock
 from drivers.cycle import CycleCounters, GroupCycle
 from drivers.errors import BusError, ChainError, PortError
+from drivers.goal_ticks import GoalTicks
 from drivers.port import BytePort, reopen
 from drivers.readings import Readings
 from drivers.recheck import Recheck, recheck
@@ -62,7 +63,7 @@ class ServoChain:
         self._watchdog_s = watchdog_s
         self._slow_every = slow_every
         self._fast = fast
-        self._low, self._high = np.ascontiguousarray(goal_limits_raw(robot, self._units).T)
+        self._ticks = GoalTicks(self._units, goal_limits_raw(robot, self._units))
         self._readings = Readings(robot.joint_count, bus.table, self._units)
         self._cycle: GroupCycle = bus.cycle(robot.servo_ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(robot.servo_ids, fast=fast)
@@ -252,8 +253,7 @@ class ServoChain:
         self._spoke_at_s = self._clock.now_s()
 
     def _send_goals(self, goal_rad: Floats) -> NDArray[np.int32]:
-        raw = self._units.position_raw(goal_rad)
-        goals: NDArray[np.int32] = np.minimum(np.maximum(raw, self._low), self._high)
+        goals = self._ticks.of(goal_rad)
         self._cycle.write_goals(goals)
         return goals
 

@@ -122,9 +122,10 @@ class SafeLink:
         if self._memory is None:
             self._state = state
             return state
-        stale = stale_fault(state, self._limits, self._clock.now_s())
-        if stale is not None and self._recovery is not None and self.tripped is None:
-            return self._bring_back(stale, None)
+        if self._recovery is not None and self.tripped is None:
+            stale = stale_fault(state, self._limits, self._clock.now_s())
+            if stale is not None:
+                return self._bring_back(stale, None)
         self._state = state
         self._judge(state, self._memory)
         return state

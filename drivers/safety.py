@@ -167,9 +167,11 @@ def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLi
 
 def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | None:
     """First joint that was not read for too long; None if there is none."""
-    age_s = state.age_s + (now_s - state.time_s)
-    if np.maximum.reduce(age_s) <= limits.stale_limit_s:  # of a NaN, too, not
+    since_s = now_s - state.time_s
+    # the oldest stands for all, as rounding keeps their order; of a NaN this is not true
+    if np.maximum.reduce(state.age_s) + since_s <= limits.stale_limit_s:
         return None
+    age_s = state.age_s + since_s
     joint = int(np.argmin(age_s <= limits.stale_limit_s))
     return f"joint {joint}: not read for {age_s[joint]:.3f} s"
 

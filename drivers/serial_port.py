@@ -98,11 +98,15 @@ class SerialPort:
         """Send all of ``data``."""
         fd = self._descriptor
         try:
-            sent = os.write(fd, data)
-            while sent < len(data):
+            sent = 0
+            while True:
+                # said to be writable, a full device may still take nothing
+                with suppress(BlockingIOError):
+                    sent += os.write(fd, data[sent:])
+                if sent == len(data):
+                    return
                 if not self._writable.poll(_STUCK_S * 1e3):
                     raise PortError(f"{self._device}: takes no more bytes")
-                sent += os.write(fd, data[sent:])
         except OSError as error:
             raise self._gone(error) from error
 

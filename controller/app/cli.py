@@ -16,6 +16,7 @@ from controller.app.commands.fish import film, match, synthesise
 from controller.app.commands.gait import list_gaits, run_gait, show_gait
 from controller.app.commands.listing import list_
 from controller.app.commands.plan import plan
+from controller.app.commands.play import play
 from controller.app.commands.repertoire import record, run_plan, show_file
 from controller.app.commands.replay import replay
 from controller.app.commands.report import report
@@ -59,9 +60,9 @@ app.command(
         "sweep --dask tcp://cluster:8786 --points 500",
     )
 )(sweep)
-app.command(
-    epilog=_examples("tune sidewinding --for speed --out mine.toml", "gait run mine.toml")
-)(tune)
+app.command(epilog=_examples("tune sidewinding --for speed --out mine.toml", "gait run mine.toml"))(
+    tune
+)
 app.command(
     epilog=_examples("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json")
 )(trials)
@@ -97,6 +98,9 @@ bus.command(
     )
 )(serve)
 bus.command(epilog=_examples("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))(sniff)
+app.command(epilog=_examples("play worm-like", "play fish.npz --robot yaw16 --speed 0.5 --json"))(
+    play
+)
 gait_app = typer.Typer(no_args_is_help=True, help="Gaits: list, show, run.")
 app.add_typer(gait_app, name="gait")
 gait_app.command("list", epilog=_examples("gait list --json"))(list_gaits)

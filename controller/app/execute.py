@@ -24,6 +24,8 @@ class Finished:
     outcome: Outcome
     log: Path
     summary: dict[str, object]
+    pose: dict[str, object]
+    """Where a camera or the joints measured the pose: what they did, and how far off they were."""
 
 
 def execute(
@@ -84,11 +86,11 @@ def execute(
             say(text)
 
         limits = SafetyLimits.from_config(prepared.robot, safety)
-        with pose_source(prepared, backend, note) as pose:
+        with pose_source(prepared, backend, note) as source:
             drive = Drive(
                 link=SafeLink(backend.chain, limits, clock, recovery),
                 clock=clock,
-                pose=pose,
+                pose=source.ask,
                 pilot=prepared.guide(note),
                 log=log,
                 robot=prepared.robot,
@@ -100,7 +102,7 @@ def execute(
             )
             outcome = drive.run()
     numbers = dict(write_summary(read_log(log_path), folder))
-    return Finished(outcome, log_path, numbers)
+    return Finished(outcome, log_path, numbers, source.found)
 
 
 def _torque_constant_n_m_a(model: str) -> float:

@@ -10,6 +10,7 @@ from config.run import RunConfig
 from config.world import WorldConfig
 from controller.app.prepare import Prepared
 from controller.app.prepare_gait import PreparedGait
+from controller.app.prepare_playback import PreparedPlayback
 from controller.runtime.guide import Guide
 from drivers.telemetry.record import Laid, PlanSummary
 
@@ -67,6 +68,8 @@ def job_of(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Job:
     """Make a job again of what a log says."""
     if run.motion == "gait":
         return PreparedGait(run, robot, world)
+    if run.motion == "playback":
+        return PreparedPlayback(run, robot, world)
     if run.motion == "repertoire":
         raise InputError(f"run {run.name}: made again by: snakewalk repertoire run PLAN")
     if not run.waypoints_m:

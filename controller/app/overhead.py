@@ -13,7 +13,6 @@ from config.run import RunConfig
 from config.world import FlatGround, WorldConfig
 from controller.capture.overhead import CameraModel, OverheadEye, Sighting
 from controller.capture.verdict import Verdict
-from controller.runtime.camera_pose import Camera
 from drivers.clock import Clock
 
 Floats = NDArray[np.float64]
@@ -81,7 +80,7 @@ def seen_whole(sighting: Sighting, camera: str) -> Sighting:
 
 
 class RenderedCamera:
-    """The simulated robot from above, frame after frame; each arrives one period after it was taken.
+    """The simulated robot from above; each frame arrives one period after it was taken.
 
     A frame is taken at the first read of the joints at or after its time, and dated with that read.
 
@@ -103,7 +102,9 @@ class RenderedCamera:
         centre_m = centre_of(run)
         self._view = TopView(robot, world, run.camera, centre_m, run.seed)
         model = CameraModel.straight_down(run.camera, centre_m)
-        self.eye = OverheadEye(model, self._view.empty_floor(), robot.body_radius_m)
+        self.eye = OverheadEye(
+            model, self._view.empty_floor(), robot.body_radius_m, run.camera.shade
+        )
         self._qpos, self._clock = qpos, clock
         self._period_s = 1.0 / run.camera.rate_hz
         self._next_s = clock.now_s()

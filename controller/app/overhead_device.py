@@ -42,11 +42,14 @@ class DeviceCamera:
         self._name = f"camera {camera.device}"
         self._device = open_device(camera)
         self._found: queue.SimpleQueue[Sighting | InputError] = queue.SimpleQueue()
+        self._gone: InputError | None = None
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="overhead camera", daemon=True)
         self._thread.start()
         try:
-            seen_whole(self.first(), self._name)
+            self.start = self.first()
+            """What the camera saw first."""
+            seen_whole(self.start, self._name)
         except InputError:
             self.close()
             raise
@@ -59,11 +62,14 @@ class DeviceCamera:
 
         """
         self.seen(self._clock.now_s())
+        if self._gone is not None:
+            raise self._gone
         try:
             found = self._found.get(timeout=PATIENCE_S)
         except queue.Empty:
             raise InputError(f"{self._name}: no frame came in {PATIENCE_S:g} s") from None
         if isinstance(found, InputError):
+            self._gone = found
             raise found
         return found
 
@@ -72,7 +78,9 @@ class DeviceCamera:
         found: list[Sighting] = []
         while not self._found.empty():
             one = self._found.get_nowait()
-            if isinstance(one, Sighting) and one.time_s <= now_s:
+            if isinstance(one, InputError):
+                self._gone = one
+            elif one.time_s <= now_s:
                 found.append(one)
         return found
 
@@ -112,7 +120,7 @@ def eye_of(run: RunConfig, robot: RobotConfig) -> OverheadEye:
     centre_m = centre_of(run)
     corners = camera.corners_px is not None
     make = CameraModel.from_corners if corners else CameraModel.straight_down
-    return OverheadEye(make(camera, centre_m), ground, robot.body_radius_m)
+    return OverheadEye(make(camera, centre_m), ground, robot.body_radius_m, camera.shade)
 
 
 def open_device(camera: CameraConfig) -> cv2.VideoCapture:

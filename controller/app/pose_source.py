@@ -31,15 +31,27 @@ class Truth:
     waypoints_reached: int
     """By the body's true centre, in order."""
 
-    def __str__(self) -> str:
+    @property
+    def numbers(self) -> dict[str, object]:
+        """For the log and the result."""
         if not self.head_m.size:
-            return "no pose was asked for"
-        rms_mm, worst_mm = 1e3 * _rms(self.head_m), 1e3 * self.head_m.max()
-        return (
-            f"against the simulator's truth: head {rms_mm:.0f} mm rms, {worst_mm:.0f} mm at most; "
-            f"heading {_rms(self.heading_rad):.3f} rad rms, {self.heading_rad.max():.3f} rad at "
-            f"most; {self.waypoints_reached} waypoints reached"
-        )
+            return {}
+        return {
+            "head_error_rms_m": round(_rms(self.head_m), 4),
+            "head_error_max_m": round(float(self.head_m.max()), 4),
+            "heading_error_rms_rad": round(_rms(self.heading_rad), 4),
+            "heading_error_max_rad": round(float(self.heading_rad.max()), 4),
+            "waypoints_truly_reached": self.waypoints_reached,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What a run asks for its pose."""
+
+    ask: PoseSource
+    found: dict[str, object]
+    """For the result, filled when the source is left: frames, and errors where truth is known."""
 
 
 @dataclass
@@ -75,7 +87,7 @@ class Watched:
 @contextmanager
 def pose_source(
     prepared: Job, backend: Backend, note: Callable[[str, str], None]
-) -> Iterator[PoseSource]:
+) -> Iterator[Source]:
     """Make the source that the run asks for; ``note`` is told (kind, text) at its end.
 
     Raises:
@@ -86,23 +98,26 @@ def pose_source(
     true = backend.pose
     if true is not None and run.pose in (None, "simulator"):
         measured = true
-        yield lambda state: measured()
+        yield Source(lambda state: measured(), {})
         return
     reckoning = DeadReckoning(
         robot, prepared.world.friction, run.start_m, prepared.start_heading_rad
     )
+    found: dict[str, object] = {}
     with ExitStack() as stack:
         believed: PoseSource = reckoning
         if run.pose == "camera":
             camera = stack.enter_context(closing(_camera(prepared, backend)))
-            seen = CameraPose(robot, camera, reckoning, lambda text: note("camera", text))
-            stack.callback(lambda: note("camera", f"{seen.used} of {seen.frames} frames used"))
-            believed = seen
+            believed = seen = CameraPose(
+                robot, camera, reckoning, lambda text: note("camera", text)
+            )
+            stack.callback(lambda: found.update(frames=seen.frames, frames_used=seen.used))
         if true is not None:
-            watched = Watched(prepared, believed, true)
-            stack.callback(lambda: note("pose", str(watched.truth)))
-            believed = watched
-        yield believed
+            believed = watched = Watched(prepared, believed, true)
+            stack.callback(lambda: found.update(watched.truth.numbers))
+        yield Source(believed, found)
+    if found:
+        note("pose", ", ".join(f"{key} {value}" for key, value in found.items()))
 
 
 def _camera(prepared: Job, backend: Backend) -> RenderedCamera | DeviceCamera:

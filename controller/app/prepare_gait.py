@@ -1,14 +1,14 @@
 """From a gait's name and parameters to a job: robot with stiff pitch joints, gait, start."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from config.errors import InputError
-from config.gait import GaitConfig
+from config.gait import GaitConfig, GaitSetConfig
 from config.ground import build_ground
 from config.heightfield import HeightField
 from config.loader import checked, load_gait, load_robot, load_world, shipped
@@ -17,7 +17,9 @@ from config.run import RunConfig
 from config.world import WorldConfig
 from controller.gaits.gait import Gait
 from controller.gaits.registry import GAITS, make_gait
+from controller.motion.cpg_motion import CpgMotion
 from controller.motion.gait_motion import Cycle, GaitMotion
+from controller.motion.gait_sequence import GaitSequence
 from controller.motion.head_steering import HeadSteering, Look
 from controller.motion.source import MotionSource
 from controller.runtime.forecast import mean_heading_rad
@@ -55,6 +57,11 @@ class PreparedGait:
         return make_gait(self.config.name, self.config.parameters, f"gait {self.config.name}")
 
     @cached_property
+    def later(self) -> list[tuple[float, Gait]]:
+        """What it changes to, and when."""
+        return [(c.at_s, make_gait(c.name, c.parameters)) for c in self.config.then]
+
+    @cached_property
     def ground(self) -> HeightField | None:
         """The world's height field; None on a flat floor."""
         return build_ground(self.world)
@@ -71,7 +78,8 @@ class PreparedGait:
 
     def judged(self) -> PlanSummary:
         """A gait is checked against the joints' range; its speed is kept within limits live."""
-        self.gait.check(self.robot)
+        for gait in (self.gait, *(gait for _, gait in self.later)):
+            gait.check(self.robot)
         start = np.array([self.run.start_m, self.run.start_m], dtype=float)
         return PlanSummary(start, np.zeros((0, 2)), self.run.waypoint_radius_m)
 
@@ -81,7 +89,14 @@ class PreparedGait:
         asked_hz = self.gait.params.frequency_hz
         if gait.frequency_hz < asked_hz - 1e-9:
             say("limit", f"{asked_hz:g} Hz is too fast for the joints: {gait.frequency_hz:.2f} Hz")
-        source: MotionSource = gait if self.live is None else self.live(gait, self.robot, say)
+        source: MotionSource = gait
+        if self.live is not None:
+            source = self.live(gait, self.robot, say)
+        elif self.config.by == "cpg":
+            source = CpgMotion(self.robot, Cycle(self.gait, self.robot).goal_rad())
+            source.schedule([(0.0, self.gait), *self.later, (self.config.duration_s, None)])
+        elif self.later:
+            source = GaitSequence(gait, self.later)
         look = Look(self.config.look_heading_rad, self.config.look_at_m)
         if look == Look():
             return source
@@ -103,27 +118,29 @@ def prepare_gait(
     look_heading_rad: float | None = None,
     look_at_m: tuple[float, float] | None = None,
     live: Live | None = None,
+    then: Sequence[tuple[float, str, dict[str, Any]]] = (),
+    by: Literal["blend", "cpg"] = "blend",
 ) -> PreparedGait:
     """Prepare a gait, or a shipped or own set of parameters (``config/gaits``), by name.
 
+    ``then`` holds (time, name, parameters) of what it changes to, ``by`` how.
+
     Raises:
-        InputError: no such gait, parameters out of range, a robot that lacks joints.
+        InputError: no such gait, parameters out of range, a robot that lacks joints, changes out of
+            order or together with an operator.
 
     """
-    values: dict[str, Any] = {}
-    gait_name = name
-    if name not in GAITS:
-        if name not in shipped("gaits") and not name.endswith(".toml"):
-            raise InputError(
-                f"{name}: no such gait; there are {', '.join(GAITS)}; "
-                f"sets of parameters: {', '.join(shipped('gaits'))}; your own ends in .toml"
-            )
-        known = load_gait(name)
-        gait_name, values = known.gait, dict(known.parameters)
+    if live is not None and (then or by == "cpg"):
+        raise InputError("--live changes gaits by keys and joins: leave out --then and --by cpg")
+    gait, known = _named(name, parameters)
+    if known is not None:
         robot, world = robot or known.robot, world or known.world
-    gait = make_gait(gait_name, values | (parameters or {}))
-    body = load_robot(robot or ("alternating16" if gait.needs.pitch else "yaw16"))
-    gait.check(body)
+    later = [(at_s, _named(other, values)[0]) for at_s, other, values in then]
+    all_gaits = [gait, *(other for _, other in later)]
+    pitch = any(each.needs.pitch for each in all_gaits)
+    body = load_robot(robot or ("alternating16" if pitch else "yaw16"))
+    for each in all_gaits:
+        each.check(body)
     run = checked(
         RunConfig,
         {
@@ -132,28 +149,47 @@ def prepare_gait(
             "world": world or gait.world,
             "motion": "gait",
             "seed": seed,
-            "time_limit_s": seconds + 30.0,
+            "time_limit_s": seconds + (60.0 if by == "cpg" else 30.0),
             "gait": {
-                "name": gait_name,
+                "name": gait.name,
                 "parameters": gait.params.model_dump(),
                 "duration_s": seconds,
                 "look_heading_rad": look_heading_rad,
                 "look_at_m": look_at_m,
+                "then": [
+                    {"at_s": at_s, "name": g.name, "parameters": g.params.model_dump()}
+                    for at_s, g in later
+                ],
+                "by": by,
             },
         },
         "command line",
     )
     wire_budget(body.joint_count, body.servo.baud, fast=True, slow_read_bytes=7).check(run.cycle_hz)
-    return PreparedGait(run, _tuned(body, gait), load_world(run.world), live)
+    return PreparedGait(run, _tuned(body, all_gaits), load_world(run.world), live)
 
 
-def _tuned(robot: RobotConfig, gait: Gait) -> RobotConfig:
-    """Set servos up for the gait: pitch joints that carry links, all of them softer if asked."""
+def _named(name: str, parameters: dict[str, Any] | None) -> tuple[Gait, GaitSetConfig | None]:
+    """Make a gait by its name or that of a set of parameters, and return the set."""
+    if name in GAITS:
+        return make_gait(name, parameters), None
+    if name not in shipped("gaits") and not name.endswith(".toml"):
+        raise InputError(
+            f"{name}: no such gait; there are {', '.join(GAITS)}; "
+            f"sets of parameters: {', '.join(shipped('gaits'))}; your own ends in .toml"
+        )
+    known = load_gait(name)
+    return make_gait(known.gait, dict(known.parameters) | (parameters or {})), known
+
+
+def _tuned(robot: RobotConfig, gaits: Sequence[Gait]) -> RobotConfig:
+    """Set servos up for the gaits: pitch joints that carry links, all of them softer if asked."""
     servo = robot.servo
     changes: dict[str, float] = {}
-    if gait.needs.pitch:
+    if any(gait.needs.pitch for gait in gaits):
         changes["pitch_p_gain"] = max(servo.pitch_p_gain, servo.position_p_gain)
         changes["pitch_current_limit_a"] = max(servo.pitch_current_limit_a, GAIT_PITCH_CURRENT_A)
-    if gait.p_gain is not None:
-        changes["position_p_gain"] = changes["pitch_p_gain"] = gait.p_gain
+    soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
+    if soft:
+        changes["position_p_gain"] = changes["pitch_p_gain"] = min(soft)
     return robot.model_copy(update={"servo": servo.model_copy(update=changes)})

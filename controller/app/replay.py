@@ -108,8 +108,8 @@ def differences(
     """Compare a run with its replay; joints and, where it was measured, the head decide.
 
     Velocities and currents are told but not held against the replay, and neither is the head of a
-    run whose pose was reckoned from the joints or seen by a camera. Angles that the original failed to read are left
-    out.
+    run whose pose was reckoned from the joints or seen by a camera. Angles that the original failed
+    to read are left out.
     """
     valid = original.cycle.valid
     header = original.header

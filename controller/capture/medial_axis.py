@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from skimage.morphology import skeletonize
 
 from controller.capture.equipartition import NoEquipartitionError, equipartition
+from controller.capture.faint import THIN_PX, fitted
 from controller.capture.ridge import WORKING_WIDTH, sample, to_the_tips
 from controller.capture.thinning import filled, largest, longest_way
 from controller.capture.verdict import Verdict
@@ -23,6 +24,7 @@ _MARGIN = 3
 _LARGEST_PX = 8000  # side of the enlarged cut-out
 _HOLE = 0.35  # a larger hole, in squares of the width, is a loop of the body
 _THIN_TIP = 0.2  # of the contrast, where a body two pixels wide ends: blur takes its tips away
+_UNSURE_PX = 4.5  # a thinner body's line is used only where its blurred picture fits
 _BRANCH = 0.14  # of the length: a longer side branch is a part of the body
 
 
@@ -66,7 +68,10 @@ def skeleton_of(mask: NDArray[np.bool_]) -> Skeleton:
     body = shape[top : rows[-1] + 1, left : columns[-1] + 1]
     level = cv2.copyMakeBorder(body, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=0)
     return skeleton_of_level(
-        level.astype(np.float32), 0.5, (float(left - _MARGIN), float(top - _MARGIN))
+        level.astype(np.float32),
+        0.5,
+        (float(left - _MARGIN), float(top - _MARGIN)),
+        grey=False,
     )
 
 
@@ -75,6 +80,8 @@ def skeleton_of_level(
     threshold: float,
     origin_px: tuple[float, float] = (0.0, 0.0),
     least: float = 0.0,
+    *,
+    grey: bool = True,
 ) -> Skeleton:
     """Skeleton of the largest part of ``level`` (h, w) above ``threshold``: finer than of a mask.
 
@@ -83,6 +90,7 @@ def skeleton_of_level(
         threshold: the contrast at the body's boundary.
         origin_px: x, y of the cut-out's first pixel in the image.
         least: contrast that noise alone reaches; tips are not looked for below it.
+        grey: whether ``level`` falls off at the boundary as blur makes it; a mask does not.
 
     """
     width = _width(level > threshold)
@@ -109,6 +117,12 @@ def skeleton_of_level(
     line = to_the_tips(curve, fine, threshold, depth, min(threshold, max(tip, least)))
     if line is None:
         return no_skeleton(Verdict.BLOB)
+    if width < THIN_PX and grey:
+        found = fitted((line - _MARGIN + 0.5) / step - 0.5, level, width)
+        if found is None and width < _UNSURE_PX:
+            return no_skeleton(Verdict.BLOB)
+        if found is not None:
+            line = (found[0] + 0.5) * step - 0.5 + _MARGIN
     try:
         even = equipartition(line, SEGMENTS)
     except (NoEquipartitionError, ValueError):

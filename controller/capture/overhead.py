@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from config.camera import CameraConfig
 from config.errors import InputError
-from controller.capture.eye import Eye
+from controller.capture.eye import Eye, Seen
 from controller.capture.silhouette import Look
 from controller.capture.verdict import Verdict
 
@@ -75,7 +75,8 @@ class CameraModel:
     def in_image(self, points_m: Floats, z_m: float) -> Floats:
         """(..., 2) pixels of world places (..., 2) that are ``z_m`` above the floor."""
         floor = self.foot_m + (points_m - self.foot_m) / (1.0 - z_m / self.height_m)
-        return _projected(np.linalg.inv(self.floor_from_px), floor)
+        back = np.asarray(np.linalg.inv(self.floor_from_px), dtype=float)
+        return _projected(back, floor)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +98,8 @@ class OverheadEye:
     model: CameraModel
     background: Image
     axis_height_m: float
+    shade: float = 0.0
+    """Part of the floor's light that the body's shadow may take: so much darker is still floor."""
 
     def see(self, image: Image, time_s: float) -> Sighting:
         """Find the body in one frame (H, W[, 3]).
@@ -105,9 +108,25 @@ class OverheadEye:
             InputError: the frame is not as large as the background.
 
         """
-        seen = Eye(self.background, Look.BOTH, "given").see(image).skeleton
+        seen = self.look(image).skeleton
         line = self.model.on_plane(seen.points_px, self.axis_height_m)
         return Sighting(time_s, line, seen.verdict)
+
+    def look(self, image: Image) -> Seen:
+        """Silhouette and skeleton of a frame, in pixels.
+
+        Raises:
+            InputError: the frame is not as large as the background.
+
+        """
+        floor = self.background
+        if image.shape != floor.shape:
+            sizes = " and ".join(f"{one.shape[1]} x {one.shape[0]}" for one in (image, floor))
+            raise InputError(f"frame and background must be alike, they are {sizes} pixels")
+        dark = cv2.convertScaleAbs(floor, alpha=1.0 - self.shade)
+        brighter, darker = cv2.subtract(image, floor), cv2.subtract(dark, image)
+        apart: Image = np.asarray(cv2.max(brighter, darker), dtype=np.uint8)
+        return Eye(np.zeros_like(apart), Look.BOTH, "given").see(apart)
 
 
 def _projected(matrix: Floats, points: Floats) -> Floats:

@@ -55,8 +55,8 @@ def contrast(image: Image, background: Image, look: Look) -> Image:
     else:
         apart = cv2.subtract(image, background)
     if apart.ndim == 3:
-        one, two, three = cv2.split(apart)
-        apart = cv2.max(cv2.max(one, two), three)
+        one, two, three = (cv2.extractChannel(apart, k) for k in range(3))
+        apart = cv2.max(cv2.max(one, two, dst=one), three, dst=one)
     return np.asarray(apart)
 
 
@@ -102,10 +102,19 @@ def nothing() -> Silhouette:
 
 
 def _parts(mask: Image) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
-    count, label, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    """Labels and statistics of the parts, looked for only where there is anything."""
+    left, top, wide, high = cv2.boundingRect(mask)
+    if wide * high < _LEAST_PX:
+        return None
+    window = (slice(top, top + high), slice(left, left + wide))
+    count, inner, stats, _ = cv2.connectedComponentsWithStats(mask[window], connectivity=8)
     if count < 2 or stats[1:, cv2.CC_STAT_AREA].max() < _LEAST_PX:
         return None
-    return np.asarray(label, dtype=np.int32), np.asarray(stats, dtype=np.int32)
+    label = np.zeros(mask.shape, dtype=np.int32)
+    label[window] = inner
+    stats[:, cv2.CC_STAT_LEFT] += left
+    stats[:, cv2.CC_STAT_TOP] += top
+    return label, np.asarray(stats, dtype=np.int32)
 
 
 def _cut_out(apart: Image, threshold: float, sure: float) -> Silhouette:

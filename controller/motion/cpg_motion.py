@@ -1,6 +1,8 @@
 """The pattern generator as a motion: it changes gait within the robot's limits, without a jump."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +33,20 @@ MOST_SAMPLES = 600
 DONE_RAD, DONE_RAD_S = 0.01, 0.02
 
 
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A change that has been computed: nothing is left to do but to begin it."""
+
+    at_s: float
+    """On the motion's own time."""
+    parts: tuple[Part, ...]
+    needs: Needs
+    settled: Pace
+    """Of what it leads to."""
+    under_way: Pace
+    stops: bool
+
+
 class CpgMotion:
     """Oscillators at rest at a pose, that take up gaits one after the other and can stop."""
 
@@ -43,13 +59,14 @@ class CpgMotion:
         self._stopping = True
         self._change = Pace.still(robot.joint_count)
         self._settled = self._change
-        self._left_s = self._part_s = 0.0
-        self._next: list[Part] = []
+        self._now_s = self._left_s = self._part_s = 0.0
+        self._next: tuple[Part, ...] = ()
+        self._due: tuple[Change, ...] = ()
 
     @property
     def done(self) -> bool:
         """Whether it has been stopped and lies still."""
-        if not self._stopping:
+        if not self._stopping or self._due:
             return False
         far = np.abs(self.goal_rad() - self.cpg.pattern.offset_rad).max()
         return bool(far < DONE_RAD and np.abs(self.velocity_rad_s()).max() < DONE_RAD_S)
@@ -61,18 +78,54 @@ class CpgMotion:
             InputError: joints are missing, or do not bend so far; nothing changes then.
 
         """
-        cycle = Cycle(gait, self.robot)
-        taken_s = self._go(Pattern.of(gait, self.robot, cycle.rate_rad_s), cycle.pace())
-        self.needs, self._stopping = gait.needs, False
-        return taken_s
+        return self._begin(self._plan(gait))
 
     def stop(self) -> float:
         """Come to rest at the middle of each joint's swing; returns how long it takes, s."""
-        resting = Pattern.rest(self.cpg.pattern.offset_rad)
-        self._stopping = True
-        return self._go(resting, Pace.still(self.robot.joint_count))
+        return self._begin(self._plan(None))
 
-    def _go(self, pattern: Pattern, settled: Pace) -> float:
+    def schedule(self, changes: Sequence[tuple[float, Gait | None]]) -> float:
+        """Take up gaits, or rest for None, at rising times from now; returns when the last is over.
+
+        All is computed here: the course of the oscillators on the motion's own time is known ahead,
+        so that nothing is left to choose while the motion runs. ``become`` and ``stop`` after this
+        put the rest of the schedule off.
+
+        Raises:
+            InputError: joints are missing, or do not bend so far; nothing changes then.
+
+        """
+        twin, planned, begin_s = copy(self), [], self._now_s
+        twin.cpg = copy(self.cpg)
+        over_s = 0.0
+        for after_s, gait in changes:
+            twin._advance(begin_s + after_s - twin._now_s)
+            planned.append(twin._plan(gait))
+            over_s = after_s + twin._begin(planned[-1])
+        self._due = tuple(planned)
+        return over_s
+
+    def _plan(self, gait: Gait | None) -> Change:
+        """Plan a change from how the oscillators go now."""
+        if gait is None:
+            resting = Pattern.rest(self.cpg.pattern.offset_rad)
+            return self._choose(resting, Pace.still(self.robot.joint_count), self.needs, stops=True)
+        cycle = Cycle(gait, self.robot)
+        pattern = Pattern.of(gait, self.robot, cycle.rate_rad_s)
+        return self._choose(pattern, cycle.pace(), gait.needs, stops=False)
+
+    def _begin(self, change: Change) -> float:
+        """Begin a change; returns how long it takes, s."""
+        self._due = ()
+        self.cpg.become(*change.parts[0])
+        self._next = change.parts[1:]
+        self.needs, self._stopping = change.needs, change.stops
+        self._settled, self._change = change.settled, change.under_way
+        self._part_s = self._time_s(change.parts[0])
+        self._left_s = sum(map(self._time_s, change.parts))
+        return self._left_s
+
+    def _choose(self, pattern: Pattern, settled: Pace, needs: Needs, *, stops: bool) -> Change:
         """Choose the fastest change that stays within the limits: each is known in closed form.
 
         Where a wide slow gait becomes a narrow fast one, or back, amplitude times frequency would
@@ -93,12 +146,7 @@ class CpgMotion:
             if excess <= 1.0 + TOLERANCE:
                 break
         self.cpg.restore(start)
-        self.cpg.become(*best[0])
-        self._next = best[1:]
-        self._settled, self._change = settled, change
-        self._part_s = self._time_s(best[0])
-        self._left_s = sum(map(self._time_s, best))
-        return self._left_s
+        return Change(self._now_s, tuple(best), needs, settled, change, stops)
 
     @staticmethod
     def _time_s(part: Part) -> float:
@@ -140,9 +188,27 @@ class CpgMotion:
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""
+        return self._advance(dt_s)
+
+    def _advance(self, dt_s: float) -> Floats:
+        """Go on; what begins on the way begins at its own time, however the time is cut up."""
+        end_s = self._now_s + dt_s
+        while True:
+            due_s = self._due[0].at_s if self._due else np.inf
+            part_s = self._now_s + self._part_s if self._next else np.inf
+            if min(due_s, part_s) > end_s:
+                return self._turn(end_s - self._now_s)
+            self._turn(max(min(due_s, part_s) - self._now_s, 0.0))
+            if due_s <= part_s:
+                change, *later = self._due
+                self._begin(change)
+                self._due = tuple(later)
+            else:
+                self.cpg.become(*self._next[0])
+                self._part_s, self._next = self._time_s(self._next[0]), self._next[1:]
+
+    def _turn(self, dt_s: float) -> Floats:
+        self._now_s += dt_s
         self._left_s -= dt_s
         self._part_s -= dt_s
-        if self._part_s <= 0.0 and self._next:
-            self.cpg.become(*self._next[0])
-            self._part_s, self._next = self._time_s(self._next[0]), self._next[1:]
         return self.cpg.step(dt_s)

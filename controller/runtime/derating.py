@@ -45,9 +45,6 @@ class Allowed:
 PLENTY = Allowed(1.0, "")
 
 
-_FULL = Allowed(1.0, "")
-
-
 def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allowed:
     """Judge a state; temperatures and voltages that were not read yet (NaN) limit nothing.
 
@@ -69,16 +66,6 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
         and np.fmin.reduce(volts) >= least_v + VOLTAGE_BAND_V
     ):
         return PLENTY
-    # All is well in nearly every cycle: find that out at a tenth of the cost
-    if not any(
-        np.count_nonzero(bad)
-        for bad in (
-            heat > limit_c - HEAT_BAND_C,
-            amps > CURRENT_START * limit_a,
-            volts < least_v + VOLTAGE_BAND_V,
-        )
-    ):
-        return _FULL
     judged = (
         (_falling(heat, limit_c - HEAT_BAND_C, limit_c - HEAT_EDGE_C), heat, "{:.0f} C", limit_c),
         (

@@ -1,5 +1,7 @@
 """Whether a body touches itself: a thick curve against its own other parts."""
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +22,7 @@ def self_touches(skeleton_rad: Floats, length_m: float, radius_m: float) -> Bool
     points = shapes.shape[1]
     piece = length_m / points
     lag = max(2, int(np.ceil(np.pi * radius_m / piece)) + 1)  # segment ends are then pi r apart
-    i, j = np.triu_indices(points, lag)
+    i, j = _pairs(points, lag)
     if len(i) == 0:
         return np.zeros(len(shapes), dtype=bool)
     touches = np.zeros(len(shapes), dtype=bool)
@@ -39,6 +41,15 @@ def self_touches(skeleton_rad: Floats, length_m: float, radius_m: float) -> Bool
             near |= _distance(point, start, stop) < 2.0 * radius_m
         touches[first + body[near]] = True
     return touches
+
+
+@cache
+def _pairs(points: int, lag: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pairs of segments at least ``lag`` apart, first and second; asked anew in every decision."""
+    first, second = np.triu_indices(points, lag)
+    first.setflags(write=False)
+    second.setflags(write=False)
+    return first, second
 
 
 def _distance(point: Floats, start: Floats, stop: Floats) -> Floats:

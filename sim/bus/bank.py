@@ -35,7 +35,8 @@ TABLE_BYTES = 1024
 class ServoBank:
     """S servos of one model, factory new but for ID and baud rate.
 
-    ``clashing`` allows two servos to share an ID, as an unlucky chain does.
+    ``clashing`` allows two servos to share an ID, as an unlucky chain does. ``table`` is (S, bytes)
+    of a greater array that they are a part of (``sim.bus.mixed``).
 
     Raises:
         ControlTableError: the model cannot be simulated, an ID is out of range or used twice, or
@@ -50,6 +51,7 @@ class ServoBank:
         baud: int = 1_000_000,
         *,
         clashing: bool = False,
+        table: NDArray[np.uint8] | None = None,
     ) -> None:
         self.ids = tuple(ids)
         self.layout, self._registers, self._rules = registers_of(model.upper().replace("_", "-"))
@@ -62,7 +64,7 @@ class ServoBank:
             faults.append(f"{baud} baud: {self.model} has {', '.join(map(str, known))}")
         if faults:
             raise ControlTableError(faults)
-        self.table = np.zeros((len(self.ids), TABLE_BYTES), np.uint8)
+        self.table = table if table is not None else np.zeros((len(ids), TABLE_BYTES), np.uint8)
         self._views = {name: self._view(name) for name in self._rules}
         self._spans = {
             register.address: (register, self._rules[name])

@@ -56,11 +56,16 @@ class Line:
 
 
 class Decoder:
-    """Bytes of a bus in, lines out; ``model`` is taken for servos that no ping has told about."""
+    """Bytes of a bus in, lines out; ``model`` is taken for servos that no ping has told about.
 
-    def __init__(self, model: str = "XM430-W350") -> None:
+    ``models`` are those that are known beforehand, by ID.
+    """
+
+    def __init__(self, model: str = "XM430-W350", models: Mapping[int, str] | None = None) -> None:
         self._usual = load_control_table(model)
-        self._tables: dict[int, ControlTable] = {}
+        self._tables: dict[int, ControlTable] = {
+            servo_id: load_control_table(each) for servo_id, each in (models or {}).items()
+        }
         self._reader = PacketReader()
         self._asked: dict[int, Span] = {}
         self._fast: list[tuple[int, Span]] = []

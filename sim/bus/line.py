@@ -48,7 +48,7 @@ class SimLine(Wire):
         usb_latency_s: float = 0.0,
     ) -> None:
         super().__init__(clock if clock is not None else SimClock(plant.time_s), usb_latency_s)
-        self.firmware = Firmware(bank, plant, surroundings)
+        self.firmware = self._firmware(bank, plant, surroundings)
         self.bank = bank
         self.tamper = tamper
         self._script: Script | None = None
@@ -69,6 +69,11 @@ class SimLine(Wire):
     def look_again(self) -> None:
         """Take note that IDs, power or voices have changed by other means than a packet."""
         self._service.retune()
+
+    def _firmware(
+        self, bank: ServoBank, plant: Plant, surroundings: Surroundings | None
+    ) -> Firmware:
+        return Firmware(bank, plant, surroundings)
 
     def _advance(self, until_s: float) -> None:
         self.firmware.advance(until_s)

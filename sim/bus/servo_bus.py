@@ -6,14 +6,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from config.errors import InputError
 from config.faults import FaultPlan
 from config.loader import load
 from drivers.clock import WallClock
-from sim.bus.bank import ServoBank
-from sim.bus.bench import BenchPlant
+from sim.bus.bench_line import bench_line
 from sim.bus.chain_spec import parse_chain
 from sim.bus.fault_player import FaultPlayer
-from sim.bus.gearbox import GEARBOXES
 from sim.bus.line import SimLine
 from sim.bus.pty import PtyServer
 
@@ -29,10 +28,10 @@ class ServoBus:
         faults: str | Path | FaultPlan | None = None,
         start_rad: float = 0.0,
     ) -> None:
-        spec = parse_chain(servos)
-        bank = ServoBank(spec.ids, spec.model, baud)
-        gear = GEARBOXES.get(bank.model)
-        self.line = SimLine(bank, BenchPlant(len(bank), gear=gear, start_rad=start_rad), baud=baud)
+        line = bench_line(parse_chain(servos), baud, start_rad)
+        if not isinstance(line, SimLine):
+            raise InputError(f"{servos}: registers by name are for servos of Protocol 2.0")
+        self.line = line
         """The bus as a port in simulated time."""
         if faults is not None:
             plan = faults if isinstance(faults, FaultPlan) else load(Path(faults), FaultPlan)

@@ -6,8 +6,10 @@ from collections.abc import Callable
 import numpy as np
 
 from sim.bus.ax12 import CELLS, Ax12Servos
+from sim.bus.bank import ServoBank
 from sim.bus.decode import Decoder, Line
 from sim.bus.line import SimLine
+from sim.bus.mixed_bank import MixedBank
 
 Rows = list[dict[str, object]]
 SHOWN = 8
@@ -37,8 +39,18 @@ class Traffic:
 
 def look_at(line: SimLine) -> Rows:
     """One row a servo of Protocol 2.0: what it is, where it is, how it fares."""
-    bank, firmware = line.bank, line.firmware
-    firmware.refresh()
+    line.firmware.refresh()
+    if not isinstance(line.bank, MixedBank):
+        rows = _look_at(line.bank)
+    else:
+        rows = [row for part in line.bank.parts for row in _look_at(part)]
+        for row in rows:  # a table has the same columns for all
+            row["current"], row["load"] = row.pop("current", "-"), row.pop("load", "-")
+    powered = line.firmware.powered
+    return [row | {"power": bool(on)} for row, on in zip(rows, powered, strict=True)]
+
+
+def _look_at(bank: ServoBank) -> Rows:
     drawn = "Present Current" if bank.measures_current else "Present Load"
     names = {
         "id": "ID",
@@ -57,7 +69,6 @@ def look_at(line: SimLine) -> Rows:
     for row in range(len(bank)):
         shown: dict[str, object] = {key: int(values[row]) for key, values in columns.items()}
         shown["volts"] = columns["volts"][row] / 10.0
-        shown["power"] = bool(firmware.powered[row])
         rows.append(shown)
     return rows
 

@@ -91,4 +91,4 @@ class TopView:
         field = self._noise[self._chance.integers(_FIELDS)]
         down, right = (int(self._chance.integers(side)) for side in field.shape[:2])
         grey = self._screen.draw(self._scene) + np.roll(field, (down, right), axis=(0, 1))
-        return np.clip(grey, 0, 255).astype(np.uint8)
+        return np.asarray(np.clip(grey, 0, 255), dtype=np.uint8)

@@ -129,3 +129,27 @@ def test_dynamixel_controller(servo_bus: Make, monkeypatch: pytest.MonkeyPatch) 
     motor.set_position(2200)
     assert settled(lambda: abs(motor.get_position() - 2200) < 15)
     assert bus["Torque Enable"].tolist() == [0, 1]
+
+
+def test_lerobots_bus_with_two_models(servo_bus: Make, lerobot_motors: ModuleType) -> None:
+    """An arm of two XL430-W250 and four XL330-M288, as the Koch arm."""
+    base = importlib.import_module("lerobot.motors")
+    bus = servo_bus("1-2:XL430-W250,3-6:XL330-M288")
+    motors = {
+        f"m{k}": base.Motor(k, "xl430-w250" if k <= 2 else "xl330-m288", base.MotorNormMode.DEGREES)
+        for k in range(1, 7)
+    }
+    arm = lerobot_motors.DynamixelMotorsBus(port=bus.path, motors=motors)
+    arm.connect()  # compares the model numbers of all
+    try:
+        arm.enable_torque()
+        arm.sync_write("Goal_Position", dict.fromkeys(motors, 2300), normalize=False)
+        assert settled(
+            lambda: all(
+                abs(seen - 2300) < 60
+                for seen in arm.sync_read("Present_Position", normalize=False).values()
+            )
+        )
+    finally:
+        arm.disconnect()
+    assert not bus["Torque Enable"].any()

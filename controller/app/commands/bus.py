@@ -29,7 +29,8 @@ WIDTH = 120
 
 def serve(
     servos: Annotated[
-        str | None, typer.Option(help="IDS[:MODEL] on a bench: 1-16, or 1,2,5-8:XL330-M288")
+        str | None,
+        typer.Option(help="IDS[:MODEL],... on a bench: 1-16, or 1-2:XL430-W250,3-6:XL330-M288"),
     ] = None,
     robot: Annotated[
         str | None, typer.Option(help="shipped robot or a TOML file, in MuJoCo on flat ground")
@@ -118,47 +119,29 @@ def _simulated(
     """What is served, its line, and who looks at it."""
     from config.faults import FaultPlan  # noqa: PLC0415
     from config.loader import load  # noqa: PLC0415
-    from sim.bus.ax12 import MODEL  # noqa: PLC0415
+    from sim.bus.ax12_line import Ax12Line  # noqa: PLC0415
+    from sim.bus.bench_line import bench_line  # noqa: PLC0415
     from sim.bus.chain_spec import ChainSpec, parse_chain  # noqa: PLC0415
     from sim.bus.decode import Decoder  # noqa: PLC0415
     from sim.bus.fault_player import FaultPlayer  # noqa: PLC0415
-    from sim.bus.traffic import Traffic, look_at  # noqa: PLC0415
+    from sim.bus.traffic import Traffic, look_at, look_at_ax12  # noqa: PLC0415
 
     spec = parse_chain(servos or "1-4")
-    if robot is None and spec.model == MODEL:
+    if robot is None:
+        line = bench_line(spec, baud or 1_000_000)
+    else:
+        line = _robot_line(robot, baud)
+        spec = ChainSpec(line.bank.ids, (line.bank.model,) * len(line.bank))
+    if isinstance(line, Ax12Line):
         if faults is not None:
-            raise InputError(f"{faults}: fault files are for servos of Protocol 2.0, not {MODEL}")
-        return _ax12(spec, baud)
-    line = _robot_line(robot, baud) if robot is not None else _bench_line(spec, baud)
+            raise InputError(
+                f"{faults}: fault files are for servos of Protocol 2.0, not {spec.model}"
+            )
+        return spec, line, Traffic(lambda: look_at_ax12(line.servos), None)
     if faults is not None:
         FaultPlayer(line, load(faults, FaultPlan), str(faults))
-    what = ChainSpec(line.bank.ids, line.bank.model)
-    return what, line, Traffic(lambda: look_at(line), Decoder(line.bank.model))
-
-
-def _ax12(spec: "ChainSpec", baud: int | None) -> tuple["ChainSpec", "Wire", "Traffic"]:
-    from sim.bus.ax12 import Ax12Servos  # noqa: PLC0415
-    from sim.bus.ax12_line import BAUD_CLOCK, Ax12Line  # noqa: PLC0415
-    from sim.bus.bench import BenchPlant  # noqa: PLC0415
-    from sim.bus.traffic import Traffic, look_at_ax12  # noqa: PLC0415
-
-    rate = baud or 1_000_000
-    if not BAUD_CLOCK / 255 <= rate <= BAUD_CLOCK / 2:
-        raise InputError(f"{rate} baud: an {spec.model} has 7843 to 1000000")
-    servos = Ax12Servos(spec.ids, BenchPlant(len(spec.ids)))
-    servos["Baud Rate"][:] = round(BAUD_CLOCK / rate) - 1
-    return spec, Ax12Line(servos, baud=rate), Traffic(lambda: look_at_ax12(servos), None)
-
-
-def _bench_line(spec: "ChainSpec", baud: int | None) -> "SimLine":
-    from sim.bus.bank import ServoBank  # noqa: PLC0415
-    from sim.bus.bench import BenchPlant  # noqa: PLC0415
-    from sim.bus.gearbox import GEARBOXES  # noqa: PLC0415
-    from sim.bus.line import SimLine  # noqa: PLC0415
-
-    rate = baud or 1_000_000
-    bank = ServoBank(spec.ids, spec.model, rate)
-    return SimLine(bank, BenchPlant(len(bank), gear=GEARBOXES.get(bank.model)), baud=rate)
+    models = dict(zip(spec.ids, spec.models, strict=True))
+    return spec, line, Traffic(lambda: look_at(line), Decoder(spec.kinds[0], models))
 
 
 def _robot_line(name: str, baud: int | None) -> "SimLine":

@@ -115,6 +115,11 @@ def run_gait(
     robot: Robot = None,
     world: World = None,
     param: Param = None,
+    then: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME@SECONDS[,PARAM=VALUE...]: change gait; may be given again"),
+    ] = None,
+    by: Annotated[str, typer.Option(help="how gaits change: blend, or cpg: oscillators")] = "blend",
     seconds: Annotated[float, typer.Option(help="then it comes to rest")] = 20.0,
     look_heading_rad: Annotated[
         float | None, typer.Option(help="world heading that the head keeps")
@@ -140,6 +145,8 @@ def run_gait(
     from controller.app.report.leave import leave_report  # noqa: PLC0415
     from drivers.telemetry.reader import read_log  # noqa: PLC0415
 
+    if by not in {"blend", "cpg"}:
+        raise InputError(f"--by {by}: expected blend or cpg")
     with ExitStack() as stack:
         prepared = prepare_gait(
             name,
@@ -151,6 +158,8 @@ def run_gait(
             look_heading_rad=look_heading_rad,
             look_at_m=_point(look_at),
             live=_live(stack, live, gamepad),
+            then=[_change(text) for text in then or []],
+            by="cpg" if by == "cpg" else "blend",
         )
         run = prepared.run
         folder = out if out is not None else Path("runs") / f"gait-{run.name}-{prepared.robot.name}"
@@ -168,7 +177,9 @@ def run_gait(
         "tripped": finished.outcome.tripped,
         "slowed_to": round(finished.outcome.least_rate, 3),
     }
-    if prepared.live is None:
+    if prepared.config.then:
+        found["then"] = [f"{change.name}@{change.at_s:g}" for change in prepared.config.then]
+    if prepared.live is None and not prepared.config.then and by == "blend":
         way = gait_way(read_log(finished.log))
         found |= {
             "frequency_hz": round(way.frequency_hz, 3),
@@ -223,6 +234,19 @@ def _parameters(given: list[str] | None) -> dict[str, Any]:
         except json.JSONDecodeError:
             values[name] = value
     return values
+
+
+def _change(text: str) -> tuple[float, str, dict[str, Any]]:
+    """Read NAME@SECONDS[,PARAM=VALUE...]."""
+    what, *values = text.split(",")
+    name, at, seconds = what.rpartition("@")
+    try:
+        at_s = float(seconds)
+    except ValueError:
+        at = ""
+    if not at or not name:
+        raise InputError(f"--then {text}: expected NAME@SECONDS[,PARAM=VALUE...]")
+    return at_s, name, _parameters(values)
 
 
 def _point(text: str | None) -> tuple[float, float] | None:

@@ -45,6 +45,8 @@ def run(
     )
     changed = [Path(each).stem for each in (robot, world, track) if each is not None]
     parts = [prepared.run.name, *changed, prepared.run.motion, f"seed{prepared.run.seed}"]
+    if prepared.run.pose is not None:
+        parts.append(f"pose-{prepared.run.pose}")
     name = "-".join(parts)
     folder = out if out is not None else Path("runs") / name
     with PathProgress(prepared.path.length_m, len(prepared.run.waypoints_m)) as progress:
@@ -62,6 +64,7 @@ def run(
             "duration_s": round(outcome.duration_s, 2),
             "tripped": outcome.tripped,
             "advance_alarms": outcome.alarms,
+            **finished.pose,
             "log": str(finished.log),
             "summary": str(folder / "summary.json"),
             "report": None if left.report is None else str(left.report),

@@ -1,0 +1,13 @@
+"""How a recording is played in time: table ``playback`` of a run; the file is its ``track``."""
+
+from pydantic import Field
+
+from config.base import Strict
+
+
+class PlaybackConfig(Strict):
+    """A recording in place of a walk."""
+
+    speed: float | None = Field(
+        None, gt=0.0, le=10.0, description="times the animal's own; default: as fast as joints can"
+    )

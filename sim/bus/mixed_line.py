@@ -1,0 +1,179 @@
+"""Servos of several models on one wire: a firmware for each part of the chain, one line for all."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.bus.agenda import Agenda
+from sim.bus.bank import TABLE_BYTES
+from sim.bus.bench import BenchPlant
+from sim.bus.clock import SimClock
+from sim.bus.firmware import Firmware
+from sim.bus.line import SimLine
+from sim.bus.mixed_bank import MixedBank
+from sim.bus.protection import Protection, Surroundings
+from sim.plant import Plant
+
+Rows = NDArray[np.intp]
+_ENTRY = 5
+"""Bytes of one servo's goal in a sync write: ID and value."""
+
+
+class MixedProtection(Protection):
+    """What is done to the supply and the housings of all parts from outside."""
+
+    def __init__(self, bank: MixedBank, parts: Sequence[Protection]) -> None:
+        self._mix, self._parts = bank, tuple(parts)
+        self._usual_v = [part.supply_v for part in parts]
+
+    @property
+    def supply_v(self) -> float:
+        """Voltage at the head of the chain; parts of another nominal voltage have their own."""
+        return self._parts[0].supply_v
+
+    def supply(self, volts: float) -> None:
+        """Change the supply; back at the head's first voltage, each part has its first again."""
+        back = volts == self._usual_v[0]
+        for part, usual_v in zip(self._parts, self._usual_v, strict=True):
+            part.supply(usual_v if back else volts)
+
+    def heat(self, rows: Rows, celsius: float) -> None:
+        """As ``Protection.heat``."""
+        for part, own in self._mix.split(rows):
+            self._parts[part].heat(own, celsius)
+
+    def detect(self, rows: Rows, error: int) -> None:
+        """As ``Protection.detect``."""
+        for part, own in self._mix.split(rows):
+            self._parts[part].detect(own, error)
+
+
+class MixedFirmware(Firmware):
+    """Firmware of every part of ``bank``, each on its own plant; rows are those of the chain."""
+
+    def __init__(
+        self, bank: MixedBank, plants: Sequence[Plant], around: Surroundings | None = None
+    ) -> None:
+        self.bank: MixedBank = bank
+        self.parts = tuple(
+            Firmware(own, plant, around) for own, plant in zip(bank.parts, plants, strict=True)
+        )
+        self.protection = MixedProtection(bank, [part.protection for part in self.parts])
+        self.agenda = Agenda()
+        self.powered = np.ones(len(bank), bool)
+        bounds = [*bank.starts[1:], len(bank)]
+        for part, low, high in zip(self.parts, bank.starts, bounds, strict=True):
+            part.powered = self.powered[low:high]
+
+    def advance(self, until_s: float) -> None:
+        """As ``Firmware.advance``, all parts in step wherever something is planned."""
+        while self.agenda.next_s <= until_s:
+            due_s = self.agenda.next_s
+            for part in self.parts:
+                part.advance(due_s)
+            self.agenda.carry_out(due_s)
+            self.changed()
+        for part in self.parts:
+            part.advance(until_s)
+
+    def heard(self, time_s: float) -> None:
+        """As ``Firmware.heard``: a packet is heard along the whole chain."""
+        for part in self.parts:
+            part.heard(time_s)
+
+    def changed(self) -> None:
+        """As ``Firmware.changed``."""
+        for part in self.parts:
+            part.changed()
+
+    def write_goals(self, rows: Rows, raw: NDArray[np.uint8], at: int) -> None:
+        """As ``Firmware.write_goals``, each part with its own entries."""
+        which = np.searchsorted(self.bank.starts, rows, "right") - 1
+        entries = raw[at : at + _ENTRY * len(rows)].reshape(-1, _ENTRY)
+        for part, own in self.bank.split(rows):
+            mine = np.ascontiguousarray(entries[which == part]).ravel()
+            self.parts[part].write_goals(own, mine, 0)
+
+    def wake(self, rows: Rows) -> None:
+        """As ``Firmware.wake``."""
+        for part, own in self.bank.split(rows):
+            self.parts[part].wake(own)
+
+    def reboot(self, row: int, factory_keeping: tuple[str, ...] | None = None) -> None:
+        """As ``Firmware.reboot``."""
+        part, own = self._own(row)
+        part.reboot(own, factory_keeping)
+
+    def power_up(self, rows: Rows) -> None:
+        """As ``Firmware.power_up``."""
+        for part, own in self.bank.split(rows):
+            self.parts[part].power_up(own)
+
+    def clear_turns(self, row: int) -> bool:
+        """As ``Firmware.clear_turns``."""
+        part, own = self._own(row)
+        return part.clear_turns(own)
+
+    def clear_error(self, row: int) -> bool:
+        """As ``Firmware.clear_error``."""
+        part, own = self._own(row)
+        return part.clear_error(own)
+
+    def seize(self, rows: Rows) -> None:
+        """As ``Firmware.seize``."""
+        for part, own in self.bank.split(rows):
+            self.parts[part].seize(own)
+
+    def release(self, rows: Rows) -> None:
+        """As ``Firmware.release``."""
+        for part, own in self.bank.split(rows):
+            self.parts[part].release(own)
+
+    def cut_power(self, rows: Rows) -> None:
+        """As ``Firmware.cut_power``."""
+        for part, own in self.bank.split(rows):
+            self.parts[part].cut_power(own)
+
+    def give_power(self, rows: Rows) -> None:
+        """As ``Firmware.give_power``."""
+        for part, own in self.bank.split(rows):
+            self.parts[part].give_power(own)
+
+    def refresh_motion(self) -> None:
+        """As ``Firmware.refresh_motion``."""
+        for part in self.parts:
+            part.refresh_motion()
+
+    def refresh(self, address: int = 0, length: int = TABLE_BYTES) -> None:
+        """As ``Firmware.refresh``."""
+        for part in self.parts:
+            part.refresh(address, length)
+
+    def _own(self, row: int) -> tuple[Firmware, int]:
+        part = self.bank.part_of(row)
+        return self.parts[part], row - int(self.bank.starts[part])
+
+
+class MixedLine(SimLine):
+    """Servos of several models on benches of their own behind one serial line of ``baud``.
+
+    ``benches`` are the plants of the bank's parts, in their order.
+    """
+
+    def __init__(
+        self,
+        bank: MixedBank,
+        benches: Sequence[BenchPlant],
+        clock: SimClock | None = None,
+        baud: int = 1_000_000,
+    ) -> None:
+        self._benches = tuple(benches)
+        super().__init__(bank, self._benches[0], clock, baud)
+
+    def _firmware(
+        self, bank: object, plant: Plant, surroundings: Surroundings | None
+    ) -> MixedFirmware:
+        del plant  # the first of the benches
+        assert isinstance(bank, MixedBank)
+        return MixedFirmware(bank, self._benches, surroundings)
