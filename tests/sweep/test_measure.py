@@ -7,8 +7,9 @@ import pytest
 
 from config.robot import RobotConfig
 from controller.app.sweep.effort import link_rotations
-from controller.app.sweep.measure import measure
+from controller.app.sweep.measure import Row, measure
 from controller.app.sweep.points import Point
+from controller.app.sweep.tune import Task, loss
 from controller.runtime.body import body_in_world
 from drivers.types import BodyPose
 
@@ -45,10 +46,23 @@ def test_a_gait_that_a_robot_refuses_is_a_row_and_no_crash() -> None:
 
 @pytest.mark.parametrize("missing", ["ended", "speed_m_s"])
 def test_unmeasured_points_never_win(missing: str) -> None:
-    from controller.app.sweep.tune import loss
-
-    row = {"ended": "ran to its end", "speed_m_s": 1.0, "climb_m_s": 0.0, "least_rate": 1.0}
-    good = loss(row, "speed", goal="way", least=0.5)
+    row = ahead(1.0, 0.0)
+    good = loss(row, SPEED)
     assert good == -1.0
-    assert loss(row | {missing: None}, "speed", goal="way", least=0.5) > good
-    assert loss(row | {"least_rate": 0.9}, "speed", goal="way", least=0.5) > good
+    assert loss(row | {missing: None}, SPEED) > good
+    assert loss(row | {"least_rate": 0.9}, SPEED) > good
+
+
+def test_what_goes_elsewhere_is_another_gait() -> None:
+    assert loss(ahead(0.8, 0.6), SPEED) == pytest.approx(-0.8)
+    assert loss(ahead(-1.0, 0.0), SPEED) > 0.0
+    assert loss(ahead(0.0, 1.0), SPEED) > 0.0
+
+
+SPEED = Task("speed", "way", (1.0, 0.0), 0.5)
+
+
+def ahead(forward: float, left: float) -> Row:
+    """A run at 1 m/s in this direction."""
+    found: Row = {"ended": "ran to its end", "speed_m_s": 1.0, "climb_m_s": 0.0, "least_rate": 1.0}
+    return found | {"forward_bl_cycle": forward, "left_bl_cycle": left}

@@ -58,25 +58,41 @@ class Tuned:
         return int((better if self.aim == "speed" else ~better).sum())
 
 
-def pace(row: Row, goal: Goal) -> float:
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What is asked of a gait."""
+
+    aim: Aim
+    goal: Goal
+    toward: tuple[float, float] = (1.0, 0.0)
+    """Unit vector, forward and left: where the defaults go. Another way is another gait."""
+    least: float = 0.0
+    """Pace of the defaults."""
+
+
+def pace(row: Row, task: Task) -> float:
     """How fast it does what it is there for, m/s or rad/s; 0 where it did not run to its end."""
     if row.get("ended") != "ran to its end" or row.get("speed_m_s") is None:
         return 0.0
-    if goal == "turn":
+    if task.goal == "turn":
         return abs(_value(row, "turn_rad_cycle")) * _value(row, "ran_hz")
-    return abs(_value(row, "climb_m_s" if goal == "climb" else "speed_m_s"))
+    if task.goal == "climb":
+        return abs(_value(row, "climb_m_s"))
+    way = _value(row, "forward_bl_cycle"), _value(row, "left_bl_cycle")
+    share = (way[0] * task.toward[0] + way[1] * task.toward[1]) / max(math.hypot(*way), 1e-12)
+    return max(0.0, _value(row, "speed_m_s") * share)
 
 
-def loss(row: Row, aim: Aim, goal: Goal, least: float) -> float:
+def loss(row: Row, task: Task) -> float:
     """What is made small; a gait that trips, is derated, or hardly moves is no answer."""
-    speed = pace(row, goal)
+    speed = pace(row, task)
     if speed <= 0.0 or _value(row, "least_rate") < 1.0:
         return _WORST
-    if aim == "speed":
+    if task.aim == "speed":
         return -speed
-    if speed < LAGGARD * least:
-        return _WORST * (1.0 - speed / max(least, 1e-9))
-    return _cost(row, goal)
+    if speed < LAGGARD * task.least:
+        return _WORST * (1.0 - speed / max(task.least, 1e-9))
+    return _cost(row, task)
 
 
 def tune(
@@ -101,14 +117,13 @@ def tune(
     kind = type(make_gait(gait))
     kind().check(body)
     space = Space.of(kind)
-    goal = kind.aim
     start = Point(gait, body.name, kind.world, 0, seed, seconds)
     default = kind().params.model_dump()
     # fresh interpreters: forked ones would share MuJoCo's and numba's threads
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         first = measure(start)
-        least = pace(first, goal)
-        if least <= 0.0:
+        task = _task(first, aim, kind.aim)
+        if task.least <= 0.0:
             raise InputError(f"{gait} on {robot}: the defaults do not move it: {first['ended']}")
         done = 1
 
@@ -124,7 +139,7 @@ def tune(
         dimensions = len(space.spans)
         people = max(5, _GENERATION)
         found = differential_evolution(
-            partial(_rated, start=start, aim=aim, goal=goal, least=least),
+            partial(_rated, start=start, task=task),
             Bounds([0.0] * dimensions, [1.0] * dimensions),
             x0=space.unit(default),
             init=_around(space.unit(default), people, np.random.default_rng(seed)),
@@ -140,10 +155,19 @@ def tune(
         values = space.values(found.x)
         tuned = replace(start, number=1, parameters=values)
         others = range(seed + 1, seed + 1 + seeds)
-        one = partial(_scored, aim=aim, goal=goal)
+        one = partial(_scored, task=task)
         before = tuple(pool.map(partial(one, start), others))
         after = tuple(pool.map(partial(one, tuned), others))
     return Tuned(gait, body.name, aim, values, done, before, after)
+
+
+def _task(row: Row, aim: Aim, goal: Goal) -> Task:
+    """Judge others by what the defaults do."""
+    forward, left = _value(row, "forward_bl_cycle"), _value(row, "left_bl_cycle")
+    size = math.hypot(forward, left)
+    toward = (forward / size, left / size) if size > 1e-9 else (1.0, 0.0)
+    task = Task(aim, goal, toward)
+    return replace(task, least=pace(row, task))
 
 
 def _around(centre: Floats, people: int, rng: np.random.Generator) -> Floats:
@@ -153,25 +177,25 @@ def _around(centre: Floats, people: int, rng: np.random.Generator) -> Floats:
     return np.vstack([near, far])
 
 
-def _rated(unit: Floats, *, start: Point, aim: Aim, goal: Goal, least: float) -> float:
+def _rated(unit: Floats, *, start: Point, task: Task) -> float:
     values = Space.of(type(make_gait(start.gait))).values(unit)
     row = measure(replace(start, parameters=values))
-    return loss(row, aim, goal, least)
+    return loss(row, task)
 
 
-def _scored(point: Point, vary: int, *, aim: Aim, goal: Goal) -> float:
+def _scored(point: Point, vary: int, *, task: Task) -> float:
     row = measure(point, vary=vary)
-    if aim == "speed":
-        return pace(row, goal)
-    if pace(row, goal) <= 0.0:
+    if task.aim == "speed":
+        return pace(row, task)
+    if pace(row, task) <= 0.0:
         return math.inf
-    return _cost(row, goal)
+    return _cost(row, task)
 
 
-def _cost(row: Row, goal: Goal) -> float:
+def _cost(row: Row, task: Task) -> float:
     """Cost of transport, or joules a radian."""
-    if goal == "turn":
-        return _value(row, "power_w") / pace(row, goal)
+    if task.goal == "turn":
+        return _value(row, "power_w") / pace(row, task)
     return _value(row, "cost_of_transport")
 
 
