@@ -14,6 +14,7 @@ from controller.app.commands.capture import capture
 from controller.app.commands.doctor import doctor
 from controller.app.commands.fish import film, match, synthesise
 from controller.app.commands.gait import list_gaits, run_gait, show_gait
+from controller.app.commands.gait_fit import fit_gait
 from controller.app.commands.listing import list_
 from controller.app.commands.plan import plan
 from controller.app.commands.play import play
@@ -101,7 +102,7 @@ bus.command(epilog=_examples("bus sniff exchange.jsonl --json", "bus sniff /dev/
 app.command(epilog=_examples("play worm-like", "play fish.npz --robot yaw16 --speed 0.5 --json"))(
     play
 )
-gait_app = typer.Typer(no_args_is_help=True, help="Gaits: list, show, run.")
+gait_app = typer.Typer(no_args_is_help=True, help="Gaits: list, show, run, fit.")
 app.add_typer(gait_app, name="gait")
 gait_app.command("list", epilog=_examples("gait list --json"))(list_gaits)
 gait_app.command(
@@ -115,6 +116,10 @@ gait_app.command(
         "gait run rolling --port /dev/ttyUSB0",
     ),
 )(run_gait)
+gait_app.command(
+    "fit",
+    epilog=_examples("gait fit CURVE.csv --picture fit.png", "gait fit CURVE.csv -o joints.npz"),
+)(fit_gait)
 
 fish_app = typer.Typer(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
 app.add_typer(fish_app, name="fish")

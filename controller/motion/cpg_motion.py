@@ -178,12 +178,13 @@ class CpgMotion:
         return self.cpg.velocity_rad_s()
 
     def pace(self) -> Pace:
-        """Largest of the change under way and of the gait."""
-        if self._left_s <= 0.0:
-            return self._settled
+        """Largest of the gait, of the change under way, and of those that are due."""
+        ahead = [self._settled, *(p for c in self._due for p in (c.under_way, c.settled))]
+        if self._left_s > 0.0:
+            ahead.append(self._change)
         return Pace(
-            np.maximum(self._settled.speed_rad_s, self._change.speed_rad_s),
-            np.maximum(self._settled.acceleration_rad_s2, self._change.acceleration_rad_s2),
+            np.max([pace.speed_rad_s for pace in ahead], axis=0),
+            np.max([pace.acceleration_rad_s2 for pace in ahead], axis=0),
         )
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
