@@ -9,7 +9,7 @@ import numpy as np
 from numba import int32, int64, intp, types, uint8, uintp
 from numpy.typing import NDArray
 
-from drivers.protocol.compiling import compiled
+from drivers.compiling import compiled
 
 _tcflush = types.ExternalFunction("tcflush", int32(int32, int32))
 _read = types.ExternalFunction("read", intp(int32, intp, uintp))
@@ -26,13 +26,13 @@ _PIECE = 64
 _RAW = types.Array(uint8, 1, "C", readonly=True)
 
 
-@compiled(int64(int64[::1]))
+@compiled(int64(int64[::1]), nogil=True)
 def _now_ns(time: NDArray[np.int64]) -> int:
     _clock_gettime(_MONOTONIC, time.ctypes.data)
     return int(time[0]) * _SECOND_NS + int(time[1])
 
 
-@compiled(int64(int32, _RAW, uint8[::1], int64, int64))
+@compiled(int64(int32, _RAW, uint8[::1], int64, int64), nogil=True)
 def exchange(
     fd: int, request: NDArray[np.uint8], answer: NDArray[np.uint8], count: int, wait_ns: int
 ) -> int:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from dynamixel_sdk import PortHandler
 
 
 @pytest.fixture(scope="session")
@@ -19,3 +20,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("metal", "a real bus, for tests marked 'metal'")
     group.addoption("--port", help="serial device of the bus")
     group.addoption("--robot", default="yaw16", help="shipped robot or TOML file on that bus")
+
+
+@pytest.fixture
+def patient_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The SDK waits some 35 ms of real time for an answer; a busy machine may need more."""
+    patience = 50.0
+    real_ms = PortHandler.getCurrentTime
+    monkeypatch.setattr(PortHandler, "getCurrentTime", lambda port: real_ms(port) / patience)

@@ -1,27 +1,19 @@
 """One march along a polyline in steps of equal chords, compiled where numba is installed."""
 
-from collections.abc import Callable
-from importlib.util import find_spec
-from typing import TypeVar
-
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.compiling import compiled
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-F = TypeVar("F", bound=Callable[..., object])
+_READ = "Array(float64, {}, 'C', readonly=True)"
 
 
-def _compiled(function: F) -> F:
-    if find_spec("numba") is None:
-        return function
-    from numba import njit  # noqa: PLC0415  optional and slow
-
-    made: F = njit(cache=True)(function)
-    return made
-
-
-@_compiled
+@compiled(
+    f"int64({_READ.format(2)}, {_READ.format(1)}, float64,"
+    " Array(int64, 1, 'C', readonly=True), float64[:, ::1], float64[::1])"
+)
 def march(
     line: Floats, arc: Floats, chord: float, crossing: Ints, points: Floats, at: Floats
 ) -> int:

@@ -7,7 +7,7 @@ import numpy as np
 from numba import boolean, int32, int64, types, uint8, uint16
 from numpy.typing import NDArray
 
-from drivers.protocol.compiling import compiled
+from drivers.compiling import compiled
 from drivers.protocol.crc import TABLE
 from drivers.protocol.group_frames import (
     FLAWLESS,

@@ -4,31 +4,28 @@ Compiled where numba is installed, else run as they stand, to the same bytes. Ar
 and plain numbers: numba takes five times longer to look at a tuple than at an array.
 """
 
-from collections.abc import Callable
-from importlib.util import find_spec
-from typing import TypeVar
-
 import numpy as np
 from numpy.typing import NDArray
+
+from drivers.compiling import compiled
 
 Bytes = NDArray[np.uint8]
 Rows = NDArray[np.intp]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Registers = NDArray[np.integer]
-F = TypeVar("F", bound=Callable[..., object])
+
+# as numba writes them; what is only read may be read-only, and a register's column has gaps
+_READ = "Array(uint8, 1, 'C', readonly=True)"
+_TABLE = "uint8[:, ::1]"
+_CRC = "Array(uint16, 1, 'C', readonly=True)"
+_COLUMN = "Array({}, 1, 'A', readonly=True)"
+_PLACES = "Array(int64, 1, 'C', readonly=True)"
+_SEEN = "Array(float64, 1, 'C', readonly=True)"
+_FRAME = "Array(float64, 2, 'C', readonly=True)"
 
 
-def _compiled(function: F) -> F:
-    if find_spec("numba") is None:
-        return function
-    from numba import njit  # noqa: PLC0415  optional and slow
-
-    made: F = njit(cache=True)(function)
-    return made
-
-
-@_compiled
+@compiled(f"int64({_READ}, int64, int64, int64, {_CRC})")
 def crc_of(data: Bytes, start: int, stop: int, crc: int, crc_table: NDArray[np.uint16]) -> int:
     """CRC of a part of ``data``, going on from ``crc``; ``crc_table`` (256,) is that of a byte."""
     for k in range(start, stop):
@@ -36,14 +33,14 @@ def crc_of(data: Bytes, start: int, stop: int, crc: int, crc_table: NDArray[np.u
     return crc
 
 
-@_compiled
+@compiled("void(uint8[::1], int64, int64, int64)")
 def put(data: Bytes, at: int, value: int, size: int) -> None:
     """Write a signed number, little-endian."""
     for k in range(size):
         data[at + k] = (value >> (8 * k)) & 0xFF
 
 
-@_compiled
+@compiled(f"void({_TABLE}, {_PLACES}, {_SEEN}, {_SEEN}, {_SEEN}, {_FRAME}, {_SEEN})")
 def show_motion(
     table: Bytes,
     places: Ints,
@@ -76,7 +73,7 @@ def show_motion(
         put(table[row], at_position, int(ticks), 4)
 
 
-@_compiled
+@compiled(f"void(uint8[::1], {_PLACES}, {_TABLE}, {_PLACES}, {_PLACES}, {_CRC})")
 def compose(
     packet: Bytes,
     shape: Ints,
@@ -112,7 +109,10 @@ def compose(
         crc = crc_of(packet, end - 2, end, crc, crc_table)
 
 
-@_compiled
+@compiled(
+    f"void({_READ}, {_PLACES}, {_TABLE}, int64, int64, Array(int64, 2, 'C', readonly=True),"
+    f" {_FRAME}, float64, float64[::1], boolean[::1])"
+)
 def take_goals(
     raw: Bytes,
     rows: Rows,
@@ -154,14 +154,14 @@ def take_goals(
             taken[row] = True
 
 
-@_compiled
+@compiled(f"void(float64[::1], {_SEEN}, float64)")
 def add_loss(heat_j: Floats, current_a: Floats, ohm_s: float) -> None:
     """Add what the windings turned into heat."""
     for row in range(len(heat_j)):
         heat_j[row] += current_a[row] * current_a[row] * ohm_s
 
 
-@_compiled
+@compiled(f"void(float64[::1], float64[::1], float64, {_SEEN})")
 def warm_up(temperature_c: Floats, heat_j: Floats, slice_s: float, thermal: Floats) -> None:
     """Move each sensor towards where its heat would take it in the long run; heat is used up.
 
@@ -178,7 +178,10 @@ def warm_up(temperature_c: Floats, heat_j: Floats, slice_s: float, thermal: Floa
         heat_j[row] = 0.0
 
 
-@_compiled
+@compiled(
+    f"boolean({_SEEN}, {_COLUMN.format('uint8')}, int64,"
+    f" {_COLUMN.format('uint16')}, {_COLUMN.format('uint16')})"
+)
 def out_of_range(
     temperature_c: Floats,
     hottest_c: Registers,
@@ -195,7 +198,7 @@ def out_of_range(
     return False
 
 
-@_compiled
+@compiled(f"float64({_SEEN}, {_SEEN})")
 def drawn(pwm: Floats, current_a: Floats) -> float:
     """Current that the bridges take from the supply, A."""
     sum_a = 0.0
@@ -204,7 +207,7 @@ def drawn(pwm: Floats, current_a: Floats) -> float:
     return sum_a
 
 
-@_compiled
+@compiled(f"float64(float64[::1], float64, {_SEEN}, {_SEEN}, {_SEEN}, {_SEEN}, float64)")
 def count_blocked(
     blocked_s: Floats,
     slice_s: float,

@@ -2,8 +2,10 @@
 
 The clock handed in is real time; ``pace`` times that is mirrored on the line's simulated clock
 whenever the server looks. What a client writes to ``path`` goes onto the line, and answers are
-handed out when their bytes have arrived. A client that sets a baud rate retunes the line to it, so
-servos at another are silent; one that sets none is taken to have the line's.
+handed out when their bytes have arrived. Time that the server itself missed (a busy machine, or
+physics slower than real time) is left out rather than caught up, so that a client never finds
+servos that have aged by a second between two bytes. A client that sets a baud rate retunes the line
+to it, so servos at another are silent; one that sets none is taken to have the line's.
 """
 
 import os
@@ -21,6 +23,8 @@ from sim.bus.wire import Wire
 
 IDLE_S = 0.02
 """How often physics catches up while no client talks."""
+LATE_S = 0.1
+"""Real time that one look may make up for; what is beyond it is left out."""
 CHUNK_BYTES = 4096
 _SPEEDS = {getattr(termios, f"B{baud}"): baud for baud in BAUDS if hasattr(termios, f"B{baud}")}
 _OUTPUT_SPEED = 5
@@ -48,6 +52,8 @@ class PtyServer:
         self._pace = pace
         self._link = link
         self._offset_s = line.clock.now_s() - clock.now_s() * pace
+        self.missed_s = 0.0
+        """Time on the line that was left out because the server came late."""
         self._master = self._slave = -1
         self._speed = 0
         self.overrun_bytes = 0
@@ -87,8 +93,7 @@ class PtyServer:
         line = self._line
         if not self.path:
             select.select([], [], [], wait_s)
-            line.clock.sleep_until_s(self._now_s())
-            line.settle()
+            self._catch_up()
             if not line.gone:
                 line.openPort()
                 self._open()
@@ -97,8 +102,7 @@ class PtyServer:
         if due_s is not None:
             wait_s = min(wait_s, max(0.0, due_s - self._now_s()) / self._pace)
         ready, _, _ = select.select([self._master], [], [], wait_s)
-        line.clock.sleep_until_s(self._now_s())
-        line.settle()
+        self._catch_up()
         if line.gone:
             self.close()
             return
@@ -135,6 +139,16 @@ class PtyServer:
             baud = _SPEEDS.get(speed)
             if baud is not None and baud != self._line.getBaudRate():
                 self._line.setBaudRate(baud)
+
+    def _catch_up(self) -> None:
+        """Bring the line to the present."""
+        line = self._line
+        late_s = self._now_s() - line.clock.now_s() - LATE_S * self._pace
+        if late_s > 0.0:
+            self._offset_s -= late_s
+            self.missed_s += late_s
+        line.clock.sleep_until_s(self._now_s())
+        line.settle()
 
     def _now_s(self) -> float:
         return self._clock.now_s() * self._pace + self._offset_s

@@ -1,7 +1,8 @@
 """One contract for every joint link: whatever answers on the bus, this is what a link promises.
 
-In process on a bench and on MuJoCo by default; on metal with ``pytest -m metal --port DEVICE``
-(``--robot`` says which), where the robot must stand free: joints move by up to 0.1 rad.
+In process on a bench and on MuJoCo, and through a pseudo-terminal, by default; on metal with
+``pytest -m metal --port DEVICE`` (``--robot`` says which), where the robot must stand free: joints
+move by up to 0.1 rad.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,11 +27,24 @@ from drivers.types import JointCommand, JointState
 from sim.bus.bank import ServoBank
 from sim.bus.bench import BenchPlant
 from sim.bus.line import SimLine
+from sim.bus.pty import PtyServer
 from sim.plant import Plant
+
+from .pty_port import PtyPort, ServedClock
 
 PERIOD_S = 0.02
 TRIO = RobotConfig(name="trio", joint_axes="ypy")
 START_RAD = [0.3, 0.0, -0.2]
+
+
+@dataclass
+class Bus:
+    """Where the host's bytes go, and what answers."""
+
+    port: BytePort
+    robot: RobotConfig
+    line: SimLine | None
+    """The simulated line; None on metal."""
 
 
 @dataclass
@@ -68,6 +82,11 @@ def mujoco() -> Plant:
     return plant
 
 
+def a_line(plant: Plant) -> SimLine:
+    bank = ServoBank(TRIO.servo_ids, TRIO.servo.model, TRIO.servo.baud)
+    return SimLine(bank, plant, baud=TRIO.servo.baud)
+
+
 def bare(port: BytePort, robot: RobotConfig) -> JointLink:
     return ServoChain(DynamixelBus(port, robot.servo.model), robot)
 
@@ -78,18 +97,32 @@ def safe(port: BytePort, robot: RobotConfig) -> JointLink:
 
 
 needs_mujoco = pytest.mark.skipif(find_spec("mujoco") is None, reason="MuJoCo is not installed")
+
+
+def in_process(plant: Callable[[], Plant]) -> Iterator[Bus]:
+    line = a_line(plant())
+    yield Bus(line, TRIO, line)
+
+
+def on_a_pty(plant: Callable[[], Plant]) -> Iterator[Bus]:
+    line, clock = a_line(plant()), ServedClock()
+    with PtyServer(line, clock) as server, PtyPort(server, TRIO.servo.baud, clock) as port:
+        yield Bus(port, TRIO, line)
+
+
 BACKENDS = [
-    pytest.param(bench, id="bench"),
-    pytest.param(mujoco, id="mujoco", marks=needs_mujoco),
+    pytest.param((in_process, bench), id="bench"),
+    pytest.param((in_process, mujoco), id="mujoco", marks=needs_mujoco),
+    pytest.param((on_a_pty, bench), id="pty"),
     pytest.param(None, id="metal", marks=pytest.mark.metal),
 ]
 
 
 @pytest.fixture(params=BACKENDS)
-def make_port(request: pytest.FixtureRequest) -> Iterator[tuple[BytePort, RobotConfig]]:
+def bus(request: pytest.FixtureRequest) -> Iterator[Bus]:
     if request.param is not None:
-        bank = ServoBank(TRIO.servo_ids, TRIO.servo.model, TRIO.servo.baud)
-        yield SimLine(bank, request.param(), baud=TRIO.servo.baud), TRIO
+        door, plant = request.param
+        yield from door(plant)
         return
     device = request.config.getoption("--port")
     if device is None:
@@ -98,20 +131,16 @@ def make_port(request: pytest.FixtureRequest) -> Iterator[tuple[BytePort, RobotC
 
     robot = load_robot(request.config.getoption("--robot"))
     with SerialPort(device, robot.servo.baud) as port:
-        yield port, robot
+        yield Bus(port, robot, None)
 
 
 @pytest.fixture(params=[bare, safe])
-def backend(
-    request: pytest.FixtureRequest, make_port: tuple[BytePort, RobotConfig]
-) -> Iterator[Backend]:
-    port, robot = make_port
-    line = port if isinstance(port, SimLine) else None
-    made = Backend(request.param(port, robot), port, robot, line)
+def backend(request: pytest.FixtureRequest, bus: Bus) -> Iterator[Backend]:
+    made = Backend(request.param(bus.port, bus.robot), bus.port, bus.robot, bus.line)
     yield made
-    if line is not None:
-        line.openPort()
-        line.tamper = None
+    if bus.line is not None:
+        bus.port.openPort()
+        bus.line.tamper = None
     made.link.disable()
 
 
@@ -236,14 +265,15 @@ def test_the_servos_stop_by_themselves_when_the_host_is_gone(backend: Backend) -
     line = simulated(backend)
     backend.link.enable()
     backend.cycles(5)
-    line.clock.advance(1.0)
+    clock = backend.port.clock
+    clock.sleep_until_s(clock.now_s() + 1.0)
     line.settle()
     assert (line.bank["Bus Watchdog"] == 0xFF).all()
 
 
 def test_a_lost_port_is_an_error_that_says_so(backend: Backend) -> None:
-    line = simulated(backend)
+    simulated(backend)
     backend.link.enable()
-    line.closePort()
+    backend.port.closePort()
     with pytest.raises(DriverError, match="closed"):
         backend.link.read()

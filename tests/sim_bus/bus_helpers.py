@@ -6,8 +6,10 @@ from drivers.protocol.packet import Instruction, InstructionPacket, StatusPacket
 from drivers.protocol.parser import PacketReader
 from sim.bus.bank import ServoBank
 from sim.bus.bench import BenchPlant
+from sim.bus.clock import SimClock
 from sim.bus.line import SimLine
 from sim.bus.motor import TICKS_PER_RAD
+from sim.bus.pty import IDLE_S, PtyServer
 
 ALL = 0xFE
 
@@ -19,6 +21,13 @@ def a_line(
     for servo in range(1, joints + 1):
         write(line, servo, 9, delay, 1)
     return line
+
+
+def serve_for(server: PtyServer, clock: SimClock, seconds: float) -> None:
+    """Let time pass as a server in its loop sees it."""
+    for _ in range(round(seconds / IDLE_S)):
+        clock.advance(IDLE_S)
+        server.step(0.0)
 
 
 def ask(line: SimLine, servo_id: int, code: int, params: bytes = b"") -> list[StatusPacket]:

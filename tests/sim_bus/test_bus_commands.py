@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -11,11 +12,13 @@ import dynamixel_sdk as sdk
 import pytest
 
 from sim.bus.clock import SimClock
-from sim.bus.pty import PtyServer
+from sim.bus.pty import LATE_S, PtyServer
 from sim.bus.servo_bus import ServoBus
 
-from .bus_helpers import a_line
+from .bus_helpers import a_line, serve_for
 from .test_faults import fault, scripted
+
+pytestmark = pytest.mark.usefixtures("patient_sdk")
 
 PING = bytes.fromhex("FF FF FD 00 01 03 00 01 19 4E")
 
@@ -33,7 +36,7 @@ def snakewalk(*words: str) -> subprocess.Popen[str]:
 def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path) -> None:
     record = tmp_path / "exchange.jsonl"
     link = tmp_path / "tty"
-    words = ("--servos", "1-2:XL330-M288", "--for", "3", "--json")
+    words = ("--servos", "1-2:XL330-M288", "--json")
     with snakewalk("bus", "serve", *words, "--record", str(record), "--link", str(link)) as process:
         assert process.stdout is not None
         first = json.loads(process.stdout.readline())
@@ -41,14 +44,14 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
         port = sdk.PortHandler(str(link))
         port.setBaudRate(1_000_000)
         handler = sdk.PacketHandler(2.0)
-        # real time on a machine that may be busy: an answer may come after the client's patience
-        assert (1200, 0, 0) in (handler.ping(port, 2) for _ in range(10))
+        assert handler.ping(port, 2) == (1200, 0, 0)
         port.setBaudRate(57_600)
         assert handler.ping(port, 2)[1] == sdk.COMM_RX_TIMEOUT  # servos at 1 Mbaud are silent
         port.closePort()
-        out, _ = process.communicate(timeout=30)
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate()
     done = json.loads(out)
-    assert done["answers"] >= 1
+    assert done["answers"] == 1
     assert not link.exists()
     sniffed = subprocess.run(
         [
@@ -77,7 +80,7 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
 )
 def test_wrong_input_is_one_line_and_exit_code_2(words: tuple[str, ...], said: str) -> None:
     with snakewalk("bus", *words) as process:
-        _, error = process.communicate(timeout=30)
+        _, error = process.communicate()
     assert process.returncode == 2
     assert said in error
     assert len(error.splitlines()) == 1
@@ -88,13 +91,11 @@ def test_the_pty_vanishes_and_comes_back_behind_its_link(tmp_path: Path) -> None
     clock, link = SimClock(), tmp_path / "tty"
     with PtyServer(line, clock, link=link) as server:
         first = server.path
-        clock.advance(1.1)
-        server.step(0.0)
+        serve_for(server, clock, 1.1)
         assert not server.path
         assert not os.path.exists(first)
         assert not link.exists()
-        clock.advance(1.0)
-        server.step(0.0)
+        serve_for(server, clock, 1.0)
         client = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
             os.write(client, PING)
@@ -111,9 +112,20 @@ def test_pace_stretches_time() -> None:
     line = a_line(1)
     start_s = line.clock.now_s()
     with PtyServer(line, clock, pace=0.25) as server:
-        clock.advance(2.0)
-        server.step(0.0)
+        serve_for(server, clock, 2.0)
     assert line.clock.now_s() - start_s == pytest.approx(0.5)
+
+
+def test_time_that_the_server_missed_is_left_out() -> None:
+    clock, line = SimClock(), a_line(1)
+    start_s = line.clock.now_s()
+    with PtyServer(line, clock) as server:
+        clock.advance(5.0)
+        server.step(0.0)
+        assert line.clock.now_s() - start_s == pytest.approx(LATE_S)
+        serve_for(server, clock, 1.0)
+        assert line.clock.now_s() - start_s == pytest.approx(LATE_S + 1.0)
+        assert server.missed_s == pytest.approx(5.0 - LATE_S)
 
 
 def test_three_lines_are_enough_for_a_test_suite(servo_bus: Callable[..., ServoBus]) -> None:
@@ -134,11 +146,12 @@ def test_the_fixture_takes_faults(servo_bus: Callable[..., ServoBus], tmp_path: 
 
 
 def test_serve_speaks_protocol_1_for_an_ax12() -> None:
-    with snakewalk("bus", "serve", "--servos", "5:AX-12A", "--for", "2", "--json") as process:
+    with snakewalk("bus", "serve", "--servos", "5:AX-12A", "--json") as process:
         assert process.stdout is not None
         port = sdk.PortHandler(json.loads(process.stdout.readline())["port"])
         port.setBaudRate(1_000_000)
         assert sdk.PacketHandler(1.0).ping(port, 5) == (12, 0, 0)
         port.closePort()
-        out, _ = process.communicate(timeout=30)
+        process.send_signal(signal.SIGTERM)
+        out, _ = process.communicate()
     assert json.loads(out)["answers"] == 2  # the SDK reads the model number, too

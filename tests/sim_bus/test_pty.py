@@ -10,7 +10,7 @@ from drivers.clock import WallClock
 from sim.bus.clock import SimClock
 from sim.bus.pty import PtyServer
 
-from .bus_helpers import a_line, write
+from .bus_helpers import a_line, serve_for, write
 
 PING = bytes.fromhex("FF FF FD 00 01 03 00 01 19 4E")
 
@@ -44,15 +44,14 @@ def test_physics_runs_on_while_nobody_talks_and_clients_come_and_go() -> None:
     with PtyServer(line, clock) as server:
         for _ in range(2):
             os.close(os.open(server.path, os.O_RDWR | os.O_NOCTTY))
-            clock.advance(0.5)
-            server.step(0.0)
+            serve_for(server, clock, 0.5)
         assert line.firmware.plant.position_rad[0] > 0.4
         path = server.path
     server.close()
     assert not os.path.exists(path)
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("patient_sdk")
 def test_the_sdk_opens_it_as_a_serial_port() -> None:
     stop = threading.Event()
     ph = sdk.PacketHandler(2.0)

@@ -1,6 +1,7 @@
 """``snakewalk bus serve`` and ``bus sniff``: simulated servos for any client; bytes in words."""
 
 import json
+import signal
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,6 +58,7 @@ def serve(
     line.usb_latency_s = latency * 1e-3
     line.taps.append(traffic)
     clock = WallClock()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # the link goes, the record is whole
     with PtyServer(line, clock, pace=pace, link=link) as server:
         out = record.open("w", encoding="utf-8") if record is not None else None
         if out is not None:
@@ -71,7 +73,8 @@ def serve(
                 out.close()
     if as_json:
         done = {"questions": traffic.questions, "answers": traffic.answers, "bytes": traffic.bytes}
-        print(json.dumps(done | {"servos": traffic.registers()}), flush=True)
+        rest = {"missed_s": server.missed_s, "servos": traffic.registers()}
+        print(json.dumps(done | rest), flush=True)
 
 
 def sniff(
@@ -202,6 +205,8 @@ def _run(server: "PtyServer", traffic: "Traffic", stopped: "Stop", as_json: bool
                     f"{server.path or 'port gone'}   {traffic.questions} questions, "
                     f"{traffic.answers} answers, {traffic.bytes} bytes"
                 )
+                if server.missed_s >= LOOK_S:
+                    counts += f"; {server.missed_s:.1f} s left out, this machine is too slow"
                 recent = "\n".join(line.text()[:WIDTH] for line in traffic.recent)
                 seen = _Seen(counts, traffic.registers(), recent)
 
