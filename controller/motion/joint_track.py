@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from controller.motion.angle_track import AngleTrack
+from drivers.compiling import compiled
 
 Floats = NDArray[np.float64]
 
@@ -59,10 +60,9 @@ class JointTrack:
 
     def goal_rad(self, head: float) -> Floats:
         """(J,) joint angles; at both ends of what is known the spline runs on straight."""
-        middle = min(max(round(head), self.first), self.last)
-        t = head - middle + 0.5
-        weights = np.array([0.5 * (1.0 - t) ** 2, 0.5 + t - t * t, 0.5 * t * t])
-        return np.asarray(weights.dot(self._around(middle - self.first)))
+        goal = np.empty(self._q.shape[1])
+        _spline(self._q, head - self.first, goal)
+        return goal
 
     def bends(self, start: int) -> tuple[Floats, Floats]:
         """Largest |dq/dS| and |d2q/dS2| over the joints near each whole head from ``start`` on.
@@ -85,13 +85,19 @@ class JointTrack:
         skip = start - self.first - low
         return slope[skip:], wide[skip:]
 
-    def _around(self, k: int) -> Floats:
-        """(3, J) samples k - 1, k and k + 1 of the table."""
-        q = self._q
-        if 0 < k < len(q) - 1:
-            return q[k - 1 : k + 2]
-        if len(q) == 1:
-            return q[[0, 0, 0]]
-        before = q[k - 1] if k > 0 else 2.0 * q[0] - q[1]
-        after = q[k + 1] if k + 1 < len(q) else 2.0 * q[-1] - q[-2]
-        return np.stack([before, q[k], after])
+
+@compiled("void(float64[:, ::1], float64, float64[::1])")
+def _spline(q: Floats, at: float, goal: Floats) -> None:
+    """Quadratic B-spline through the table ``q`` (n, J) at place ``at`` into ``goal`` (J,)."""
+    last = len(q) - 1
+    middle = int(min(max(np.rint(at), 0.0), float(last)))
+    t = at - middle + 0.5
+    before, here, after = 0.5 * (1.0 - t) ** 2, 0.5 + t - t * t, 0.5 * t * t
+    for joint in range(len(goal)):
+        own = q[middle, joint]
+        low, high = q[max(middle - 1, 0), joint], q[min(middle + 1, last), joint]
+        if middle == 0:
+            low = 2.0 * own - high
+        if middle == last:  # a table of one row is constant
+            high = 2.0 * own - low
+        goal[joint] = before * low + here * own + after * high

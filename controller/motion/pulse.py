@@ -6,12 +6,11 @@ quickly then asks for a jump of speed. Here half of the acceleration limit is le
 of the track that is known.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.motion.joint_track import JointTrack
+from drivers.compiling import compiled
 
 Floats = NDArray[np.float64]
 _TINY = 1e-9
@@ -40,8 +39,8 @@ class Pulse:
         self._slew = wanted_segments_s / ramp_time_s
         self._stopping = False
         self._first = joints.first
-        self._allowed = [wanted_segments_s]
-        self._slope = [0.0]
+        self._allowed = np.array([wanted_segments_s])
+        self._slope = np.zeros(1)
         self._least = wanted_segments_s
 
     def stop(self) -> None:
@@ -52,27 +51,22 @@ class Pulse:
         """Move on by ``dt_s``; returns the head, never beyond what is known of the track."""
         if self.joints.grow():
             self._look_ahead()
-        k = min(int(self.head) - self._first, len(self._slope) - 1)
-        thrust = min(self._slew, self._half_acceleration / max(self._slope[k], _TINY))
-        soon = self.head + self.speed_segments_s * dt_s
-        wanted = self.speed_segments_s + (-thrust if self._stopping else thrust) * dt_s
-        allowed = min(self._limit_at(self.head), self._limit_at(soon))
-        self.speed_segments_s = max(0.0, min(allowed, wanted))
-        self.head = min(self.head + self.speed_segments_s * dt_s, float(self.joints.last))
+        slew = -self._slew if self._stopping else self._slew
+        at, self.speed_segments_s = _moved(
+            self.head - self._first,
+            self.speed_segments_s,
+            dt_s,
+            slew,
+            self._half_acceleration,
+            self._allowed,
+            self._slope,
+        )
+        self.head = min(self._first + at, float(self.joints.last))
         return self.head
 
     def goal_rad(self) -> Floats:
         """(J,) joint goals at the head's place."""
         return self.joints.goal_rad(self.head)
-
-    def _limit_at(self, head: float) -> float:
-        allowed = self._allowed
-        at = min(max(head - self._first, 0.0), len(allowed) - 1.0)
-        low = min(int(at), len(allowed) - 2) if len(allowed) > 1 else 0
-        part = at - low
-        if part == 0.0 or len(allowed) == 1:
-            return allowed[low]
-        return math.sqrt(allowed[low] ** 2 * (1.0 - part) + allowed[low + 1] ** 2 * part)
 
     def _look_ahead(self) -> None:
         """Tabulate the speed allowed from the head's place on, braking distance included."""
@@ -80,15 +74,52 @@ class Pulse:
         slope, turn = self.joints.bends(self._first)
         by_speed = self._speed_limit / np.maximum(slope, _TINY)
         by_bend = np.sqrt(self._half_acceleration / np.maximum(turn, _TINY))
-        self._slope = steps = slope.tolist()
+        self._slope = slope
         here = np.minimum(np.minimum(by_speed, by_bend), self._wanted)
         # least of three neighbours: between two places no limit is missed, and none is a step
         around = np.pad(here, 1, mode="edge")
-        allowed = np.minimum(np.minimum(around[:-2], around[2:]), here).tolist()
+        allowed = np.minimum(np.minimum(around[:-2], around[2:]), here)
         # what comes behind the end may be as steep as the steepest so far: be able to brake for it
-        self._least = min(self._least, *allowed)
+        self._least = min(self._least, float(allowed.min()))
         allowed[-1] = self._least
-        for k in range(len(allowed) - 2, -1, -1):
-            brake = self._half_acceleration / max(steps[k], steps[k + 1], _TINY)
-            allowed[k] = min(allowed[k], math.sqrt(allowed[k + 1] ** 2 + 2.0 * brake))
+        _brake(allowed, slope, self._half_acceleration)
         self._allowed = allowed
+
+
+@compiled("float64(float64[::1], float64)")
+def _limit_at(allowed: Floats, at: float) -> float:
+    """Between two places the squares of the speeds lie on a line, as in even braking."""
+    at = min(max(at, 0.0), len(allowed) - 1.0)
+    low = max(min(int(at), len(allowed) - 2), 0)
+    part = at - low
+    if part == 0.0:
+        return float(allowed[low])
+    return float(np.sqrt(allowed[low] ** 2 * (1.0 - part) + allowed[low + 1] ** 2 * part))
+
+
+@compiled(
+    "UniTuple(float64, 2)(float64, float64, float64, float64, float64, float64[::1], float64[::1])"
+)
+def _moved(
+    at: float,
+    speed: float,
+    dt_s: float,
+    slew: float,
+    half_acceleration: float,
+    allowed: Floats,
+    slope: Floats,
+) -> tuple[float, float]:
+    """Place from the tables' start on, and speed, after ``dt_s``; ``slew`` < 0 stops."""
+    bend = slope[max(min(int(at), len(slope) - 1), 0)]
+    thrust = min(abs(slew), half_acceleration / max(bend, _TINY))
+    limit = min(_limit_at(allowed, at), _limit_at(allowed, at + speed * dt_s))
+    speed = max(0.0, min(limit, speed + (thrust if slew > 0.0 else -thrust) * dt_s))
+    return at + speed * dt_s, speed
+
+
+@compiled("void(float64[::1], float64[::1], float64)")
+def _brake(allowed: Floats, slope: Floats, half_acceleration: float) -> None:
+    """Lower the speeds so that each place's can be braked down to the next one's."""
+    for k in range(len(allowed) - 2, -1, -1):
+        brake = half_acceleration / max(slope[k], slope[k + 1], _TINY)
+        allowed[k] = min(allowed[k], np.sqrt(allowed[k + 1] ** 2 + 2.0 * brake))

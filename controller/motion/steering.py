@@ -20,8 +20,8 @@ class Path(Protocol):
         """(..., 2) points at arc lengths, clamped to the ends."""
         ...
 
-    def gap_m(self, point_m: Floats, s_m: float) -> float:
-        """Distance of a point (2,) from the path at an arc length that ``nearest`` has given."""
+    def follow(self, points_m: Floats, s_m: Floats, gap_m: Floats) -> None:
+        """Take (n, 2) followers along from (n,) arc lengths on; writes those, and the distances."""
         ...
 
     def nearest(self, point_m: ArrayLike, from_s_m: float = 0.0, window_m: float = 1.5) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RobotConfig
+from drivers.compiling import compiled
 from drivers.types import BodyPose
 
 Floats = NDArray[np.float64]
@@ -45,23 +46,51 @@ def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> Body
     Yaw turns the link behind by ``-q`` about the up axis, pitch by ``+q`` about the left axis, so a
     positive joint bends the head side to the left, or lifts it.
     """
-    if "p" in robot.joint_axes:
-        forward = _forward(robot.joint_axes, pose.rotation, joint_rad)
-    else:
-        forward = _forward_in_plane(pose.rotation, joint_rad)
-    placed = _centres(len(forward), robot.link_length_m).dot(forward)
-    placed += pose.head_in_world_m
+    links = len(joint_rad) + 1
+    forward, placed = np.empty((links, 3)), np.empty((links + 1, 3))
+    yaws = _yaws(robot.joint_axes)
+    link_m = robot.link_length_m
+    _carry(yaws, pose.rotation, pose.head_in_world_m, joint_rad, link_m, forward, placed)
     return BodyView(placed[:-1], forward, placed[-1])
 
 
-def _forward(joint_axes: str, rotation: Floats, joint_rad: Floats) -> Floats:
-    """(L, 3) link axes of any chain, in plain floats: one turn after the other."""
-    rows = np.asarray(rotation, dtype=float).T.tolist()
-    (fx, fy, fz), (lx, ly, lz), (ux, uy, uz) = rows
-    axes = [fx, fy, fz]
-    turns = zip(np.cos(joint_rad).tolist(), np.sin(joint_rad).tolist(), strict=True)
-    for axis, (c, s) in zip(joint_axes, turns, strict=True):
-        if axis == "y":
+@cache
+def _yaws(joint_axes: str) -> NDArray[np.bool_]:
+    """(J,) whether a joint is a yaw joint."""
+    return np.array([axis == "y" for axis in joint_axes])
+
+
+@compiled(
+    "void(boolean[::1], Array(float64, 2, 'A', readonly=True),"
+    " Array(float64, 1, 'A', readonly=True), Array(float64, 1, 'A', readonly=True), float64,"
+    " float64[:, ::1], float64[:, ::1])"
+)
+def _carry(
+    yaws: NDArray[np.bool_],
+    rotation: Floats,
+    head_m: Floats,
+    joint_rad: Floats,
+    link_m: float,
+    forward: Floats,
+    placed: Floats,
+) -> None:
+    """Carry the head's axes along the joints into ``forward`` (L, 3) and ``placed`` (L + 1, 3).
+
+    ``placed`` is the centres of the links and, last, their mean.
+    """
+    links = len(forward)
+    fx, fy, fz = rotation[0, 0], rotation[1, 0], rotation[2, 0]
+    lx, ly, lz = rotation[0, 1], rotation[1, 1], rotation[2, 1]
+    ux, uy, uz = rotation[0, 2], rotation[1, 2], rotation[2, 2]
+    x, y, z = head_m[0], head_m[1], head_m[2]
+    sum_x, sum_y, sum_z = x, y, z
+    forward[0, 0], forward[0, 1], forward[0, 2] = fx, fy, fz
+    placed[0, 0], placed[0, 1], placed[0, 2] = x, y, z
+    half_m = 0.5 * link_m
+    for k in range(1, links):
+        x, y, z = x - half_m * fx, y - half_m * fy, z - half_m * fz
+        c, s = np.cos(joint_rad[k - 1]), np.sin(joint_rad[k - 1])
+        if yaws[k - 1]:
             fx, lx = c * fx - s * lx, s * fx + c * lx
             fy, ly = c * fy - s * ly, s * fy + c * ly
             fz, lz = c * fz - s * lz, s * fz + c * lz
@@ -69,32 +98,9 @@ def _forward(joint_axes: str, rotation: Floats, joint_rad: Floats) -> Floats:
             fx, ux = c * fx - s * ux, s * fx + c * ux
             fy, uy = c * fy - s * uy, s * fy + c * uy
             fz, uz = c * fz - s * uz, s * fz + c * uz
-        axes += (fx, fy, fz)
-    return np.array(axes).reshape(-1, 3)
-
-
-def _forward_in_plane(rotation: Floats, joint_rad: Floats) -> Floats:
-    """The same for yaw joints alone: all turn about the head's up axis, so that angles add up."""
-    links = len(joint_rad) + 1
-    turn_rad = _sums(links).dot(joint_rad)
-    turned = np.empty((links, 2))
-    np.cos(turn_rad, out=turned[:, 0])
-    np.sin(turn_rad, out=turned[:, 1])
-    return np.asarray(turned.dot(rotation.T[:2]))
-
-
-@cache
-def _sums(links: int) -> Floats:
-    """(L, L - 1) weights of the yaw joints in the heading of each link, from the head's on."""
-    return -np.tri(links, links - 1, k=-1)
-
-
-@cache
-def _centres(links: int, link_m: float) -> Floats:
-    """(L + 1, L) weights of the links' axes in the place of each centre, last in their mean."""
-    whole = np.tri(links, k=-1)  # of every link before, but for half of the head's
-    whole[1:, 0] = 0.5
-    own = 0.5 * np.eye(links)
-    own[0, 0] = 0.0  # places are from the head's centre on
-    weights = -link_m * (whole + own)
-    return np.vstack([weights, weights.mean(axis=0)])
+        x, y, z = x - half_m * fx, y - half_m * fy, z - half_m * fz
+        forward[k, 0], forward[k, 1], forward[k, 2] = fx, fy, fz
+        placed[k, 0], placed[k, 1], placed[k, 2] = x, y, z
+        sum_x, sum_y, sum_z = sum_x + x, sum_y + y, sum_z + z
+    placed[links, 0], placed[links, 1] = sum_x / links, sum_y / links
+    placed[links, 2] = sum_z / links

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.run import SafetyConfig
+from drivers.compiling import compiled
 from drivers.types import JointState
 
 Floats = NDArray[np.float64]
@@ -60,12 +61,6 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
         safety.current_limit_a,
         safety.voltage_min_v,
     )
-    if (  # as nearly always; a comparison with a NaN counts as none, and is left to what follows
-        np.fmax.reduce(heat) <= limit_c - HEAT_BAND_C
-        and np.maximum.reduce(amps) <= CURRENT_START * limit_a
-        and np.fmin.reduce(volts) >= least_v + VOLTAGE_BAND_V
-    ):
-        return PLENTY
     judged = (
         (_falling(heat, limit_c - HEAT_BAND_C, limit_c - HEAT_EDGE_C), heat, "{:.0f} C", limit_c),
         (
@@ -90,6 +85,33 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
     return Allowed(rate, text)
 
 
+@compiled(
+    "boolean(float64[::1], Array(float64, 1, 'A', readonly=True), float64,"
+    " Array(float64, 1, 'A', readonly=True), Array(float64, 1, 'A', readonly=True),"
+    " float64, float64, float64)"
+)
+def _plenty(
+    mean_a: Floats,
+    current_a: Floats,
+    share: float,
+    heat_c: Floats,
+    voltage_v: Floats,
+    most_a: float,
+    most_c: float,
+    least_v: float,
+) -> bool:
+    """Average magnitudes of currents into ``mean_a``; whether ``allowed`` finds nothing to limit.
+
+    What was not read yet (NaN) limits nothing; a mean current that is NaN is not well.
+    """
+    well = True
+    for joint in range(len(mean_a)):
+        mean_a[joint] += share * (abs(current_a[joint]) - mean_a[joint])
+        if not mean_a[joint] <= most_a or heat_c[joint] > most_c or voltage_v[joint] < least_v:
+            well = False
+    return well
+
+
 def _falling(values: Floats, start: float, end: float) -> Floats:
     """1 up to ``start``, 0 from ``end`` on, a line between; 1 for NaN."""
     share = np.clip((end - values) / (end - start), 0.0, 1.0)
@@ -104,17 +126,26 @@ class Derating:
         self.least = 1.0
         """Lowest rate so far."""
         self._safety = safety
-        self._current_a: Floats | None = None
+        self._current_a = np.zeros(0)
         self._said = False
         self._news: list[str] = []
 
     def update(self, state: JointState, dt_s: float) -> float:
         """Take in a state and return the rate, LEAST to 1."""
-        amps = np.abs(state.current_a)
-        if self._current_a is None:
-            self._current_a = np.zeros(len(amps))
-        self._current_a = self._current_a + min(1.0, dt_s / CURRENT_S) * (amps - self._current_a)
-        now = allowed(state, self._current_a, self._safety)
+        safety = self._safety
+        if len(self._current_a) != len(state.current_a):
+            self._current_a = np.zeros(len(state.current_a))
+        plenty = _plenty(
+            self._current_a,
+            state.current_a,
+            min(1.0, dt_s / CURRENT_S),
+            state.temperature_c,
+            state.voltage_v,
+            CURRENT_START * safety.current_limit_a,
+            safety.temperature_limit_c - HEAT_BAND_C,
+            safety.voltage_min_v + VOLTAGE_BAND_V,
+        )
+        now = PLENTY if plenty else allowed(state, self._current_a, safety)
         if now.rate == self.rate:
             return self.rate
         time_s = FALL_S if now.rate < self.rate else RISE_S

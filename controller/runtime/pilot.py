@@ -70,7 +70,7 @@ class Pilot:
         self._fall_back = fall_back
         self._pitch_rad: Floats | None = None
         self._waypoints_m = np.asarray(waypoints_m, float)
-        self._along_m = self._head_along_m = 0.0
+        self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
         self._length_m = length_m
         self._lay_path(np.asarray(start_m, float), 0)
         self._segment_m = length_m / source.track.points
@@ -104,7 +104,7 @@ class Pilot:
     @property
     def along_m(self) -> float:
         """Arc length of the path point nearest to the body's centre."""
-        return self._along_m
+        return float(self._along_m[0])
 
     @property
     def pulse_m_s(self) -> float:
@@ -117,10 +117,10 @@ class Pilot:
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Advance by ``dt_s`` and return the joint goals (J,)."""
-        centre, head_m = view.centre_m[:2], view.link_m[0, :2]
-        self._along_m = self.path.nearest(centre, self._along_m)
-        self._head_along_m = self.path.nearest(head_m, self._head_along_m)
-        self._count(centre, head_m)
+        followers_m = self._followers_m
+        followers_m[0], followers_m[1] = view.centre_m[:2], view.link_m[0, :2]
+        self.path.follow(followers_m, self._along_m, self._gap_m)
+        self._count(followers_m[0], followers_m[1])
         self.decision = None
         if self.head >= self._source.track.end - _FORESIGHT:
             self.decision = self._source.decide(*self._aim(view))
@@ -159,20 +159,20 @@ class Pilot:
     def _astray(self, centre_m: Floats) -> bool:
         """Whether the next waypoint has been passed by, or the path been left by half a body."""
         path, end_m = self.path, self.path.length_m
-        along_m = self._along_m
+        along_m, gap_m = self._along_m[0], self._gap_m[0]
         if along_m >= end_m - 1e-6:  # how far beyond the end, the way that the path led there
             last = path.position([end_m - 0.05, end_m])
             ahead = (last[1] - last[0]) / 0.05
             along_m += float((centre_m - last[1]) @ ahead)
         return bool(
             along_m > self._passed_m[self.reached] + self._radius_m
-            or path.gap_m(centre_m, self._along_m) > _ASTRAY_BODIES * self._length_m
+            or gap_m > _ASTRAY_BODIES * self._length_m
         )
 
     def _lay_path(self, from_m: Floats, first: int) -> None:
         """Plan from a point through the waypoints from ``first`` on."""
         self.path = self._plan(np.vstack([from_m, self._waypoints_m[first:]]))
-        self._along_m = self._head_along_m = 0.0
+        self._along_m = np.zeros(2)  # of the body's centre, and of its head
         self._passed_m = np.zeros(len(self._waypoints_m))
         at = 0.0
         for k in range(first, len(self._waypoints_m)):
@@ -189,13 +189,13 @@ class Pilot:
         if not self._feedback:
             offset = self._start[1]
             head_m = self._believed(self._start[0], offset)
-            along_m = self.path.nearest(head_m, self._along_m)
+            along_m = self.path.nearest(head_m, self.along_m)
             return offset, aim_rad(self.path, head_m, along_m, self._carrot_m)
         # The piece begins where the track ends now: aim from where the head will be by then.
         lead_m = (self._source.track.end - self.head) * self._segment_m
         heading = view.headings_rad.mean()
         ahead_m = head_m + lead_m * np.array([np.cos(heading), np.sin(heading)])
-        return offset, aim_rad(self.path, ahead_m, self._head_along_m + lead_m, self._carrot_m)
+        return offset, aim_rad(self.path, ahead_m, float(self._along_m[1]) + lead_m, self._carrot_m)
 
     def _measured(self, view: BodyView) -> tuple[float, Floats, Floats]:
         body = self._source.track.body_rad(self.head)

@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-_AT_ONCE = 256  # bodies in memory: 256 x 5000 pairs of segments
+Indices = NDArray[np.intp]
+_AT_ONCE = 256  # bodies in memory
+_GROUP = 4  # segments
 
 
 def self_touches(skeleton_rad: Floats, length_m: float, radius_m: float) -> Bools:
@@ -22,20 +24,18 @@ def self_touches(skeleton_rad: Floats, length_m: float, radius_m: float) -> Bool
     points = shapes.shape[1]
     piece = length_m / points
     lag = max(2, int(np.ceil(np.pi * radius_m / piece)) + 1)  # segment ends are then pi r apart
-    i, j = _pairs(points, lag)
-    if len(i) == 0:
-        return np.zeros(len(shapes), dtype=bool)
     touches = np.zeros(len(shapes), dtype=bool)
+    if lag >= points:
+        return touches
+    reach = 2.0 * radius_m + piece  # segments this far apart at their middles cannot touch
     for first in range(0, len(shapes), _AT_ONCE):
         some = shapes[first : first + _AT_ONCE]
         step = np.stack([np.cos(some), np.sin(some)], axis=-1) * piece
         ends = np.concatenate([np.zeros((len(some), 1, 2)), np.cumsum(step, axis=1)], axis=1)
-        middle = 0.5 * (ends[:, 1:] + ends[:, :-1])
-        gap = middle[:, i] - middle[:, j]
-        reach = 2.0 * radius_m + piece  # segments this far apart at their middles cannot touch
-        body, pair = np.nonzero(gap[..., 0] ** 2 + gap[..., 1] ** 2 < reach**2)
-        a, b = ends[body, i[pair]], ends[body, i[pair] + 1]
-        c, d = ends[body, j[pair]], ends[body, j[pair] + 1]
+        body, i, j = _near_pairs(ends, lag, reach, piece)
+        if not len(body):  # as of most shapes that are used
+            continue
+        a, b, c, d = ends[body, i], ends[body, i + 1], ends[body, j], ends[body, j + 1]
         near = _segments_cross(a, b, c, d)
         for point, start, stop in ((a, c, d), (b, c, d), (c, a, b), (d, a, b)):
             near |= _distance(point, start, stop) < 2.0 * radius_m
@@ -43,13 +43,40 @@ def self_touches(skeleton_rad: Floats, length_m: float, radius_m: float) -> Bool
     return touches
 
 
+def _near_pairs(
+    ends: Floats, lag: int, reach_m: float, piece_m: float
+) -> tuple[Indices, Indices, Indices]:
+    """Body, first and second segment of all pairs ``lag`` apart whose middles are within reach.
+
+    Looked for between groups of segments first: a middle is at most 1.5 pieces from its group's.
+    """
+    points = ends.shape[1] - 1
+    group_i, group_j, part_i, part_j = _groups(points, lag)
+    last = (points - 1) // _GROUP
+    centres = ends[:, np.minimum(np.arange(last + 1) * _GROUP + 2, points)]
+    gap = centres[:, group_i] - centres[:, group_j]
+    far = reach_m + 3.0 * piece_m
+    body, pair = np.nonzero(gap[..., 0] ** 2 + gap[..., 1] ** 2 < far**2)
+    i = (group_i[pair][:, None] * _GROUP + part_i).ravel()
+    j = (group_j[pair][:, None] * _GROUP + part_j).ravel()
+    real = (j - i >= lag) & (j < points)
+    body, i, j = body.repeat(len(part_i))[real], i[real], j[real]
+    middle = 0.5 * (ends[:, 1:] + ends[:, :-1])
+    gap = middle[body, i] - middle[body, j]
+    near = gap[:, 0] ** 2 + gap[:, 1] ** 2 < reach_m**2
+    return body[near], i[near], j[near]
+
+
 @cache
-def _pairs(points: int, lag: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pairs of segments at least ``lag`` apart, first and second; asked anew in every decision."""
-    first, second = np.triu_indices(points, lag)
-    first.setflags(write=False)
-    second.setflags(write=False)
-    return first, second
+def _groups(points: int, lag: int) -> tuple[Indices, Indices, Indices, Indices]:
+    """Pairs of groups with segments ``lag`` apart, and of the segments in them."""
+    count = (points - 1) // _GROUP + 1
+    apart = max(0, -(-(lag - _GROUP + 1) // _GROUP))
+    parts = np.divmod(np.arange(_GROUP * _GROUP), _GROUP)
+    made = (*np.triu_indices(count, apart), *parts)
+    for each in made:
+        each.setflags(write=False)
+    return made
 
 
 def _distance(point: Floats, start: Floats, stop: Floats) -> Floats:

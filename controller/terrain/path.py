@@ -1,16 +1,16 @@
 """A smooth path: a cubic spline through points in order, by arc length ([PT] 2.6.1)."""
 
-import math
-from bisect import bisect_left, bisect_right
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from config.errors import InputError
+from drivers.compiling import compiled
 
 Floats = NDArray[np.float64]
 _STEP_M = 0.01
+WINDOW_M = 1.5
+"""How far along the path a follower is looked for: on its own lap, where a path crosses itself."""
 
 
 class SplinePath:
@@ -33,7 +33,6 @@ class SplinePath:
         self._s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
         self._points = fine
         self._xy = np.ascontiguousarray(fine.T)
-        self._marks: list[float] = self._s.tolist()
 
     @property
     def length_m(self) -> float:
@@ -48,27 +47,30 @@ class SplinePath:
         points[..., 1] = np.interp(s, self._s, self._xy[1])
         return points
 
-    def gap_m(self, point_m: Floats, s_m: float) -> float:
-        """Distance of a point (2,) from the path's mark at ``s_m``, as ``nearest`` gives it."""
-        low = min(bisect_left(self._marks, s_m), len(self._marks) - 1)
-        return math.dist(self._points[low], point_m)
-
     def heading_rad(self, s_m: float) -> float:
         """Direction of the path at an arc length."""
         before, after = self.position(np.array([s_m - _STEP_M, s_m + _STEP_M]))
         return float(np.arctan2(*(after - before)[::-1]))
 
-    def nearest(self, point_m: ArrayLike, from_s_m: float = 0.0, window_m: float = 1.5) -> float:
-        """Arc length of the closest point in ``[from_s_m, from_s_m + window_m]``.
+    def nearest(
+        self, point_m: ArrayLike, from_s_m: float = 0.0, window_m: float = WINDOW_M
+    ) -> float:
+        """Arc length of the closest point in ``[from_s_m, from_s_m + window_m]``."""
+        at_s_m, gap_m = np.array([from_s_m]), np.empty(1)
+        point = np.asarray(point_m, dtype=float)[None, :2]
+        _follow(self._s, self._xy, np.ascontiguousarray(point), at_s_m, gap_m, window_m)
+        return float(at_s_m[0])
 
-        The window keeps a follower on its own lap where a path crosses or closes on itself.
+    def follow(self, points_m: Floats, s_m: Floats, gap_m: Floats) -> None:
+        """Take followers along: each to the closest point of ``WINDOW_M`` from where it was.
+
+        Args:
+            points_m: (n, 2) where they are.
+            s_m: (n,) arc lengths; written.
+            gap_m: (n,) distances from the path there; written.
+
         """
-        marks = self._marks
-        low = min(bisect_left(marks, from_s_m - 1e-9), len(marks) - 1)
-        high = max(bisect_right(marks, from_s_m + window_m), low + 1)
-        way = self._xy[:, low:high] - np.asarray(point_m, dtype=float)[:2, None]
-        way *= way
-        return marks[low + int((way[0] + way[1]).argmin())]
+        _follow(self._s, self._xy, points_m, s_m, gap_m, WINDOW_M)
 
     def first_pass(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
         """Arc length, from ``from_s_m`` on, at which the path first comes nearest to a point.
@@ -80,3 +82,29 @@ class SplinePath:
         close = np.flatnonzero(gap <= gap.min() + _STEP_M)
         run = close[: int(np.argmax(np.append(np.diff(close), 2) > 1)) + 1]
         return float(self._s[low + run[np.argmin(gap[run])]])
+
+
+@compiled(
+    "void(float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64)"
+)
+def _follow(
+    marks_m: Floats, xy_m: Floats, points_m: Floats, s_m: Floats, gap_m: Floats, window_m: float
+) -> None:
+    for k in range(len(points_m)):
+        end_m = s_m[k] + window_m
+        low, high = 0, len(marks_m) - 1  # bisect for the first mark that is not behind
+        while low < high:
+            middle = (low + high) // 2
+            if marks_m[middle] < s_m[k] - 1e-9:
+                low = middle + 1
+            else:
+                high = middle
+        least, best = np.inf, low
+        x, y = points_m[k, 0], points_m[k, 1]
+        for mark in range(low, len(marks_m)):
+            if mark > low and marks_m[mark] > end_m:
+                break
+            square = (xy_m[0, mark] - x) ** 2 + (xy_m[1, mark] - y) ** 2
+            if square < least:
+                least, best = square, mark
+        s_m[k], gap_m[k] = marks_m[best], np.sqrt(least)

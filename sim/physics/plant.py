@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from config.heightfield import HeightField
 from config.robot import RobotConfig
 from config.world import WorldConfig
+from drivers.compiling import compiled
 from drivers.types import BodyPose
 from sim.physics.interpreted import InterpretedSteps
 from sim.physics.layout import step_layout
@@ -24,6 +25,19 @@ Floats = NDArray[np.float64]
 
 GEAR_DRAG_N_M_S = 0.03
 """Assumed, for lack of a published figure: 4 % of what the back-EMF of an XM430-W350 brakes."""
+
+
+@compiled("void(float64[::1], float64[:, ::1])")
+def _pose(place: Floats, pose: Floats) -> None:
+    """Place and unit quaternion (7,) to place, and below it the matrix of axes as columns."""
+    w, x, y, z = place[3], place[4], place[5], place[6]
+    pose[0, 0], pose[0, 1], pose[0, 2] = place[0], place[1], place[2]
+    pose[1, 0] = w * w + x * x - y * y - z * z
+    pose[1, 1], pose[1, 2] = 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+    pose[2, 0], pose[2, 1] = 2.0 * (x * y + w * z), w * w - x * x + y * y - z * z
+    pose[2, 2] = 2.0 * (y * z - w * x)
+    pose[3, 0], pose[3, 1] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
+    pose[3, 2] = w * w - x * x - y * y + z * z
 
 
 class Steps(Protocol):
@@ -143,9 +157,9 @@ class MujocoPlant:
 
     def head_pose(self) -> BodyPose:
         """Head link's centre and axes."""
-        matrix = np.empty(9)
-        mujoco.mju_quat2Mat(matrix, self._place[3:])
-        return BodyPose(self.time_s, self._place[:3].copy(), matrix.reshape(3, 3))
+        pose = np.empty((4, 3))
+        _pose(self._place, pose)
+        return BodyPose(self._count * self.step_s, pose[0], pose[1:])
 
     @property
     def link_positions_m(self) -> Floats:

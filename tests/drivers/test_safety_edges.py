@@ -114,16 +114,17 @@ def test_lasting_over_current_is_no_sound_state_that_is_looked_at_only_once() ->
     assert later.veto == "joint 1: 3.00 A for too long"
 
 
-def test_limits_in_one_row_are_the_limits() -> None:
-    assert LIMITS.least.tolist() == [
-        *(-LIMITS.limit_rad - 0.2),
-        *[-np.finfo(float).max] * J,
-        *[-2.0] * J,
-        *[-np.inf] * J,
-        *[10.0] * J,
-    ]
-    assert LIMITS.most[: J + 1].tolist() == [*(LIMITS.limit_rad + 0.2), np.finfo(float).max]
-    assert LIMITS.most[2 * J :].tolist() == [2.0] * J + [70.0] * J + [14.8] * J
+@pytest.mark.parametrize("name", ["error", "hardware_error"])
+def test_one_error_among_sound_servos_is_no_sound_state(name: str) -> None:
+    for joint in range(J):
+        shown = np.zeros(J, np.uint8)
+        shown[joint] = 0x80
+        assert "alarm" in str(judge(now=state(**{name: shown})).veto)
+
+
+def test_goals_and_angles_of_another_kind_of_number_are_numbers() -> None:
+    now = state(position_rad=np.zeros(J, np.float32))
+    assert judge(np.zeros(J, np.int64), now).veto is None
 
 
 def test_memory_at_rest_tells_that_no_current_was_too_high() -> None:

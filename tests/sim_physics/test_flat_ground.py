@@ -50,3 +50,13 @@ def test_on_a_ramp_it_holds_below_the_friction_angle_and_slides_above() -> None:
     pull = 9.81 * (np.sin(angle) - mu * np.cos(angle))
     way = np.linalg.norm(slid.link_positions_m.mean(axis=0) - start)
     np.testing.assert_allclose(way, 0.5 * pull * 0.5**2, rtol=0.03)
+
+
+def test_the_head_pose_is_that_of_the_head_link() -> None:
+    body, drive = a_body(ground=slope(0.1)), a_drive()
+    drive.goal_rad[:] = serpenoid(1.0)
+    body.advance(0.2, drive)
+    pose = body.head_pose()
+    np.testing.assert_allclose(pose.rotation.T @ pose.rotation, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(pose.head_in_world_m, body.link_positions_m[0], atol=1e-12)
+    np.testing.assert_allclose(pose.rotation, body.link_rotations[0], atol=1e-12)

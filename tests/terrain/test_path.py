@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from controller.terrain.path import SplinePath
+from controller.terrain.path import WINDOW_M, SplinePath
 
 SQUARE = [(0, 0), (2, 0), (2, 2), (0, 2), (0, 0)]
 
@@ -56,8 +56,16 @@ def test_a_lap_passes_its_waypoints_in_order_and_its_start_again_at_the_end() ->
     np.testing.assert_allclose(path.position(at), SQUARE, atol=0.01)
 
 
-def test_gap_is_the_distance_from_the_nearest_mark() -> None:
+def test_followers_go_where_each_is_nearest_and_know_how_far_away() -> None:
     path = SplinePath([(0.0, 0.0), (2.0, 1.0), (4.0, 0.0)])
-    for point in np.random.default_rng(3).uniform(-1.0, 5.0, (20, 2)):
-        s_m = path.nearest(point, 0.0, window_m=9.0)
-        assert path.gap_m(point, s_m) == pytest.approx(np.hypot(*(path.position(s_m) - point)))
+    points = np.random.default_rng(3).uniform(0.0, 4.0, (20, 2))
+    start_m = np.linspace(0.0, path.length_m, 20)
+    at_m, gap_m = start_m.copy(), np.empty(20)
+    path.follow(points, at_m, gap_m)
+    assert at_m.tolist() == [path.nearest(p, s) for p, s in zip(points, start_m, strict=True)]
+    assert gap_m == pytest.approx(np.hypot(*(path.position(at_m) - points).T))
+    table = np.arange(0.0, path.length_m, 0.001)
+    for k in range(20):  # by brute force, with the window
+        inside = table[(table >= start_m[k]) & (table <= start_m[k] + WINDOW_M)]
+        least = np.hypot(*(path.position(inside) - points[k]).T).min(initial=np.inf)
+        assert gap_m[k] == pytest.approx(least, abs=0.011) or k == 19
