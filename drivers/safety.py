@@ -8,7 +8,7 @@ limit, an alarm, lasting over-current, heat, supply voltage, a state that is too
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,8 +63,16 @@ class SafetyLimits:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class SafetyMemory:
+class Sound(NamedTuple):
+    """A state that kept limits: the same two again can only have aged."""
+
+    state: JointState
+    limits: SafetyLimits
+    oldest_s: float
+    """Greatest age in it."""
+
+
+class SafetyMemory(NamedTuple):
     """What the next judgement needs of the last one."""
 
     time_s: float
@@ -73,8 +81,8 @@ class SafetyMemory:
     """(J,) last goals that passed; at the start the measured angles."""
     over_current_since_s: Floats
     """(J,) time of the first reading above the limit; NaN below it."""
-    sound: tuple[JointState, SafetyLimits] | None = None
-    """The state judged last and the limits it kept: the same two again can only have aged."""
+    sound: Sound | None = None
+    """What was judged last, if it was well."""
 
     @staticmethod
     def at_rest(state: JointState) -> "SafetyMemory":
@@ -83,8 +91,7 @@ class SafetyMemory:
         return SafetyMemory(state.time_s, held, _never(len(held)))
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(NamedTuple):
     """What becomes of one command."""
 
     goal_rad: Floats
@@ -131,17 +138,20 @@ def judge(
 
     What a state was found to be does not change when it is asked again, but for its age.
     """
-    sound = last.sound
-    if sound is not None and sound[0] is state and sound[1] is limits:
+    sound, aged_s = last.sound, now_s - state.time_s
+    if sound is not None and sound.state is state and sound.limits is limits:
+        if sound.oldest_s + aged_s <= limits.stale_limit_s:
+            return None, last
         return stale_fault(state, limits, now_s), last
-    since_s = last.over_current_since_s
-    if _plainly_well(state, since_s, limits):
-        fault = stale_fault(state, limits, now_s)
-    else:
+    since_s, oldest_s = last.over_current_since_s, _oldest_s(state, last, limits)
+    if not oldest_s + aged_s <= limits.stale_limit_s:  # too old, or not plainly well (NaN)
         since_s = over_current_since_s(state, last, limits)
         fault = state_fault(state, since_s, limits, now_s)
-    sound = (state, limits) if fault is None else None
-    return fault, SafetyMemory(last.time_s, last.goal_rad, since_s, sound)
+        if fault is not None:
+            return fault, SafetyMemory(last.time_s, last.goal_rad, since_s)
+        oldest_s = float(np.maximum.reduce(state.age_s))
+    sound = Sound(state, limits, oldest_s)
+    return None, SafetyMemory(last.time_s, last.goal_rad, since_s, sound)
 
 
 def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> Floats:
@@ -175,8 +185,6 @@ def state_fault(
     stale = stale_fault(state, limits, now_s)
     if stale is not None:
         return stale
-    if _plainly_well(state, over_since_s, limits):
-        return None
     over_s = state.time_s - over_since_s
     alarm = (state.hardware_error != 0) | ((state.error & ALERT) != 0)
     numbers = np.stack([state.position_rad, state.velocity_rad_s, state.current_a])
@@ -207,36 +215,37 @@ def state_fault(
     return None
 
 
-def _plainly_well(state: JointState, over_since_s: Floats, limits: SafetyLimits) -> bool:
-    """Whether no check of ``state_fault`` can find anything, at a tenth of their cost.
+def _oldest_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> float:
+    """Greatest age of a state in which no check can find anything; NaN if that is not plain.
 
-    Stricter than they: what is not plain is left to them.
+    It costs a tenth of the checks, and is stricter: what is not plain is left to them.
     """
-    if over_since_s is not _never(len(over_since_s)):
-        return False
+    if last.over_current_since_s is not _never(len(last.over_current_since_s)):
+        return math.nan
     try:
-        return _inside(
+        return _oldest_of(
             *(state.position_rad, state.velocity_rad_s, state.current_a),
-            *(state.temperature_c, state.voltage_v),
+            *(state.temperature_c, state.voltage_v, state.age_s),
             *(state.error, state.hardware_error),
             limits.limit_rad,
             *(limits.limit_slack_rad, limits.current_limit_a, limits.temperature_limit_c),
             *(limits.voltage_min_v, limits.voltage_max_v),
         )
     except TypeError:  # a link with another kind of numbers: the checks themselves take any
-        return False
+        return math.nan
 
 
 @compiled(
-    f"boolean({_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, {_BYTES}, {_BYTES}, {_FLOATS},"
-    " float64, float64, float64, float64, float64)"
+    f"float64({_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, {_BYTES}, {_BYTES},"
+    f" {_FLOATS}, float64, float64, float64, float64, float64)"
 )
-def _inside(
+def _oldest_of(
     position_rad: Floats,
     velocity_rad_s: Floats,
     current_a: Floats,
     temperature_c: Floats,
     voltage_v: Floats,
+    age_s: Floats,
     error: Bytes,
     hardware_error: Bytes,
     limit_rad: Floats,
@@ -245,8 +254,9 @@ def _inside(
     hottest_c: float,
     least_v: float,
     most_v: float,
-) -> bool:
-    """Whether every value is a number inside its limits, and no error is shown."""
+) -> float:
+    """Greatest age, if every value is a number inside its limits and no error shows; else NaN."""
+    oldest_s = -np.inf
     for k in range(len(position_rad)):
         # a comparison with a NaN is false: what was not read is not inside
         inside = (
@@ -255,10 +265,12 @@ def _inside(
             and abs(current_a[k]) <= most_a
             and temperature_c[k] <= hottest_c
             and least_v <= voltage_v[k] <= most_v
+            and age_s[k] < np.inf
         )
         if not inside or error[k] or hardware_error[k]:
-            return False
-    return True
+            return np.nan
+        oldest_s = max(oldest_s, age_s[k])
+    return oldest_s
 
 
 @compiled(

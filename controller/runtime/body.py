@@ -1,7 +1,7 @@
 """The body as it lies in the world: the measured head pose carried along the measured joints."""
 
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,7 @@ from drivers.types import BodyPose
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class BodyView:
+class BodyView(NamedTuple):
     """Where every link is, in the world."""
 
     link_m: Floats

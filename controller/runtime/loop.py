@@ -1,13 +1,12 @@
 """The control loop: absolute deadlines, a late cycle is skipped and never made up in a burst."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from drivers.clock import Clock
 
 
-@dataclass(frozen=True, slots=True)
-class Tick:
+class Tick(NamedTuple):
     """One turn of the loop."""
 
     number: int

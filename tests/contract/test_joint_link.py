@@ -174,7 +174,7 @@ def test_state_is_whole_and_read_only(backend: Backend) -> None:
     state = backend.link.enable()
     joints = backend.link.joint_count
     assert joints == backend.robot.joint_count
-    for name in JointState.__slots__[1:]:
+    for name in JointState._fields[1:]:
         array = getattr(state, name)
         assert array.shape == (joints,), name
         assert not array.flags.writeable, name

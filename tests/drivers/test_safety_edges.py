@@ -61,7 +61,7 @@ def test_the_joint_that_measures_no_number_is_named(joint: int, name: str, bad: 
 @pytest.fixture
 def _long_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every check by itself, without the quick look that nothing is the matter."""
-    monkeypatch.setattr("drivers.safety._plainly_well", lambda *_: False)
+    monkeypatch.setattr("drivers.safety._oldest_s", lambda *_: np.nan)
 
 
 @pytest.mark.usefixtures("_long_way")
@@ -122,6 +122,11 @@ def test_one_error_among_sound_servos_is_no_sound_state(name: str) -> None:
         assert "alarm" in str(judge(now=state(**{name: shown})).veto)
 
 
+@pytest.mark.parametrize("joint", range(J))
+def test_an_age_that_is_no_number_is_too_old(joint: int) -> None:
+    assert f"joint {joint}: not read" in str(judge(now=state(age_s=one(np.nan, joint))).veto)
+
+
 def test_goals_and_angles_of_another_kind_of_number_are_numbers() -> None:
     now = state(position_rad=np.zeros(J, np.float32))
     assert judge(np.zeros(J, np.int64), now).veto is None
@@ -141,7 +146,7 @@ def test_the_joint_that_is_too_old_is_named_not_one_at_the_limit() -> None:
 
 
 def test_a_joint_that_was_not_read_keeps_its_time_though_none_is_above_the_limit_now() -> None:
-    begun = replace(memory(), over_current_since_s=one(NOW - 0.3, 1, np.nan))
+    begun = memory()._replace(over_current_since_s=one(NOW - 0.3, 1, np.nan))
     unread = state(valid=np.array([True, False, True]))
     assert judge(now=unread, last=begun).memory.over_current_since_s[1] == NOW - 0.3
     assert np.isnan(judge(last=begun).memory.over_current_since_s).all()

@@ -1,7 +1,5 @@
 """The judgement, densely around every limit."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -45,7 +43,7 @@ def state(**changes: object) -> JointState:
         age_s=np.zeros(J),
         valid=np.ones(J, np.bool_),
     )
-    return replace(calm, **changes)  # type: ignore[arg-type]
+    return calm._replace(**changes)  # type: ignore[arg-type]
 
 
 def memory(goal: float = 0.0, dt_s: float = DT) -> SafetyMemory:
@@ -82,7 +80,7 @@ class TestClampsAtTheirBoundary:
 
     def test_lead(self, joint: int, sign: int, offset: float) -> None:
         goal = sign * (0.8 + offset)
-        verdict = judge(one(goal, joint), last=replace(memory(), goal_rad=one(goal, joint)))
+        verdict = judge(one(goal, joint), last=memory()._replace(goal_rad=one(goal, joint)))
         assert verdict.veto is None
         assert verdict.goal_rad[joint] == pytest.approx(sign * (0.8 + min(offset, 0)), abs=1e-15)
         assert verdict.clamped[joint] == (offset > 0)
@@ -91,7 +89,7 @@ class TestClampsAtTheirBoundary:
         limit = LIMITS.limit_rad[joint]
         goal = one(sign * (limit + offset), joint)
         there = state(position_rad=one(sign * limit, joint))
-        verdict = judge(goal, there, replace(memory(), goal_rad=goal))
+        verdict = judge(goal, there, memory()._replace(goal_rad=goal))
         assert verdict.veto is None
         assert verdict.goal_rad[joint] == sign * (limit + min(offset, 0))
         assert verdict.clamped[joint] == (offset > 0)
@@ -130,7 +128,7 @@ class TestVetoesAtTheirBoundary:
 
     def test_current_over_time(self, joint: int, offset: float) -> None:
         hot = state(current_a=one(-3.0, joint))
-        last = replace(memory(), over_current_since_s=one(NOW - 0.5 - offset, joint, np.nan))
+        last = memory()._replace(over_current_since_s=one(NOW - 0.5 - offset, joint, np.nan))
         verdict = judge(now=hot, last=last)
         assert (verdict.veto is not None) == (offset >= 0)
 

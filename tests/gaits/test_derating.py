@@ -1,7 +1,5 @@
 """Slower before a servo trips: by heat, current and supply; never standing still, and told once."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -41,7 +39,7 @@ def test_a_cool_robot_on_a_good_supply_runs_at_full_rate() -> None:
 
 
 def test_what_was_not_read_yet_limits_nothing() -> None:
-    unknown = replace(state(), temperature_c=np.full(J, np.nan), voltage_v=np.full(J, np.nan))
+    unknown = state()._replace(temperature_c=np.full(J, np.nan), voltage_v=np.full(J, np.nan))
     assert rate(unknown) == 1.0
 
 
