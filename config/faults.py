@@ -73,10 +73,11 @@ class Heat(_Fault):
 
 
 class Supply(_Lasting):
-    """The supply of the whole bus has another voltage."""
+    """The supply of some servos, or of the whole bus, has another voltage."""
 
     kind: Literal["supply"]
     volts: float = Field(ge=0.0, le=40.0)
+    ids: tuple[ServoId, ...] = Field((), description="of these servos only; not given: of all")
 
 
 class Unplug(_Lasting):

@@ -7,7 +7,7 @@ EARLY = 1e-6
 
 
 class Arrivals:
-    """Packets in the order in which the servos send them, taken out byte by byte."""
+    """Packets in the order in which they begin on the wire, taken out byte by byte."""
 
     def __init__(self) -> None:
         self.byte_s = 1e-5
@@ -20,7 +20,12 @@ class Arrivals:
 
     def add(self, start_s: float, data: bytes) -> float:
         """Put a packet on the wire at ``start_s``; when its last byte will have arrived."""
-        self._packets.append((start_s, data))
+        packets = self._packets
+        if not packets or packets[-1][0] <= start_s:
+            packets.append((start_s, data))
+        else:  # there are some that are late
+            place = sum(packet[0] <= start_s for packet in packets)
+            packets.insert(place, (start_s, data))
         return start_s + len(data) * self.byte_s
 
     def count(self, now_s: float) -> int:

@@ -1,8 +1,13 @@
 """AX-12A servos on the wire: Protocol 1.0."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from itertools import groupby
 
-from sim.bus.ax12 import TABLE_BYTES, Ax12Servos
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.bus.ax12 import Ax12Servos
+from sim.bus.ax12_table import TABLE_BYTES
 from sim.bus.clock import SimClock
 from sim.bus.overlay import overlay
 from sim.bus.protocol1 import (
@@ -26,6 +31,9 @@ ANSWERED_FROM: dict[int, int] = {Instruction1.PING: 0, Instruction1.READ: 1}
 """Least Status Return Level(16) at which an instruction is answered; 2 for all others."""
 
 
+_ID_AT = 2
+
+
 class Ax12Line(Wire):
     """``servos`` behind a serial line of ``baud``."""
 
@@ -42,8 +50,36 @@ class Ax12Line(Wire):
         )
         self.servos = servos
         self._reader = Reader1()
-        self._kept: dict[int, tuple[int, bytes]] = {}
+        self._muted = np.zeros(len(servos), bool)
         self.setBaudRate(baud)
+
+    # what a fault file needs
+
+    def ids(self) -> list[int]:
+        """The ID of each row."""
+        return [int(each) for each in self.servos["ID"]]
+
+    def speakers(self, answer: bytes) -> Collection[int]:
+        """Who has written an answer."""
+        return (answer[_ID_AT],)
+
+    def rename(self, row: int, servo_id: int) -> None:
+        """Give a servo another ID."""
+        self.servos["ID"][row] = servo_id
+
+    def mute(self, rows: NDArray[np.intp], on: bool) -> None:
+        """Let servos fall silent, or speak again; they hear and obey."""
+        self._muted[rows] = on
+
+    def look_again(self) -> None:
+        """Nothing is remembered: who is there is asked anew for every packet."""
+
+    def shown(self, register: str) -> NDArray[np.unsignedinteger]:
+        """(S,) values of a register as a read now would show them; a copy."""
+        self.servos.refresh()
+        return self.servos[register].copy()
+
+    # the wire
 
     def _advance(self, until_s: float) -> None:
         self.servos.advance(until_s)
@@ -65,14 +101,20 @@ class Ax12Line(Wire):
         return [*frames, data[at:]]
 
     def _obey(self, data: bytes, end_s: float) -> list[Answer]:
-        return [answer for packet in self._reader.feed(data) for answer in self._execute(packet)]
+        return [
+            answer
+            for piece in self._heard(data, end_s)
+            for packet in self._reader.feed(piece)
+            for answer in self._execute(packet)
+        ]
 
     def _hearing(self, servo_id: int) -> list[int]:
         servos, rate = self.servos, self.getBaudRate()
         return [
             row
             for row in range(len(servos))
-            if servo_id in (BROADCAST_ID, servos["ID"][row])
+            if servos.powered[row]
+            and servo_id in (BROADCAST_ID, servos["ID"][row])
             and abs(BAUD_CLOCK / (int(servos["Baud Rate"][row]) + 1) / rate - 1.0) <= BAUD_TOLERANCE
         ]
 
@@ -91,16 +133,18 @@ class Ax12Line(Wire):
             asked = ANSWERED_FROM.get(code, 2)
             if packet.servo_id == BROADCAST_ID and code != Instruction1.PING:
                 continue
-            if level >= asked:
-                shown = error | int(self.servos.errors[row])
-                voices.append((delay_s, frame(own, shown, data)))
-        if not voices:
-            return []
-        if packet.servo_id == BROADCAST_ID:  # a broadcast ping: IDs answer in turn
-            voices.sort(key=lambda voice: voice[1][2])
-            return [Answer(delay_s, data) for delay_s, data in voices]
-        delay_s, said, _ = overlay(voices, BITS_PER_BYTE / self.getBaudRate())
-        return [Answer(delay_s, said)]
+            if level >= asked and not self._muted[row]:
+                shown = error | int(self.servos.protection.shown[row])
+                voices.append((own, delay_s, frame(own, shown, data)))
+        voices.sort(key=lambda voice: voice[0])  # to a broadcast ping, IDs answer in turn
+        return [self._say(list(each)) for _, each in groupby(voices, lambda voice: voice[0])]
+
+    def _say(self, voices: list[tuple[int, float, bytes]]) -> Answer:
+        """What is heard of the servos with one ID."""
+        spoken = [(delay_s, data) for _, delay_s, data in voices]
+        delay_s, data, garbled = overlay(spoken, BITS_PER_BYTE / self.getBaudRate())
+        self.collisions += garbled
+        return Answer(delay_s, data)
 
     def _one(self, row: int, code: int, params: bytes) -> tuple[int, bytes]:
         """Error bits and parameters of the answer."""
@@ -116,12 +160,9 @@ class Ax12Line(Wire):
         if code == Instruction1.WRITE and len(params) >= 2:
             return servos.write(row, params[0], params[1:]), b""
         if code == Instruction1.REG_WRITE and len(params) >= 2:
-            self._kept[row] = (params[0], params[1:])
-            servos["Registered"][row] = 1
-            return 0, b""
-        if code == Instruction1.ACTION and not params and row in self._kept:
-            servos["Registered"][row] = 0
-            return servos.write(row, *self._kept.pop(row)), b""
+            return servos.register_write(row, params[0], params[1:]), b""
+        if code == Instruction1.ACTION and not params:
+            return servos.action(row), b""
         if code == Instruction1.FACTORY_RESET and not params:
             servos.reset(row)
             return 0, b""

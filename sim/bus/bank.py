@@ -21,6 +21,7 @@ from sim.bus.registers import (
     MODE_RESETS,
     MODES,
     POSITION_MODE,
+    VELOCITY_MODE,
     WATCHDOG_TRIPPED,
     indirect_blocks,
     registers_of,
@@ -152,19 +153,20 @@ class ServoBank:
             self.indirect.written(address, len(data))
         return error
 
-    def register_write(self, row: int, address: int, data: bytes) -> ResultError:
-        """Reg Write: check and keep for Action."""
-        error = self.check(row, address, data)
+    def register_write(
+        self, row: int, address: int, data: bytes, *, ram_only: bool = False
+    ) -> ResultError:
+        """Reg Write: check as ``write`` does, and keep for Action."""
+        error = self.check(row, address, data, ram_only=ram_only)
         if not error:
             self._registered[row] = (address, data)
             self["Registered Instruction"][row] = 1
         return error
 
-    def action(self, row: int) -> ResultError:
-        """Carry out the registered write; "Action without Reg Write" is an instruction error."""
-        kept = self._registered.pop(row, None)
+    def registered(self, row: int) -> tuple[int, bytes] | None:
+        """Take out what was registered, address and data; None if nothing was."""
         self["Registered Instruction"][row] = 0
-        return self.write(row, *kept) if kept is not None else ResultError.INSTRUCTION
+        return self._registered.pop(row, None)
 
     def reset(self, rows: Rows, keep: Sequence[str], ram_only: bool = False) -> None:
         """Set initial values, in the RAM area alone (reboot) or in both (factory reset)."""
@@ -174,6 +176,7 @@ class ServoBank:
         for goal in GOALS[:3]:
             if goal in self:
                 self[goal][rows] = self[_limit_of(goal)][rows]
+        self._stand_still(rows)
         for row in rows:
             self._registered.pop(int(row), None)
             self["Backup Ready"][row] = int(row) in self._backup
@@ -214,6 +217,12 @@ class ServoBank:
         for goal in ("Goal PWM", "Goal Current"):
             if goal in self:
                 self[goal][rows] = self[_limit_of(goal)][rows]
+        self._stand_still(rows)
+
+    def _stand_still(self, rows: Rows) -> None:
+        """Torque on alone turns nothing (e-manual, Bus Watchdog(98), example, steps 1 and 2)."""
+        turning = rows[self["Operating Mode"][rows] == VELOCITY_MODE]
+        self["Goal Velocity"][turning] = 0
 
     def _check_value(self, row: int, name: str, value: int) -> ResultError:
         rule = self._rules[name]

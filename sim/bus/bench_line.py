@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from config.errors import InputError
-from sim.bus.ax12 import MODEL, Ax12Servos
+from sim.bus.ax12 import Ax12Servos
 from sim.bus.ax12_line import BAUD_CLOCK, Ax12Line
+from sim.bus.ax12_table import MODEL
 from sim.bus.bank import ServoBank
 from sim.bus.bench import BenchPlant
 from sim.bus.chain_spec import ChainSpec

@@ -8,42 +8,31 @@ from numpy.typing import NDArray
 
 from config import faults as plan
 from config.errors import ConfigError
-from sim.bus.line import SimLine
+from sim.bus.fault_target import FaultTarget
 from sim.bus.noise import Noise
-from sim.bus.protection import (
-    ENCODER_ERROR,
-    OVERHEATING_ERROR,
-    OVERLOAD_ERROR,
-    SHOCK_ERROR,
-    VOLTAGE_ERROR,
-)
 
 Rows = NDArray[np.intp]
 
-_TRIPS = {
-    "overload": OVERLOAD_ERROR,
-    "overheating": OVERHEATING_ERROR,
-    "voltage": VOLTAGE_ERROR,
-    "encoder": ENCODER_ERROR,
-    "shock": SHOCK_ERROR,
-}
+_NAMES = ("id", "takes", "behind")
+"""Keys of a fault that name one servo."""
 
 
 class FaultPlayer:
     """Faults of a plan on ``line``, from its present time on.
 
     Raises:
-        ConfigError: the plan names an ID that no servo of the line has.
+        ConfigError: the plan names an ID that no servo of the line has, or an error that its servos
+            cannot detect.
 
     """
 
-    def __init__(self, line: SimLine, faults: plan.FaultPlan, source: str = "faults") -> None:
+    def __init__(self, line: FaultTarget, faults: plan.FaultPlan, source: str = "faults") -> None:
         self._line = line
-        self._firmware = line.firmware
+        self._servos = line.servos
         self._start_s = line.clock.now_s()
-        self._rows = {int(servo): row for row, servo in enumerate(line.bank["ID"])}
+        self._rows = {servo: row for row, servo in enumerate(line.ids())}
         self._check(faults, source)
-        self.noise = Noise(random.Random(faults.seed), self._start_s)
+        self.noise = Noise(random.Random(faults.seed), self._start_s, line.speakers)
         self.stalls: list[tuple[float, float]] = []
         """When the host stands still, and for how long; times of the line's clock."""
         for fault in faults.fault:
@@ -66,27 +55,41 @@ class FaultPlayer:
     # planning
 
     def _check(self, faults: plan.FaultPlan, source: str) -> None:
-        wrong = []
+        wrong: list[str] = []
+        there = ", ".join(map(str, sorted(self._rows)))
         for k, fault in enumerate(faults.fault):
+            where = f"{source}: fault.{k}.{fault.kind}"
             named = list(getattr(fault, "ids", ()))
-            named += [
-                getattr(fault, key) for key in ("id", "takes", "behind") if hasattr(fault, key)
-            ]
+            named += [getattr(fault, key) for key in _NAMES if hasattr(fault, key)]
             wrong += [
-                f"{source}: fault.{k}.{fault.kind}: no servo has ID {each}; the bus has "
-                f"{', '.join(map(str, sorted(self._rows)))}"
+                f"{where}: no servo has ID {each}; the bus has {there}"
                 for each in named
                 if each not in self._rows
             ]
+            if isinstance(fault, plan.Trip) and fault.kind != "reboot":
+                wrong += self._blind(fault, where)
         if wrong:
             raise ConfigError(wrong)
 
+    def _blind(self, fault: plan.Trip, where: str) -> list[str]:
+        """What is wrong with an error that a servo named cannot detect."""
+        known = {
+            each: self._servos.protection.alarms(self._rows[each])
+            for each in fault.ids
+            if each in self._rows
+        }
+        return [
+            f"{where}: servo {each} detects {', '.join(alarms)} only"
+            for each, alarms in known.items()
+            if fault.kind not in alarms
+        ]
+
     def _plan(self, fault: plan.Fault) -> None:
         begin, end = self._deeds(fault)
-        self._firmware.agenda.plan(self._start_s + fault.at_s, self._known(begin))
+        self._servos.agenda.plan(self._start_s + fault.at_s, self._known(begin))
         for_s = getattr(fault, "for_s", None)
         if end is not None and for_s is not None:
-            self._firmware.agenda.plan(self._start_s + fault.at_s + for_s, self._known(end))
+            self._servos.agenda.plan(self._start_s + fault.at_s + for_s, self._known(end))
 
     def _known(self, deed: Callable[[], None]) -> Callable[[], None]:
         """A deed after which the line looks again at who is there."""
@@ -99,24 +102,22 @@ class FaultPlayer:
 
     def _deeds(self, fault: plan.Fault) -> tuple[Callable[[], None], Callable[[], None] | None]:
         """What to do at the beginning and at the end."""
-        line, firmware = self._line, self._firmware
+        line, servos = self._line, self._servos
+        guard = servos.protection
         rows = np.array([self._rows[each] for each in getattr(fault, "ids", ())], np.intp)
         if isinstance(fault, plan.Port):
             return line.vanish, line.come_back
         if isinstance(fault, plan.Supply):
-            usual = firmware.protection.supply_v
-            return (
-                lambda: firmware.protection.supply(fault.volts),
-                lambda: firmware.protection.supply(usual),
-            )
+            some = rows if len(rows) else None
+            return lambda: guard.supply(fault.volts, some), lambda: guard.supply(None, some)
         if isinstance(fault, plan.Unplug):
-            behind = np.arange(self._rows[fault.behind] + 1, len(line.bank))
-            return lambda: firmware.cut_power(behind), lambda: firmware.give_power(behind)
+            behind = np.arange(self._rows[fault.behind] + 1, len(line.ids()))
+            return lambda: servos.cut_power(behind), lambda: servos.give_power(behind)
         if isinstance(fault, plan.Clash):
             row = self._rows[fault.id]
-            return lambda: self._set_id(row, fault.takes), lambda: self._set_id(row, fault.id)
+            return lambda: line.rename(row, fault.takes), lambda: line.rename(row, fault.id)
         if isinstance(fault, plan.Heat):
-            return lambda: firmware.protection.heat(rows, fault.celsius), None
+            return lambda: guard.heat(rows, fault.celsius), None
         if isinstance(fault, plan.Trip):
             return lambda: self._trip(rows, fault.kind), None
         return self._servo_deeds(fault, rows)
@@ -124,24 +125,17 @@ class FaultPlayer:
     def _servo_deeds(
         self, fault: plan.Fault, rows: Rows
     ) -> tuple[Callable[[], None], Callable[[], None]]:
-        firmware = self._firmware
+        line, servos = self._line, self._servos
         if fault.kind == "mute":
-            return lambda: self._mute(rows, True), lambda: self._mute(rows, False)
+            return lambda: line.mute(rows, True), lambda: line.mute(rows, False)
         if fault.kind == "stuck":
-            return lambda: firmware.seize(rows), lambda: firmware.release(rows)
-        return lambda: firmware.cut_power(rows), lambda: firmware.give_power(rows)
-
-    # deeds
-
-    def _mute(self, rows: Rows, on: bool) -> None:
-        self._line.roll.mute[rows] = on
-
-    def _set_id(self, row: int, servo_id: int) -> None:
-        self._line.bank["ID"][row] = servo_id
+            return lambda: servos.seize(rows), lambda: servos.release(rows)
+        return lambda: servos.cut_power(rows), lambda: servos.give_power(rows)
 
     def _trip(self, rows: Rows, kind: str) -> None:
         if kind == "reboot":
             for row in rows:
-                self._firmware.reboot(int(row))
+                self._servos.reboot(int(row))
         else:
-            self._firmware.protection.detect(rows, _TRIPS[kind])
+            guard = self._servos.protection
+            guard.detect(rows, guard.alarms(int(rows[0]))[kind])

@@ -4,28 +4,27 @@ Order of one look: physics is stepped to the time of the look (cut where a watch
 protection is due), and only then registers are read or written.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.bus.agenda import Agenda
 from sim.bus.bank import TABLE_BYTES, ServoBank
+from sim.bus.effort import Effort
 from sim.bus.jam import Jam
-from sim.bus.kernel import show_motion, take_goals
+from sim.bus.kernel import take_goals
 from sim.bus.loops import CONTROL_S, Loops
 from sim.bus.motor import MOTORS, PWM_FULL, TICKS_PER_RAD, TICKS_PER_REV, make_drive
-from sim.bus.profile import VELOCITY_UNIT_RAD_S
 from sim.bus.protection import SLICE_S, Protection, Surroundings
+from sim.bus.readout import PRESENT, SUPPLY, Readout
 from sim.bus.registers import (
     CURRENT_MODE,
     CURRENT_POSITION_MODE,
     EXTENDED_RANGE_TICKS,
     POSITION_MODE,
     PWM_MODE,
-    VELOCITY_MODE,
     WATCHDOG_TRIPPED,
 )
+from sim.bus.watchdog import Watchdog
 from sim.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -33,7 +32,6 @@ Ints = NDArray[np.int64]
 
 CENTRE_TICKS = 2048
 """Present Position(132) of a straight joint."""
-WATCHDOG_UNIT_S = 0.02
 FAR_RAD = 1e9
 """Where a motor is sent that only has to push: the output saturates at its limit."""
 REVERSE, TORQUE_ON_BY_GOAL = 0x01, 0x08
@@ -42,11 +40,6 @@ STARTUP_TORQUE_ON, STARTUP_RAM_RESTORE = 0x01, 0x02
 """Startup Configuration(60)."""
 HOMING_LIMIT_TICKS = 1_024
 """Homing Offset(20) beyond this is ignored in position control mode (e-manual)."""
-IN_POSITION_TICKS, FOLLOWING_TICKS = 20, 100
-"""Deviations behind the flags of Moving Status(123), "predefined" in the e-manual: ours."""
-PRESENT, SUPPLY = range(120, 144), range(144, 147)
-"""Addresses of what time and shafts show, and of voltage and temperature; e-manual."""
-IN_POSITION, PROFILE_ONGOING, FOLLOWING_ERROR = 0x01, 0x02, 0x08
 
 
 class Firmware:
@@ -61,12 +54,12 @@ class Firmware:
         self.motor = MOTORS[bank.model]
         around = surroundings or Surroundings(supply_v=self.motor.nominal_v)
         self.drive = make_drive([self.motor] * joints, around.supply_v)
-        self.jam = Jam(self.drive, self.motor)
-        self.protection = Protection(bank, self.drive, self.motor, around, self.jam)
-        self._start_s = self._time_s = plant.time_s
+        self.jam = Jam(self.drive)
+        self._effort = Effort(self.drive, self.jam)
+        self.protection = Protection(bank, self.drive, self.motor, around, self._effort)
+        self._time_s = plant.time_s
         self._slice_s = self._time_s + SLICE_S
-        self._heard_s = self._time_s
-        self._patience_s = self._watchdog_s = np.inf
+        self._watchdog = Watchdog(bank, self._time_s)
         self._turns = np.zeros(joints)
         self._was_on = np.zeros(joints, bool)
         self._was_mode = bank["Operating Mode"].copy()
@@ -79,14 +72,9 @@ class Firmware:
         self._goal = self.drive.goal_rad.copy()
         self._control_s = self._time_s + CONTROL_S
         self._goal_address = bank.register("Goal Position").address
-        # Without a sensor load is "inferred from the internal output": in tenths of a per cent
-        effort = "Present Current" if bank.measures_current else "Present Load"
-        shown = (effort, "Present Velocity", "Present Position")
-        self._shown_at = np.array([bank.register(name).address for name in shown])
-        ampere, most = self.motor.current_unit_a, math.inf
-        if not bank.measures_current:
-            ampere, most = self.motor.stall_current_a / 1e3, 1e3
-        self._shown_units = np.array([ampere, most, VELOCITY_UNIT_RAD_S, TICKS_PER_RAD])
+        self._readout = Readout(
+            *(bank, plant, self.drive, self.motor, self._effort, self.loops, self.protection)
+        )
         self._taken = np.zeros(joints, bool)
         self.changed()
         self.power_up(np.arange(joints))
@@ -95,9 +83,9 @@ class Firmware:
 
     def advance(self, until_s: float) -> None:
         """Step physics, watchdog, heat and protections to ``until_s``."""
-        plant, drive, protection = self.plant, self.drive, self.protection
+        plant, drive, protection, dog = self.plant, self.drive, self.protection, self._watchdog
         while self._time_s < until_s:
-            stop_s = min(until_s, self._slice_s, self._watchdog_s, self.agenda.next_s)
+            stop_s = min(until_s, self._slice_s, dog.due_s, self.agenda.next_s)
             if self.loops.active:
                 stop_s = min(stop_s, self._control_s)
             plant.advance(stop_s, drive)
@@ -106,11 +94,12 @@ class Firmware:
             if self.loops.active and stop_s >= self._control_s:
                 self._control_s = stop_s + CONTROL_S
                 self.loops.tick(plant, self._goal, self._sign, self._held)
+                self.jam.hold(self.loops.position | self.loops.velocity)
             if stop_s >= self.agenda.next_s:
                 self.agenda.carry_out(stop_s)
                 self.changed()
-            if stop_s >= self._watchdog_s:
-                self._trip_watchdog()
+            if stop_s >= dog.due_s:
+                self._stop(dog.trip(stop_s))
             if stop_s >= self._slice_s:
                 if protection.look(plant):
                     self.changed()
@@ -118,8 +107,8 @@ class Firmware:
 
     def heard(self, time_s: float) -> None:
         """Feed the watchdogs: any instruction packet does, whoever it is for (e-manual)."""
-        self._heard_s = time_s
-        self._watchdog_s = time_s + self._patience_s
+        dog = self._watchdog
+        dog.heard_s, dog.due_s = time_s, time_s + dog.patience_s
 
     # registers to motors
 
@@ -150,7 +139,9 @@ class Firmware:
         self.loops.take_over(on, self.plant.position_rad)
         if self.loops.active and not self._was_active:
             self._control_s = self._time_s + CONTROL_S
-        drive.pwm_limit[:] = np.abs(bank["Goal PWM"].astype(float)) / PWM_FULL
+        full = np.abs(bank["Goal PWM"].astype(float)) / PWM_FULL
+        drive.pwm_limit[:] = full
+        self.protection.full = np.where(full > 0.0, full, 1.0)  # 0 of 0 is no effort
         self._push = np.zeros(len(bank))
         for pushing, goal in ((PWM_MODE, "Goal PWM"), (CURRENT_MODE, "Goal Current")):
             if goal in bank:
@@ -161,14 +152,14 @@ class Firmware:
         if bank.measures_current:
             goal_a = np.abs(bank["Goal Current"].astype(float)) * self.motor.current_unit_a
             drive.current_limit_a[:] = np.where(limited, goal_a, np.inf)
+            self._effort.limited = bool(limited.any())
         single = mode == POSITION_MODE
         low = np.where(single, bank["Min Position Limit"].astype(int), -EXTENDED_RANGE_TICKS)
         high = np.where(single, bank["Max Position Limit"].astype(int), EXTENDED_RANGE_TICKS)
         never = EXTENDED_RANGE_TICKS + 1
         self._limits = np.where(tripped, [[never], [-never]], [low, high])
         self._aim()
-        self._arm_watchdog()
-        self.jam.hold()
+        self._watchdog.arm(on)
 
     def write_goals(self, rows: NDArray[np.intp], raw: NDArray[np.uint8], at: int) -> None:
         """Goal Position(116) of many servos: entries of ``raw`` from ``at`` on, ID and 4 bytes.
@@ -222,7 +213,7 @@ class Firmware:
 
     def clear_turns(self, row: int) -> bool:
         """Clear instruction: position back into one turn; refused (False) while moving."""
-        if abs(self.plant.velocity_rad_s[row]) > self._moving_rad_s()[row]:
+        if self._readout.turning()[row]:
             return False
         self._forget_turns(np.arange(len(self.bank)) == row)
         self.changed()
@@ -263,59 +254,22 @@ class Firmware:
 
     def refresh_motion(self) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
-        plant = self.plant
-        show_motion(
-            self.bank.table,
-            self._shown_at,
-            self.jam.current_a(),
-            plant.velocity_rad_s,
-            plant.position_rad,
-            self._frame,
-            self._shown_units,
-        )
+        self._readout.motion(self._frame)
 
     def refresh(self, address: int = 0, length: int = TABLE_BYTES) -> None:
         """Present values, those at least that a read of this block shows."""
-        bank = self.bank
-        gather = bank.indirect.shown(address, length)
+        indirect = self.bank.indirect
+        gather = indirect.shown(address, length)
         stop = address + length
         if gather or (address < SUPPLY.start and stop > PRESENT.start):
             self.refresh_motion()
-            bank["Present PWM"][:] = np.rint(self.jam.pwm() * self._sign * PWM_FULL)
-            self._refresh_trajectory()
-            bank["Realtime Tick"][:] = int((self._time_s - self._start_s) * 1e3) % 32_768
+            self._readout.path(self._frame, self._time_s)
         if gather or (address < SUPPLY.stop and stop > SUPPLY.start):
-            bank["Present Input Voltage"][:] = np.rint(self.drive.supply_v * 10.0)
-            celsius = np.rint(self.protection.temperature_c)
-            bank["Present Temperature"][:] = np.minimum(np.maximum(celsius, 0.0), 255.0)
+            self._readout.supply()
         if gather:
-            bank.indirect.gather()
+            indirect.gather()
 
     # inside
-
-    def _refresh_trajectory(self) -> None:
-        """Velocity and Position Trajectory(136, 140), Moving(122), Moving Status(123)."""
-        bank, path, loops = self.bank, self.loops.trajectory, self.loops
-        goal, present = bank["Goal Position"].astype(float), bank["Present Position"]
-        shown = np.where(
-            loops.position, path.position * self._sign * TICKS_PER_RAD + self._zero, goal
-        )
-        bank["Position Trajectory"][:] = np.rint(shown)
-        run = loops.position | loops.velocity
-        bank["Velocity Trajectory"][:] = np.rint(
-            np.where(run, path.velocity * self._sign / VELOCITY_UNIT_RAD_S, 0.0)
-        )
-        ongoing = loops.position & path.ongoing
-        turning = np.abs(self.plant.velocity_rad_s) > self._moving_rad_s()
-        bank["Moving"][:] = turning | ongoing
-        placed = ~np.isin(bank["Operating Mode"], (CURRENT_MODE, VELOCITY_MODE, PWM_MODE))
-        status = IN_POSITION * (np.abs(goal - present) <= IN_POSITION_TICKS)
-        status |= FOLLOWING_ERROR * (np.abs(shown - present) > FOLLOWING_TICKS)
-        status = np.where(placed, status, 0) | PROFILE_ONGOING * ongoing
-        bank["Moving Status"][:] = status | np.where(loops.position, path.kind, 0)
-
-    def _moving_rad_s(self) -> Floats:
-        return np.asarray(self.bank["Moving Threshold"] * VELOCITY_UNIT_RAD_S)
 
     def _aim(self) -> None:
         goal = (self.bank["Goal Position"] - self._zero) * (self._sign / TICKS_PER_RAD)
@@ -323,30 +277,20 @@ class Firmware:
             goal = np.where(self._held, self._goal, goal)
         self._goal = goal
         drive_goal = np.where(self._push != 0.0, self._push, goal) if self._pushed else goal
-        loops = self.loops
+        loops, told = self.loops, None
         if loops.active:
             loops.aim(goal)
             run = loops.position | loops.velocity
-            drive_goal = np.where(run, self.drive.goal_rad, drive_goal)
+            drive_goal, told = np.where(run, self.drive.goal_rad, drive_goal), ~run
         self.drive.goal_rad[:] = drive_goal
-        if self.jam.any:
-            self.jam.hold()
+        self.jam.hold(told)
 
     def _forget_turns(self, which: NDArray[np.bool_]) -> None:
         ticks = np.rint(self.plant.position_rad * self._sign * TICKS_PER_RAD) + CENTRE_TICKS
         self._turns[which] = np.floor(ticks / TICKS_PER_REV)[which]
 
-    def _arm_watchdog(self) -> None:
-        dog = self.bank["Bus Watchdog"]
-        armed = (dog > 0) & (dog < WATCHDOG_TRIPPED) & self._was_on
-        self._patience_s = WATCHDOG_UNIT_S * float(dog[armed].min()) if armed.any() else np.inf
-        self._watchdog_s = self._heard_s + self._patience_s
-
-    def _trip_watchdog(self) -> None:
-        dog = self.bank["Bus Watchdog"]
-        late = (dog > 0) & (dog < WATCHDOG_TRIPPED) & self._was_on
-        late &= self._heard_s + WATCHDOG_UNIT_S * dog <= self._time_s + 1e-9
-        dog[late] = WATCHDOG_TRIPPED
+    def _stop(self, late: NDArray[np.bool_]) -> None:
+        """Hold where they are the servos whose watchdog has run out."""
         self._held |= late
         self._goal[late] = self.plant.position_rad[late]
         self.changed()

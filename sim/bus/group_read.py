@@ -1,5 +1,7 @@
 """Answers of many servos to one group read, composed at once from their part of the table."""
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +18,7 @@ MOTION = range(126, 136)
 """Present Current, Velocity and Position: refreshed alone where nothing else is read."""
 
 
-class GroupRead:
+class GroupRead(ABC):
     """One kind of group read: a template of its answer, and how to fill in the rest.
 
     ``status`` is the address of Hardware Error Status, which the alert in the error byte follows.
@@ -47,13 +49,13 @@ class GroupRead:
         compose(self._packet, self._shape, table, self._rows, self._block, TABLE)
         return self._cut(self._packet.tobytes(), whole)
 
+    @abstractmethod
     def _cut(self, raw: bytes, whole: bool) -> list[Answer]:
         """Cut the answer into the packets that it is."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _template(self, ids: Bytes, length: int) -> tuple[bytes, Bytes, int, int]:
         """Head; shares (N, bytes); where in them the error byte stands, and where the data."""
-        raise NotImplementedError
 
 
 class PlainRead(GroupRead):

@@ -1,15 +1,16 @@
 """Servos of Protocol 2.0 on the wire: ``sim.bus.wire`` with a bank of servos behind it."""
 
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Callable, Collection, Sequence
 
-from drivers.protocol.packet import HEADER, InstructionPacket
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.protocol.packet import BROADCAST_ID, HEADER, Instruction, InstructionPacket
 from drivers.protocol.parser import PacketReader
 from sim.bus.bank import ServoBank
 from sim.bus.clock import SimClock
 from sim.bus.firmware import Firmware
 from sim.bus.group import GroupPath
-from sim.bus.noise import Noise
 from sim.bus.protection import Surroundings
 from sim.bus.roll import Roll
 from sim.bus.service import Answer, Service
@@ -20,14 +21,7 @@ Tamper = Callable[[bytes], Sequence[bytes]]
 """What becomes of one answer on the wire: itself, nothing, or other packets, in order."""
 
 
-class Script(Protocol):
-    """What a fault file does to packets and to the host."""
-
-    noise: Noise
-
-    def host_wakes_s(self, now_s: float) -> float:
-        """When a host that wants to go on at ``now_s`` does."""
-        ...
+_ID_AT, _CODE_AT = 4, 7
 
 
 class SimLine(Wire):
@@ -51,24 +45,53 @@ class SimLine(Wire):
         self.firmware = self._firmware(bank, plant, surroundings)
         self.bank = bank
         self.tamper = tamper
-        self._script: Script | None = None
         self._service = Service(self.firmware, baud)
         self._group = GroupPath(self._service)
         self._reader = PacketReader()
+        self._asked = b""
         self.setBaudRate(baud)
-
-    def attach(self, script: Script) -> None:
-        """Let a fault file act on this line."""
-        self._script = script
 
     @property
     def roll(self) -> Roll:
         """Who hears which ID."""
         return self._service.roll
 
+    # what a fault file needs
+
+    @property
+    def servos(self) -> Firmware:
+        """Those on the line, by row."""
+        return self.firmware
+
+    def ids(self) -> list[int]:
+        """The ID of each row."""
+        return [int(each) for each in self.bank["ID"]]
+
+    def speakers(self, answer: bytes) -> Collection[int]:
+        """Who has written an answer: one servo, or all that a fast read has asked."""
+        if answer[_ID_AT] != BROADCAST_ID:
+            return (answer[_ID_AT],)
+        fast_bulk = self._asked[_CODE_AT] == Instruction.FAST_BULK_READ
+        return self._asked[8:-2:5] if fast_bulk else self._asked[12:-2]
+
+    def rename(self, row: int, servo_id: int) -> None:
+        """Give a servo another ID."""
+        self.bank["ID"][row] = servo_id
+
+    def mute(self, rows: NDArray[np.intp], on: bool) -> None:
+        """Let servos fall silent, or speak again; they hear and obey."""
+        self.roll.mute[rows] = on
+
     def look_again(self) -> None:
         """Take note that IDs, power or voices have changed by other means than a packet."""
         self._service.retune()
+
+    def shown(self, register: str) -> NDArray[np.signedinteger]:
+        """(S,) values of a register as a read now would show them; a copy."""
+        self.firmware.refresh()
+        return self.bank[register].copy()
+
+    # the wire
 
     def _firmware(
         self, bank: ServoBank, plant: Plant, surroundings: Surroundings | None
@@ -85,29 +108,15 @@ class SimLine(Wire):
         self._service.baud = baud
         self._service.retune()
 
-    def _wake_host(self) -> None:
-        if self._script is not None or not self.is_open:
-            super()._wake_host()
-
-    def _host_wakes_s(self, now_s: float) -> float:
-        return now_s if self._script is None else self._script.host_wakes_s(now_s)
-
-    def _must_be_open(self) -> None:
-        if self._script is not None:
-            self.settle()
-        if not self.is_open:
-            super()._must_be_open()
-
     def _obey(self, data: bytes, end_s: float) -> list[Answer]:
         """Let the servos hear what the host has sent."""
+        self._asked = data
         if self._script is None:
             apart = self.tamper is not None or bool(self.taps)
             quick = self._group.execute(data, end_s, whole=not apart)
             return self._one_by_one(data, end_s) if quick is None else quick
-        noise = self._script.noise
-        heard = noise.question(data, end_s) if noise.any else [data]
         answers: list[Answer] = []
-        for piece in heard:
+        for piece in self._heard(data, end_s):
             quick = self._group.execute(piece, end_s, whole=False)
             answers += self._one_by_one(piece, end_s) if quick is None else quick
         return answers
@@ -120,13 +129,10 @@ class SimLine(Wire):
             for answer in self._service.execute(packet, end_s)
         ]
 
-    def _fate(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
-        """What becomes of one answer, and by how much it is slow."""
+    def _fate(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:
         if self.tamper is not None:
             return [(0.0, packet) for packet in self.tamper(data)]
-        if self._script is not None and self._script.noise.any:
-            return self._script.noise.answer(data, now_s)
-        return [(0.0, data)]
+        return ((0.0, data),) if self._script is None else super()._fate(data, now_s)
 
     def _frames(self, data: bytes) -> Sequence[bytes]:
         if len(data) >= 7 and data[5] | data[6] << 8 == len(data) - 7:

@@ -119,7 +119,7 @@ class Loops:
                 np.abs(goal) / np.maximum(ramp, 1e-12) * (CONTROL_S * 1e3),
                 ramp * (ACCELERATION_UNIT_RAD_S2 * CONTROL_S),
             )
-        step = np.where(ramp > 0.0, per_tick, np.inf)
+        step = np.where((ramp > 0.0) & ~held, per_tick, np.inf)  # a watchdog's stop has no profile
         path.velocity[run] += np.clip(goal - path.velocity, -step, step)[run]
         error = (path.velocity - plant.velocity_rad_s) / VELOCITY_UNIT_RAD_S
         integral = bank["Velocity I Gain"] / 65_536.0

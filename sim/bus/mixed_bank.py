@@ -81,15 +81,17 @@ class MixedBank(ServoBank):
         bank, own = self._own(row)
         return bank.write(own, address, data, ram_only=ram_only)
 
-    def register_write(self, row: int, address: int, data: bytes) -> ResultError:
+    def register_write(
+        self, row: int, address: int, data: bytes, *, ram_only: bool = False
+    ) -> ResultError:
         """As ``ServoBank.register_write``."""
         bank, own = self._own(row)
-        return bank.register_write(own, address, data)
+        return bank.register_write(own, address, data, ram_only=ram_only)
 
-    def action(self, row: int) -> ResultError:
-        """As ``ServoBank.action``."""
+    def registered(self, row: int) -> tuple[int, bytes] | None:
+        """As ``ServoBank.registered``."""
         bank, own = self._own(row)
-        return bank.action(own)
+        return bank.registered(own)
 
     def reset(self, rows: Rows, keep: Sequence[str], ram_only: bool = False) -> None:
         """As ``ServoBank.reset``, to the initial values of each servo's model."""

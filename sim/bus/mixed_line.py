@@ -1,6 +1,6 @@
 """Servos of several models on one wire: a firmware for each part of the chain, one line for all."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,18 +25,19 @@ class MixedProtection(Protection):
 
     def __init__(self, bank: MixedBank, parts: Sequence[Protection]) -> None:
         self._mix, self._parts = bank, tuple(parts)
-        self._usual_v = [part.supply_v for part in parts]
 
-    @property
-    def supply_v(self) -> float:
-        """Voltage at the head of the chain; parts of another nominal voltage have their own."""
-        return self._parts[0].supply_v
+    def alarms(self, row: int) -> Mapping[str, int]:
+        """As ``Protection.alarms``, by the servo's model."""
+        return self._parts[self._mix.part_of(row)].alarms(row)
 
-    def supply(self, volts: float) -> None:
-        """Change the supply; back at the head's first voltage, each part has its first again."""
-        back = volts == self._usual_v[0]
-        for part, usual_v in zip(self._parts, self._usual_v, strict=True):
-            part.supply(usual_v if back else volts)
+    def supply(self, volts: float | None, rows: Rows | None = None) -> None:
+        """As ``Protection.supply``, each part with its own usual voltage."""
+        if rows is None:
+            for part in self._parts:
+                part.supply(volts)
+            return
+        for k, own in self._mix.split(rows):
+            self._parts[k].supply(volts, own)
 
     def heat(self, rows: Rows, celsius: float) -> None:
         """As ``Protection.heat``."""

@@ -1,20 +1,27 @@
 """Packets that do not arrive as they were sent, by the script of a fault file."""
 
 import random
+from collections.abc import Callable, Collection
+from typing import Protocol
 
 from config import faults as plan
 
 DELAY_S, LATE_S = 1e-3, 0.05
 """By how much an answer is slow where the file does not say: late is past any time-out."""
-_ID_AT = 4
 
 
 class Noise:
-    """The noise faults of a plan; ``chance`` draws and wrong bits come from one seeded source."""
+    """The noise faults of a plan; ``chance`` draws and wrong bits come from one seeded source.
 
-    def __init__(self, source: random.Random, start_s: float) -> None:
+    ``speakers`` says who has written an answer.
+    """
+
+    def __init__(
+        self, source: random.Random, start_s: float, speakers: Callable[[bytes], Collection[int]]
+    ) -> None:
         self._random = source
         self._start_s = start_s
+        self._speakers = speakers
         self._faults: list[plan.Noise] = []
         self.counts: dict[str, int] = {}
         """Packets changed so far, by kind."""
@@ -51,7 +58,7 @@ class Noise:
             return False
         if fault.for_s is not None and since_s >= fault.for_s:
             return False
-        if fault.ids and (len(data) <= _ID_AT or data[_ID_AT] not in fault.ids):
+        if fault.ids and not set(fault.ids).intersection(self._speakers(data)):
             return False
         return fault.chance >= 1.0 or self._random.random() < fault.chance
 
@@ -68,3 +75,13 @@ class Noise:
         if fault.kind in ("delay", "late"):
             slow_s += fault.by_s or (DELAY_S if fault.kind == "delay" else LATE_S)
         return [(slow_s, data)]
+
+
+class Script(Protocol):
+    """What a fault file does to packets and to the host."""
+
+    noise: Noise
+
+    def host_wakes_s(self, now_s: float) -> float:
+        """When a host that wants to go on at ``now_s`` does."""
+        ...

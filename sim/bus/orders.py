@@ -27,7 +27,6 @@ class Orders:
         goals = [self.bank.register(name) for name in GOALS if name in self.bank]
         self._goals = range(min(g.address for g in goals), max(g.address + g.size for g in goals))
         self._work: dict[int, Callable[[int, bytes], int]] = {
-            Instruction.REG_WRITE: self._register_write,
             Instruction.ACTION: self._action,
             Instruction.REBOOT: self._reboot,
             Instruction.FACTORY_RESET: self._factory_reset,
@@ -41,6 +40,10 @@ class Orders:
             if len(params) < 3:
                 return ResultError.DATA_LENGTH
             return self.write(row, word(params, 0), params[2:], ram_only=ram_only)
+        if code == Instruction.REG_WRITE:
+            if len(params) < 3:
+                return ResultError.DATA_LENGTH
+            return self.bank.register_write(row, word(params, 0), params[2:], ram_only=ram_only)
         work = self._work.get(code)
         if ram_only and code in (Instruction.FACTORY_RESET, Instruction.CONTROL_TABLE_BACKUP):
             return ResultError.ACCESS
@@ -53,13 +56,11 @@ class Orders:
             self.firmware.wake(np.array([row]))
         return error
 
-    def _register_write(self, row: int, params: bytes) -> int:
-        if len(params) < 3:
-            return ResultError.DATA_LENGTH
-        return self.bank.register_write(row, word(params, 0), params[2:])
-
     def _action(self, row: int, params: bytes) -> int:
-        return self.bank.action(row) if not params else ResultError.DATA_LENGTH
+        if params:
+            return ResultError.DATA_LENGTH
+        kept = self.bank.registered(row)
+        return self.write(row, *kept) if kept is not None else ResultError.INSTRUCTION
 
     def _reboot(self, row: int, params: bytes) -> int:
         self.firmware.reboot(row)

@@ -5,15 +5,17 @@ off until a reboot (e-manual, Shutdown).
 """
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.bus.bank import ServoBank
-from sim.bus.jam import Jam
+from sim.bus.effort import Effort
 from sim.bus.kernel import add_loss, count_blocked, drawn, out_of_range, warm_up
 from sim.bus.motor import MotorModel
+from sim.bus.supply import Supply
 from sim.plant import Plant, ServoDrive
 
 Floats = NDArray[np.float64]
@@ -27,6 +29,16 @@ OVERLOAD_S = 1.0
 VOLTAGE_ERROR, OVERHEATING_ERROR, OVERLOAD_ERROR = 0x01, 0x04, 0x20
 ENCODER_ERROR, SHOCK_ERROR = 0x08, 0x10
 """Bits of Hardware Error Status(70) and Shutdown(63)."""
+ALARMS: Mapping[str, int] = {
+    "overload": OVERLOAD_ERROR,
+    "overheating": OVERHEATING_ERROR,
+    "voltage": VOLTAGE_ERROR,
+    "encoder": ENCODER_ERROR,
+    "shock": SHOCK_ERROR,
+}
+"""By the words of a fault file."""
+ALARMS_330: Mapping[str, int] = {kind: bit for kind, bit in ALARMS.items() if kind != "encoder"}
+"""Bit 3 of the 330 models is not used (e-manual, XL330, Shutdown)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +60,15 @@ class Protection:
         drive: ServoDrive,
         motor: MotorModel,
         around: Surroundings,
-        jam: Jam,
+        effort: Effort,
     ) -> None:
         self._bank, self._drive, self._motor, self._around = bank, drive, motor, around
-        self._jam = jam
+        self._effort = effort
+        self._supply = Supply(len(bank), around.supply_v)
         self.temperature_c = np.full(len(bank), around.ambient_c)
         """(S,) at the sensor: first order in the winding's loss."""
+        self.full = np.ones(len(bank))
+        """(S,) output beyond which a motor cannot go, fraction of the supply."""
         self._ohm = motor.resistance_ohm
         self._heat_j = np.zeros(len(bank))
         self._blocked_s = np.zeros(len(bank))
@@ -62,14 +77,14 @@ class Protection:
         share = 1.0 - math.exp(-SLICE_S / motor.thermal_time_s)
         self._thermal = np.array([around.ambient_c, motor.winding_k_per_w, share])
 
-    @property
-    def supply_v(self) -> float:
-        """Voltage of the supply, before the cable."""
-        return self._around.supply_v
+    def alarms(self, row: int) -> Mapping[str, int]:
+        """What a servo can detect."""
+        del row
+        return ALARMS_330 if "PWM Slope" in self._bank else ALARMS
 
-    def supply(self, volts: float) -> None:
-        """Change the supply."""
-        self._around = replace(self._around, supply_v=volts)
+    def supply(self, volts: float | None, rows: NDArray[np.intp] | None = None) -> None:
+        """Change the supply of all, or of ``rows``; None: as it was."""
+        self._supply.change(volts, rows)
 
     def heat(self, rows: NDArray[np.intp], celsius: float) -> None:
         """Set housings to a temperature."""
@@ -85,31 +100,33 @@ class Protection:
 
     def pass_time(self, seconds: float) -> None:
         """Add up the windings' loss at the present currents."""
-        add_loss(self._heat_j, self._jam.current_a(), seconds * self._ohm)
+        add_loss(self._heat_j, self._effort.current_a(), seconds * self._ohm)
 
     def look(self, plant: Plant) -> bool:
         """Judge one slice of ``SLICE_S``; whether registers have changed."""
         self._warm_up()
-        volts = self._sag()
         drive = self._drive
+        pwm = self._effort.pwm(plant.velocity_rad_s)
+        volts = self._sag(pwm)
+        apart = self._supply.apart
         longest_s = count_blocked(
             self._blocked_s,
             SLICE_S,
-            self._jam.pwm(),
-            drive.pwm_limit,
+            pwm,
+            self.full,
             drive.torque_on,
             plant.velocity_rad_s,
             0.05 * self._motor.no_load_rad_s,
         )
         low, high, hottest = self._limits
-        tenths = round(volts * 10.0)
-        wrong = out_of_range(self.temperature_c, hottest, tenths, low, high)
-        if longest_s < OVERLOAD_S and not wrong:  # starved is outside, too
+        wrong = out_of_range(self.temperature_c, hottest, round(volts * 10.0), low, high)
+        if longest_s < OVERLOAD_S and not (wrong or apart):  # starved is outside, too
             return False
+        tenths = np.rint(drive.supply_v * 10.0)
         outside = (tenths < low) | (tenths > high)
         hot = np.rint(self.temperature_c) > hottest
         overload = self._blocked_s >= OVERLOAD_S
-        starved = (volts < STARVED * low * 0.1) & (drive.torque_on > 0)
+        starved = (drive.supply_v < STARVED * low * 0.1) & (drive.torque_on > 0)
         self._note(
             VOLTAGE_ERROR * outside
             | OVERHEATING_ERROR * hot
@@ -127,10 +144,13 @@ class Protection:
         self._thermal[0] = self._around.ambient_c
         warm_up(self.temperature_c, self._heat_j, SLICE_S, self._thermal)
 
-    def _sag(self) -> float:
+    def _sag(self, pwm: Floats) -> float:
         drive = self._drive
-        servos_a = float(drawn(drive.pwm, drive.current_a))
+        servos_a = float(drawn(pwm, self._effort.current_a()))
         drawn_a = servos_a + self._motor.standby_a * len(self._bank)
-        volts = self._around.supply_v - self._around.supply_ohm * drawn_a
+        drop_v = self._around.supply_ohm * drawn_a
+        volts = self._supply.volts - drop_v
         drive.supply_v[:] = volts
+        if self._supply.apart:
+            self._supply.feed(drive.supply_v, drop_v)
         return volts

@@ -6,14 +6,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import InputError
 from config.faults import FaultPlan
 from config.loader import load
 from drivers.clock import WallClock
 from sim.bus.bench_line import bench_line
 from sim.bus.chain_spec import parse_chain
 from sim.bus.fault_player import FaultPlayer
-from sim.bus.line import SimLine
 from sim.bus.pty import PtyServer
 
 
@@ -28,10 +26,7 @@ class ServoBus:
         faults: str | Path | FaultPlan | None = None,
         start_rad: float = 0.0,
     ) -> None:
-        line = bench_line(parse_chain(servos), baud, start_rad)
-        if not isinstance(line, SimLine):
-            raise InputError(f"{servos}: registers by name are for servos of Protocol 2.0")
-        self.line = line
+        self.line = bench_line(parse_chain(servos), baud, start_rad)
         """The bus as a port in simulated time."""
         if faults is not None:
             plan = faults if isinstance(faults, FaultPlan) else load(Path(faults), FaultPlan)
@@ -51,12 +46,11 @@ class ServoBus:
             self._thread.start()
         return self._server.path
 
-    def __getitem__(self, register: str) -> NDArray[np.signedinteger]:
+    def __getitem__(self, register: str) -> NDArray[np.integer]:
         """(S,) values of a register, in the order of the IDs; a copy, as fresh as a read is."""
         if self._server is None:
             self.line.settle()
-        self.line.firmware.refresh()
-        return self.line.bank[register].copy()
+        return self.line.shown(register)
 
     def close(self) -> None:
         """Stop serving; safe to call twice."""

@@ -5,9 +5,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.bus.ax12 import CELLS, Ax12Servos
+from sim.bus.ax12 import Ax12Servos
+from sim.bus.ax12_table import CELLS
 from sim.bus.bank import ServoBank
 from sim.bus.decode import Decoder, Line
+from sim.bus.decode1 import Decoder1
 from sim.bus.line import SimLine
 from sim.bus.mixed_bank import MixedBank
 
@@ -19,7 +21,7 @@ SHOWN = 8
 class Traffic:
     """A ``Tap`` that counts and remembers; ``registers`` reads those worth looking at."""
 
-    def __init__(self, look: Callable[[], Rows], decoder: Decoder | None) -> None:
+    def __init__(self, look: Callable[[], Rows], decoder: Decoder | Decoder1) -> None:
         self.registers = look
         self._decoder = decoder
         self.questions = self.answers = self.bytes = 0
@@ -30,11 +32,7 @@ class Traffic:
         self.questions += from_host
         self.answers += not from_host
         self.bytes += len(data)
-        if self._decoder is not None:
-            self.recent.extend(self._decoder.feed(time_s, data))
-            return
-        kind, who = "question" if from_host else "answer", data[2] if len(data) > 2 else -1
-        self.recent.append(Line(time_s, kind, who, "", {}, data.hex(" ")))
+        self.recent.extend(self._decoder.feed(time_s, data))
 
 
 def look_at(line: SimLine) -> Rows:
@@ -82,6 +80,10 @@ def look_at_ax12(servos: Ax12Servos) -> Rows:
         seen: dict[str, object] = {
             name.lower().removeprefix("present "): int(servos[name][row]) for name in shown
         }
-        alarms = {"torque": int(servos["Torque Enable"][row]), "error": int(servos.errors[row])}
-        rows.append(seen | alarms | {"power": True})
+        alarms = {
+            "torque": int(servos["Torque Enable"][row]),
+            "error": int(servos.protection.shown[row]),
+            "power": bool(servos.powered[row]),
+        }
+        rows.append(seen | alarms)
     return rows

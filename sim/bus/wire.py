@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Sequence
 from drivers.errors import PortError
 from sim.bus.arrivals import Arrivals
 from sim.bus.clock import SimClock
+from sim.bus.noise import Script
 from sim.bus.service import BITS_PER_BYTE, Answer
 
 LATENCY_S = 0.016
@@ -44,6 +45,7 @@ class Wire(ABC):
         """By how much the host's adapter hands on bytes later than they are on the wire."""
         self.taps: list[Tap] = []
         """Told of every packet on the wire: time of its end, from the host or not, bytes."""
+        self._script: Script | None = None
         self._gone = False
         self.is_using = False
         self.is_open = True
@@ -78,14 +80,23 @@ class Wire(ABC):
     def _frames(self, data: bytes) -> Sequence[bytes]:
         """Cut what is sent at once into packets, each of which counts when its own end arrives."""
 
-    def _fate(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
-        """What becomes of one answer that begins at ``now_s``, and by how much it is slow."""
-        del now_s
-        return [(0.0, data)]
+    # what goes wrong on it
 
-    def _host_wakes_s(self, now_s: float) -> float:
-        """When a host that wants to use the port at ``now_s`` does."""
-        return now_s
+    def attach(self, script: Script) -> None:
+        """Let a fault file act on this line."""
+        self._script = script
+
+    def _heard(self, data: bytes, now_s: float) -> Sequence[bytes]:
+        """What the servos hear of one packet that ends at ``now_s``."""
+        if self._script is None or not self._script.noise.any:
+            return (data,)
+        return self._script.noise.question(data, now_s)
+
+    def _fate(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:
+        """What becomes of one answer that begins at ``now_s``, and by how much it is slow."""
+        if self._script is None or not self._script.noise.any:
+            return ((0.0, data),)
+        return self._script.noise.answer(data, now_s)
 
     # the byte port
 
@@ -212,10 +223,15 @@ class Wire(ABC):
 
     def _wake_host(self) -> None:
         """Let a host go on that wants to use the port, when and if it can."""
-        self.clock.sleep_until_s(self._host_wakes_s(self.clock.now_s()))
-        self._must_be_open()
+        if self._script is not None:
+            self.clock.sleep_until_s(self._script.host_wakes_s(self.clock.now_s()))
+            self._must_be_open()
+        elif not self.is_open:
+            self._must_be_open()
 
     def _must_be_open(self) -> None:
+        if self._script is not None:
+            self.settle()
         if self._gone:
             raise PortError(f"{self.name}: the port has vanished")
         if not self.is_open:

@@ -65,3 +65,13 @@ def rad(ticks: int) -> float:
 
 def group_params(address: int, length: int, ids: Iterator[int] | range) -> bytes:
     return address.to_bytes(2, "little") + length.to_bytes(2, "little") + bytes(ids)
+
+
+def goals(ticks: dict[int, int]) -> bytes:
+    """A sync write of goal positions."""
+    entries = b"".join(
+        bytes((servo,)) + tick.to_bytes(4, "little", signed=True) for servo, tick in ticks.items()
+    )
+    return encode_instruction(
+        InstructionPacket(ALL, Instruction.SYNC_WRITE, b"\x74\0\4\0" + entries)
+    )

@@ -41,7 +41,7 @@ def wait(line: Ax12Line, seconds: float) -> None:
 def test_worked_packets(sent: str, answered: str) -> None:
     """E-manual, Protocol 1.0, examples of ping, read, write and reg write."""
     line = a_line(1)
-    line.servos._celsius[:] = 32.0
+    line.servos.protection.temperature_c[:] = 32.0
     assert exchange(line, sent) == answered
 
 
@@ -88,6 +88,26 @@ def test_wheel_mode_turns_both_ways() -> None:
         assert bool(shown & 0x400) == (sign < 0)
 
 
+def test_after_wheel_mode_a_joint_goes_the_short_way() -> None:
+    """The sensor knows no turns."""
+    line = a_line(1, dry_n_m=0.0)
+    ph = sdk.PacketHandler(1.0)
+    for address, value in ((8, 0), (32, 800)):
+        assert ph.write2ByteTxRx(line, 1, address, value) == OK
+    assert ph.write1ByteTxRx(line, 1, 24, 1) == OK
+    wait(line, 3.0)
+    turned_rad = float(line.servos.plant.position_rad[0])
+    assert turned_rad > 2 * math.tau
+    assert ph.write1ByteTxRx(line, 1, 24, 0) == OK
+    for address, value in ((8, 1023), (32, 0), (30, 512)):
+        assert ph.write2ByteTxRx(line, 1, address, value) == OK
+    wait(line, 2.0)
+    assert ph.read2ByteTxRx(line, 1, 36)[0] == pytest.approx(512, abs=3)
+    turns = float(line.servos.plant.position_rad[0]) / math.tau
+    assert turns == pytest.approx(round(turns), abs=0.01)
+    assert round(turns) >= 2
+
+
 @pytest.mark.parametrize(
     ("address", "value", "size", "error"),
     [
@@ -111,6 +131,7 @@ def test_lock_checksum_and_baud() -> None:
     ph = sdk.PacketHandler(1.0)
     assert ph.write1ByteTxRx(line, 1, 47, 1) == OK
     assert ph.write1ByteTxRx(line, 1, 11, 60) == (0, Error1.INSTRUCTION)
+    assert ph.write1ByteTxRx(line, 1, 47, 0) == (0, Error1.RANGE)  # until the power goes
     assert exchange(line, "FF FF 01 02 01 FA") == "FF FF 01 02 10 EC"
     line.setBaudRate(115_200)
     assert exchange(line, "FF FF 01 02 01 FB") == ""
@@ -126,6 +147,8 @@ def test_action_and_unknown_instructions() -> None:
     exchange(line, "FF FF FE 02 05 FA")
     assert line.servos["Goal Position"][0] == 500
     assert exchange(line, "FF FF 01 02 92 6A") == "FF FF 01 02 40 BC"  # no bulk read in an AX
+    assert exchange(line, "FF FF 01 05 04 1E 00 05 D2") == "FF FF 01 02 08 F4"  # 1280: no goal
+    assert line.servos["Registered"][0] == 0
 
 
 def test_a_held_shaft_trips_the_overload() -> None:
@@ -135,6 +158,26 @@ def test_a_held_shaft_trips_the_overload() -> None:
     wait(line, 1.5)
     assert ph.ping(line, 1)[2] == Error1.OVERLOAD
     assert line.servos["Torque Enable"][0] == 0
+
+
+@pytest.mark.parametrize(("level", "answers"), [(0, (1, 0, 0)), (1, (1, 1, 0)), (2, (1, 1, 1))])
+def test_status_return_level(level: int, answers: tuple[int, int, int]) -> None:
+    line = a_line(1)
+    line.servos["Status Return Level"][:] = level
+    asked = ("FF FF 01 02 01 FB", "FF FF 01 04 02 2B 01 CC", "FF FF 01 04 03 19 01 DD")
+    assert tuple(int(bool(exchange(line, text))) for text in asked) == answers
+    assert line.servos["LED"][0] == 1
+
+
+def test_factory_reset_gives_the_manuals_initial_values() -> None:
+    line = a_line(7)
+    ph = sdk.PacketHandler(1.0)
+    for address, value in ((11, 50), (18, 1), (16, 2)):
+        assert ph.write1ByteTxRx(line, 7, address, value) == OK
+    assert ph.factoryReset(line, 7) == OK
+    manual = {3: 1, 4: 1, 5: 250, 11: 70, 12: 60, 13: 140, 16: 2, 17: 36, 18: 36, 24: 0, 28: 32}
+    for address, value in manual.items():
+        assert ph.read1ByteTxRx(line, 1, address) == (value, *OK)
 
 
 def test_wrong_ids_are_refused() -> None:

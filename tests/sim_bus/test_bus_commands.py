@@ -155,3 +155,17 @@ def test_serve_speaks_protocol_1_for_an_ax12() -> None:
         process.send_signal(signal.SIGTERM)
         out, _ = process.communicate()
     assert json.loads(out)["answers"] == 2  # the SDK reads the model number, too
+
+
+def test_the_fixture_takes_servos_of_protocol_1(
+    servo_bus: Callable[..., ServoBus], tmp_path: Path
+) -> None:
+    path = tmp_path / "faults.toml"
+    path.write_text(fault("mute", ids=[2]))
+    bus = servo_bus("1-3:AX-12A", faults=path, start_rad=0.5)
+    handler = sdk.PacketHandler(1.0)
+    bus.line.clock.advance(0.01)
+    assert handler.write1ByteTxRx(bus.line, 1, 25, 1) == (0, 0)
+    assert handler.ping(bus.line, 2)[1] == sdk.COMM_RX_TIMEOUT
+    assert bus["LED"].tolist() == [1, 0, 0]
+    assert (bus["Present Position"] > 600).all()

@@ -83,7 +83,7 @@ def sniff(
     ],
     baud: Annotated[int, typer.Option(help="of the device, bit/s")] = 1_000_000,
     model: Annotated[
-        str, typer.Option(help="model of servos that no ping has told about")
+        str, typer.Option(help="of servos that no ping has told about; AX-12A: Protocol 1.0")
     ] = "XM430-W350",
     through: Annotated[
         bool, typer.Option("--through", help="stand between a client and the device")
@@ -93,12 +93,14 @@ def sniff(
 ) -> None:
     """Decode a live or recorded exchange packet by packet."""
     from controller.app.sniffing import listen, stand_between  # noqa: PLC0415  --help stays quick
+    from sim.bus.ax12_table import MODEL as AX12  # noqa: PLC0415
     from sim.bus.decode import Decoder  # noqa: PLC0415
+    from sim.bus.decode1 import Decoder1  # noqa: PLC0415
     from sim.bus.trace import read_trace  # noqa: PLC0415
 
     if not source.exists():
         raise InputError(f"{source}: no such file or device")
-    decoder = Decoder(model)
+    decoder = Decoder1() if model.upper() == AX12 else Decoder(model)
     live = source.is_char_device()
     if through and not live:
         raise InputError(f"{source}: --through needs a serial device")
@@ -126,6 +128,7 @@ def _simulated(
     from sim.bus.bench_line import bench_line  # noqa: PLC0415
     from sim.bus.chain_spec import ChainSpec, parse_chain  # noqa: PLC0415
     from sim.bus.decode import Decoder  # noqa: PLC0415
+    from sim.bus.decode1 import Decoder1  # noqa: PLC0415
     from sim.bus.fault_player import FaultPlayer  # noqa: PLC0415
     from sim.bus.traffic import Traffic, look_at, look_at_ax12  # noqa: PLC0415
 
@@ -135,14 +138,10 @@ def _simulated(
     else:
         line = _robot_line(robot, baud)
         spec = ChainSpec(line.bank.ids, (line.bank.model,) * len(line.bank))
-    if isinstance(line, Ax12Line):
-        if faults is not None:
-            raise InputError(
-                f"{faults}: fault files are for servos of Protocol 2.0, not {spec.model}"
-            )
-        return spec, line, Traffic(lambda: look_at_ax12(line.servos), None)
     if faults is not None:
         FaultPlayer(line, load(faults, FaultPlan), str(faults))
+    if isinstance(line, Ax12Line):
+        return spec, line, Traffic(lambda: look_at_ax12(line.servos), Decoder1())
     models = dict(zip(spec.ids, spec.models, strict=True))
     return spec, line, Traffic(lambda: look_at(line), Decoder(spec.kinds[0], models))
 
