@@ -11,7 +11,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from controller.app.body_map import body_map, check_picture
+from controller.app.body_map import body_map
+from controller.app.picture_file import check_picture
 from controller.app.recording_picture import midlines
 from controller.app.report.figures.style import AMBER, BLUE, FAINT, GREEN, GREY, INK, style
 from controller.capture.analysis import Analysis

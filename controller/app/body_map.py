@@ -1,30 +1,15 @@
 """A quantity along the body over time as a map: time to the right, head at the top."""
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from config.errors import InputError
 from controller.app.report.figures.style import ANGLES, FAINT, GREY
 from controller.capture.track import Track
 
 Floats = NDArray[np.float64]
-ENDINGS = (".png", ".svg", ".pdf")
 _COLUMNS = 330  # more cannot be seen
-
-
-def check_picture(file: Path) -> None:
-    """Refuse a name that is no picture's.
-
-    Raises:
-        InputError: an ending that matplotlib is not asked to write.
-
-    """
-    if file.suffix.lower() not in ENDINGS:
-        raise InputError(f"{file}: a picture ends in {', '.join(ENDINGS)}")
 
 
 def body_map(

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from controller.app.body_map import check_picture
+from controller.app.picture_file import check_picture
 from controller.app.report.figures.style import AMBER, BLUE, INK, RED, style
 from controller.capture.body_model import BodyModel
 from controller.capture.mesh import Mesh

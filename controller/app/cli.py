@@ -13,8 +13,9 @@ from controller.app.commands.bus_set import bus_set
 from controller.app.commands.capture import capture
 from controller.app.commands.doctor import doctor
 from controller.app.commands.fish import film, match, synthesise
-from controller.app.commands.gait import list_gaits, run_gait, show_gait
+from controller.app.commands.gait import list_gaits, show_gait
 from controller.app.commands.gait_fit import fit_gait
+from controller.app.commands.gait_run import run_gait
 from controller.app.commands.listing import list_
 from controller.app.commands.plan import plan
 from controller.app.commands.play import play

@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from controller.app.body_map import check_picture
 from controller.app.fish_synthesis import Made, Wanted
+from controller.app.picture_file import check_picture
 from controller.app.report.figures.style import BLUE, FAINT, GREEN, GREY, INK, RED, style
 from controller.capture.fish.synthesis import junctions
 

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from controller.app.body_map import check_picture
+from controller.app.picture_file import check_picture
 from controller.app.report.figures.style import AMBER, BLUE, GREEN, INK, PURPLE, RED, SKY, style
 from controller.capture.fish.match_film import Matched
 from controller.capture.fish.postures import Postures

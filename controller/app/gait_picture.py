@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import InputError
 from config.robot import RobotConfig
 from controller.gaits.gait import Gait
 from controller.motion.frames import Frame, virtual_chassis
@@ -14,22 +13,6 @@ from drivers.types import BodyPose
 
 Floats = NDArray[np.float64]
 PHASES = 6
-SUFFIXES = (".png", ".svg", ".pdf")
-
-
-def check_picture(path: Path) -> None:
-    """Refuse a file that cannot be drawn.
-
-    Raises:
-        InputError: another ending, or matplotlib is missing.
-
-    """
-    from importlib.util import find_spec  # noqa: PLC0415
-
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: a picture ends in {', '.join(SUFFIXES)}")
-    if find_spec("matplotlib") is None:
-        raise InputError("pictures need matplotlib: pip install 'snakewalk[view]'")
 
 
 def bodies_m(gait: Gait, robot: RobotConfig, phases: int = PHASES) -> Floats:

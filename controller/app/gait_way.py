@@ -6,8 +6,9 @@ import numpy as np
 
 from config.errors import InputError
 from controller.gaits.registry import make_gait
+from controller.motion.coming_to_rest import STOP_S
 from controller.motion.frames import Frame, virtual_chassis
-from controller.motion.gait_motion import STOP_S, Cycle
+from controller.motion.gait_cycle import Cycle
 from drivers.telemetry.record import RunRecord
 
 SKIPPED_S = 1.5

@@ -9,8 +9,8 @@ from config.robot import RobotConfig
 from config.run import RunConfig
 from config.world import WorldConfig
 from controller.app.prepare import Prepared
-from controller.app.prepare_gait import PreparedGait
 from controller.app.prepare_playback import PreparedPlayback
+from controller.app.prepared_gait import PreparedGait
 from controller.runtime.guide import Guide
 from drivers.telemetry.record import Laid, PlanSummary
 

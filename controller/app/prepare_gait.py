@@ -1,110 +1,20 @@
-"""From a gait's name and parameters to a job: robot with stiff pitch joints, gait, start."""
+"""From a gait's name and parameters to a job: a robot set up for it, changes of gait, checks."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Sequence
 from typing import Any, Literal
 
-import numpy as np
-
 from config.errors import InputError
-from config.gait import GaitConfig, GaitSetConfig
-from config.ground import build_ground
-from config.heightfield import HeightField
+from config.gait import GaitSetConfig
 from config.loader import checked, load_gait, load_robot, load_world, shipped
 from config.robot import RobotConfig
 from config.run import RunConfig
-from config.world import WorldConfig
+from controller.app.prepared_gait import Live, PreparedGait
 from controller.gaits.gait import Gait
 from controller.gaits.registry import GAITS, make_gait
-from controller.motion.cpg_motion import CpgMotion
-from controller.motion.gait_motion import Cycle, GaitMotion
-from controller.motion.gait_sequence import GaitSequence
-from controller.motion.head_steering import HeadSteering, Look
-from controller.motion.source import MotionSource
-from controller.runtime.forecast import mean_heading_rad
-from controller.runtime.guide import Guide, SourceGuide
 from drivers.budget import wire_budget
-from drivers.telemetry.record import Laid, PlanSummary
 
 GAIT_PITCH_CURRENT_A = 1.5
 """Goal current of the pitch joints in a gait that lifts: soft ones would not carry the links."""
-
-Live = Callable[[GaitMotion, RobotConfig, Callable[[str, str], None]], MotionSource]
-"""Puts a live operator between a gait and the servos."""
-
-
-@dataclass(frozen=True)
-class PreparedGait:
-    """A gait run: everything that is known before a servo moves."""
-
-    run: RunConfig
-    robot: RobotConfig
-    world: WorldConfig
-    live: Live | None = None
-    gain: float = field(default=float("nan"), init=False)
-
-    @property
-    def config(self) -> GaitConfig:
-        """The run's table ``gait``."""
-        if self.run.gait is None:
-            raise InputError(f"run {self.run.name}: has no table [gait]")
-        return self.run.gait
-
-    @cached_property
-    def gait(self) -> Gait:
-        """With its parameters."""
-        return make_gait(self.config.name, self.config.parameters, f"gait {self.config.name}")
-
-    @cached_property
-    def later(self) -> list[tuple[float, Gait]]:
-        """What it changes to, and when."""
-        return [(c.at_s, make_gait(c.name, c.parameters)) for c in self.config.then]
-
-    @cached_property
-    def ground(self) -> HeightField | None:
-        """The world's height field; None on a flat floor."""
-        return build_ground(self.world)
-
-    @property
-    def start_heading_rad(self) -> float:
-        """Mean heading of the body at the start."""
-        return self.run.start_heading_rad or 0.0
-
-    def laid(self) -> Laid:
-        """In the shape that the gait begins with; the first joint angles are held meanwhile."""
-        joints = Cycle(self.gait, self.robot).goal_rad()
-        return Laid(self.start_heading_rad - mean_heading_rad(self.robot, joints), joints)
-
-    def judged(self) -> PlanSummary:
-        """A gait is checked against the joints' range; its speed is kept within limits live."""
-        for gait in (self.gait, *(gait for _, gait in self.later)):
-            gait.check(self.robot)
-        start = np.array([self.run.start_m, self.run.start_m], dtype=float)
-        return PlanSummary(start, np.zeros((0, 2)), self.run.waypoint_radius_m)
-
-    def motion(self, say: Callable[[str, str], None]) -> MotionSource:
-        """Return a fresh motion source: gait, live operator and head steering, as asked."""
-        gait = GaitMotion(self.gait, self.robot, duration_s=self.config.duration_s)
-        asked_hz = self.gait.params.frequency_hz
-        if gait.frequency_hz < asked_hz - 1e-9:
-            say("limit", f"{asked_hz:g} Hz is too fast for the joints: {gait.frequency_hz:.2f} Hz")
-        source: MotionSource = gait
-        if self.live is not None:
-            source = self.live(gait, self.robot, say)
-        elif self.config.by == "cpg":
-            source = CpgMotion(self.robot, Cycle(self.gait, self.robot).goal_rad())
-            source.schedule([(0.0, self.gait), *self.later, (self.config.duration_s, None)])
-        elif self.later:
-            source = GaitSequence(gait, self.later)
-        look = Look(self.config.look_heading_rad, self.config.look_at_m)
-        if look == Look():
-            return source
-        return HeadSteering(source, self.robot, look)
-
-    def guide(self, say: Callable[[str, str], None]) -> Guide:
-        """Return a fresh guide of the motion."""
-        return SourceGuide(self.motion(say))
 
 
 def prepare_gait(

@@ -1,29 +1,20 @@
 """From a recording to a job that plays it in time on a robot."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from config.errors import InputError
-from config.ground import build_ground
-from config.heightfield import HeightField
 from config.loader import checked, load_robot, load_world
 from config.playback import PlaybackConfig
-from config.robot import RobotConfig
 from config.run import RunConfig
-from config.world import WorldConfig
-from controller.capture.load import load_track
-from controller.capture.slowing import CUT_CYCLES
-from controller.capture.wave import measure_wave
+from controller.app.prepared_motion import PreparedMotion
+from controller.app.recorded_joints import recorded_joints
 from controller.motion.recorded import Recorded
-from controller.motion.retarget import Retarget
-from controller.runtime.forecast import mean_heading_rad
 from controller.runtime.guide import Guide, SourceGuide
 from drivers.budget import wire_budget
 from drivers.telemetry.record import Laid, PlanSummary
@@ -32,18 +23,8 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class PreparedPlayback:
-    """A recording to be played: everything that is known before a servo moves."""
-
-    run: RunConfig
-    robot: RobotConfig
-    world: WorldConfig
-    gain: float = field(default=float("nan"), init=False)
-
-    @cached_property
-    def ground(self) -> HeightField | None:
-        """The world's height field; None on a flat floor."""
-        return build_ground(self.world)
+class PreparedPlayback(PreparedMotion):
+    """A recording to be played."""
 
     @cached_property
     def motion(self) -> tuple[Floats, Floats]:
@@ -67,21 +48,14 @@ class PreparedPlayback:
         """Of the playing."""
         return float(self.motion[0][-1]) / self.speed
 
-    @property
-    def start_heading_rad(self) -> float:
-        """Mean heading of the body at the start."""
-        return self.run.start_heading_rad or 0.0
-
     def laid(self) -> Laid:
         """In the first shape of the recording."""
-        joints = self.motion[1][0]
-        return Laid(self.start_heading_rad - mean_heading_rad(self.robot, joints), joints)
+        return self._laid_in(self.motion[1][0])
 
     def judged(self) -> PlanSummary:
         """Range, speed and acceleration of every joint over the whole recording."""
         self._fresh(self.speed)
-        start = np.array([self.run.start_m, self.run.start_m], dtype=float)
-        return PlanSummary(start, np.zeros((0, 2)), self.run.waypoint_radius_m)
+        return self._no_path()
 
     def guide(self, say: Callable[[str, str], None]) -> Guide:
         """Return a fresh guide of the motion."""
@@ -92,49 +66,6 @@ class PreparedPlayback:
     def _fresh(self, speed: float) -> Recorded:
         time_s, joints = self.motion
         return Recorded(self.robot, time_s / speed, joints)
-
-
-def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
-    """Read times (T,) and joint angles (T, J): of the file itself, or of its midlines.
-
-    Midlines shake from frame to frame; their joints are smoothed, well above the wave's frequency.
-
-    Raises:
-        InputError: no such recording, or made for another robot.
-
-    """
-    made = _made_joints(track, robot)
-    if made is not None:
-        return made
-    recording = load_track(track)
-    if recording.frames < 2:
-        raise InputError(f"{track}: one frame is no motion")
-    joints = Retarget(robot).joints_rad(recording.angles_rad)
-    known_s = recording.time_s - recording.time_s[0]
-    time_s = np.arange(0.0, known_s[-1] + 0.5 / recording.rate_hz, 1.0 / recording.rate_hz)
-    even = np.stack([np.interp(time_s, known_s, column) for column in joints.T], axis=1)
-    wave_hz = measure_wave(recording).frequency_hz
-    if wave_hz > 0.0:
-        width = recording.rate_hz / (2.0 * np.pi * CUT_CYCLES * wave_hz)
-        even = gaussian_filter1d(even, width, axis=0, mode="nearest")
-    return time_s, even
-
-
-def _made_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | None:
-    """Joint angles that a synthesis wrote beside its midlines; None where there are none."""
-    if Path(track).suffix != ".npz" or not Path(track).is_file():
-        return None
-    try:
-        with np.load(track, allow_pickle=False) as data:
-            if "joints_rad" not in data or "rate_hz" not in data or "robot" not in data:
-                return None
-            joints = np.asarray(data["joints_rad"], dtype=float)
-            rate_hz, name = float(data["rate_hz"]), str(data["robot"])
-    except (BadZipFile, ValueError, OSError):
-        return None  # load_track says what is wrong with it
-    if name != robot.name or joints.ndim != 2 or len(joints) < 2:
-        return None
-    return np.arange(len(joints)) / rate_hz, joints
 
 
 def prepare_playback(

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from controller.app.body_map import body_map, check_picture
+from controller.app.body_map import body_map
+from controller.app.picture_file import check_picture
 from controller.app.report.figures.style import style
 from controller.capture.track import Track
 

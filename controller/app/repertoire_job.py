@@ -15,8 +15,9 @@ from config.world import WorldConfig
 from controller.repertoire.follow import Follower
 from controller.repertoire.frame import Frame, body_frame
 from controller.repertoire.motion import RepertoireMotion
+from controller.repertoire.moves import Moves
 from controller.repertoire.repertoire import Repertoire
-from controller.repertoire.search import Moves, Route
+from controller.repertoire.search import Route
 from controller.runtime.body import BodyView, body_in_world
 from controller.runtime.forecast import mean_heading_rad
 from controller.runtime.guide import Guide, SourceGuide
@@ -44,6 +45,11 @@ class RepertoireJob:
     def moves(self) -> Moves:
         """Of the repertoire, for this robot's length."""
         return Moves(self.repertoire, self.robot.length_m / self.repertoire.length_m)
+
+    @property
+    def action_names(self) -> list[str]:
+        """Of the route."""
+        return [self.repertoire.segments[k].name for k in self.route.actions]
 
     @property
     def start_heading_rad(self) -> float:

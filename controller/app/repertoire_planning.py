@@ -11,21 +11,29 @@ from config.robot import RobotConfig
 from config.run import RunConfig
 from config.world import WorldConfig
 from controller.app.repertoire_job import RepertoireJob, laid, laid_frame
+from controller.repertoire.moves import Moves, start_pose
 from controller.repertoire.repertoire import load_repertoire
-from controller.repertoire.search import AIM_SHARE, Moves, Route, search, start_pose
+from controller.repertoire.search import AIM_SHARE, Route, search
 
 FORMAT = "snakewalk-plan-1"
 
 
+def default_file(robot: str, world: str) -> Path:
+    """Name of a repertoire where none is given."""
+    return Path(f"repertoire-{Path(robot).stem}-{Path(world).stem}.npz")
+
+
 def plan_route(
     name: str,
-    repertoire_file: Path,
+    repertoire_file: Path | None = None,
     *,
     robot: str | None = None,
     world: str | None = None,
     beam: int = 400,
 ) -> RepertoireJob:
     """Search the quickest sequence of actions through a run's waypoints.
+
+    ``repertoire_file`` is by default that of the run's robot and world in the working folder.
 
     Raises:
         InputError: no repertoire, of another robot or ground, or no sequence reaches all waypoints.
@@ -39,12 +47,13 @@ def plan_route(
     body, ground = load_robot(run.robot, beside), load_world(run.world, beside)
     if not run.waypoints_m:
         raise InputError(f"run {run.name}: has no waypoints to plan for")
-    repertoire = load_repertoire(repertoire_file)
+    file = repertoire_file or default_file(robot or known.robot, world or known.world)
+    repertoire = load_repertoire(file)
     repertoire.check(body)
     flat(ground)
     if repertoire.world != ground.name:
         raise InputError(
-            f"{repertoire_file}: recorded on world {repertoire.world}; run {run.name} is on "
+            f"{file}: recorded on world {repertoire.world}; run {run.name} is on "
             f"{ground.name}: give --world {repertoire.world}, or record there"
         )
     moves = Moves(repertoire, body.length_m / repertoire.length_m)
@@ -58,7 +67,7 @@ def plan_route(
             f"run {run.name}: no sequence of these actions passes waypoint {route.reached + 1} "
             f"within {run.waypoint_radius_m:g} m; a larger --beam or waypoint_radius_m may help"
         )
-    return RepertoireJob(run, body, ground, repertoire, repertoire_file, route)
+    return RepertoireJob(run, body, ground, repertoire, file, route)
 
 
 def flat(world: WorldConfig) -> None:
@@ -75,13 +84,27 @@ def flat(world: WorldConfig) -> None:
         )
 
 
+def plan_facts(job: RepertoireJob) -> dict[str, object]:
+    """Numbers for a command's answer."""
+    return {
+        "run": job.run.name,
+        "robot": job.robot.name,
+        "world": job.world.name,
+        "repertoire": str(job.repertoire_file),
+        "waypoints": len(job.run.waypoints_m),
+        "waypoints_reached": job.route.reached,
+        "duration_s": round(job.route.duration_s, 2),
+        "candidates": job.route.candidates,
+        "actions": job.action_names,
+    }
+
+
 def save_plan(job: RepertoireJob, path: Path) -> None:
     """Write the plan as JSON; the repertoire stays in its own file."""
-    names = [job.repertoire.segments[k].name for k in job.route.actions]
     about = {
         "format": FORMAT,
         "repertoire": str(job.repertoire_file),
-        "actions": names,
+        "actions": job.action_names,
         "pose": job.route.pose.round(6).tolist(),
         "reached": job.route.reached,
         "duration_s": job.route.duration_s,

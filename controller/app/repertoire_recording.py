@@ -11,7 +11,9 @@ from config.robot import RobotConfig
 from config.world import WorldConfig
 from controller.app.repertoire_physics import FRAME_S, PhysicsBody
 from controller.gaits.registry import make_gait
-from controller.motion.gait_motion import TURN, Cycle, GaitMotion
+from controller.gaits.wave import TURN
+from controller.motion.gait_cycle import Cycle
+from controller.motion.gait_motion import GaitMotion
 from controller.repertoire.repertoire import Repertoire
 from controller.repertoire.segment import Kind, Segment, cut
 

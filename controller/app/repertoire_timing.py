@@ -38,6 +38,15 @@ class SearchCost:
         """Extrapolated: all candidates at the price of those that were run."""
         return self.candidates * self.physics_candidate_s
 
+    def facts(self) -> dict[str, object]:
+        """Numbers for a command's answer."""
+        return {
+            "search_s": round(self.candidates * self.candidate_s, 4),
+            "physics_candidates_run": self.ran,
+            "physics_search_s_extrapolated": round(self.physics_search_s, 1),
+            "times_quicker": round(self.ratio),
+        }
+
 
 def search_cost(
     job: RepertoireJob,

@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from config.errors import InputError
+from controller.app.picture_file import check_picture
 from controller.app.report.figures.style import AMBER, BLUE, GREEN, PURPLE, RED, style
 from controller.shape.study import StudyResult
 
-ENDINGS = (".png", ".svg", ".pdf")
 _COLORS = {
     "snake": BLUE,
     "snake-printed": AMBER,
@@ -22,12 +21,6 @@ _SHOWN = 4.5  # steps over |V|; later dots are left out
 _LEAST = 40.0  # % of the states: below, all curves are one
 
 
-def check_file(file: Path) -> None:
-    """Raise InputError where the name is no picture's."""
-    if file.suffix.lower() not in ENDINGS:
-        raise InputError(f"{file}: a picture ends in {', '.join(ENDINGS)}")
-
-
 def draw(results: Sequence[StudyResult], file: Path) -> None:
     """Write the picture in the format of its ending.
 
@@ -35,7 +28,7 @@ def draw(results: Sequence[StudyResult], file: Path) -> None:
         InputError: an ending that is no picture's.
 
     """
-    check_file(file)
+    check_picture(file)
     graphs = list(dict.fromkeys(result.graph for result in results))
     columns = min(3, len(graphs))
     rows = -(-len(graphs) // columns)

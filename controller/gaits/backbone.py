@@ -14,15 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
-from scipy.spatial import cKDTree
 
-from config.errors import InputError
 from config.robot import RobotConfig
+from controller.gaits.chain import chain_points_m, chain_slopes, rotation_by
+from controller.gaits.space_curve import SAMPLES_A_LINK, SpaceCurve
 
 Floats = NDArray[np.float64]
 
-SAMPLES_A_LINK = 24
 ROUNDS = 40
 STEP_RAD = 0.3
 """The most that an angle moves in a round."""
@@ -68,7 +66,7 @@ def fit_backbone(
         InputError: fewer than four points, a curve shorter than the robot, points on each other.
 
     """
-    curve = _Curve(robot, curve_m)
+    curve = SpaceCurve(robot, curve_m)
     rotation, joints = _seed(robot, curve, roll_rad)
     limit = np.array(robot.limit_rad)
     joints = np.clip(joints, -limit, limit)
@@ -80,7 +78,8 @@ def fit_backbone(
         across = np.eye(3) - along[:, :, None] * along[:, None, :]
         across[0] = np.eye(3)  # the head's tip stays at the curve's beginning
         miss = np.einsum("nij,nj->ni", across, away).ravel()
-        slopes = np.einsum("nij,njk->nik", across, _slopes(points, axes)).reshape(len(miss), -1)
+        slopes = np.einsum("nij,njk->nik", across, chain_slopes(points, axes))
+        slopes = slopes.reshape(len(miss), -1)
         free = np.ones(slopes.shape[1], dtype=bool)
         rows = np.vstack([slopes, STIFF_M_RAD * np.eye(len(free))[6:]])
         change = np.zeros(len(free))
@@ -95,7 +94,7 @@ def fit_backbone(
             free[6:] &= ~beyond
         change *= min(1.0, STEP_RAD / max(float(np.abs(change[3:]).max()), 1e-12))
         tip = tip + change[:3]
-        rotation = _turn(change[3:6]) @ rotation
+        rotation = rotation_by(change[3:6]) @ rotation
         joints = np.clip(joints + change[6:], -limit, limit)
         if np.abs(change).max() < DONE:
             break
@@ -104,36 +103,7 @@ def fit_backbone(
     return BackboneFit(joints, tip, rotation, points, away_m)
 
 
-def chain_points_m(
-    robot: RobotConfig, joint_rad: Floats, head_m: Floats, head_rotation: Floats
-) -> tuple[Floats, Floats]:
-    """(J + 2, 3) head's tip, joints and tail's end, and (J, 3) the joints' axes, in the world.
-
-    An axis is that about which a positive angle turns everything *behind* the joint.
-    """
-    points, axes = [head_m, head_m - robot.link_length_m * head_rotation[:, 0]], []
-    frame = head_rotation
-    for axis, angle in zip(robot.joint_axes, joint_rad, strict=True):
-        about = -frame[:, 2] if axis == "y" else frame[:, 1]
-        frame = _turn(angle * about) @ frame
-        axes.append(about)
-        points.append(points[-1] - robot.link_length_m * frame[:, 0])
-    return np.array(points), np.array(axes)
-
-
-def _slopes(points: Floats, axes: Floats) -> Floats:
-    """(J + 2, 3, 6 + J) how the points move with the head's tip, its turn, and each joint."""
-    count = len(points)
-    out = np.zeros((count, 3, 6 + len(axes)))
-    out[:, :, :3] = np.eye(3)
-    out[:, :, 3:6] = np.cross(np.eye(3)[None], (points - points[0])[:, None]).transpose(0, 2, 1)
-    for j, axis in enumerate(axes):
-        behind = slice(j + 2, count)
-        out[behind, :, 6 + j] = np.cross(axis, points[behind] - points[j + 1])
-    return out
-
-
-def _seed(robot: RobotConfig, curve: "_Curve", roll_rad: float) -> tuple[Floats, Floats]:
+def _seed(robot: RobotConfig, curve: SpaceCurve, roll_rad: float) -> tuple[Floats, Floats]:
     """Rotation of the head and bends of the joints, from the curve's bends in its own frame."""
     forward = -curve.tangents
     up = np.array([0.0, 0.0, 1.0])
@@ -165,52 +135,3 @@ def _seed(robot: RobotConfig, curve: "_Curve", roll_rad: float) -> tuple[Floats,
     top = first - (first @ start) * start
     top /= np.linalg.norm(top)
     return np.stack([start, np.cross(top, start), top], axis=1), joints
-
-
-class _Curve:
-    """A curve by arc length, densely sampled."""
-
-    def __init__(self, robot: RobotConfig, curve_m: ArrayLike) -> None:
-        points = np.asarray(curve_m, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4:
-            raise InputError(f"a backbone curve has four points (x, y, z) or more: {points.shape}")
-        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        if not np.isfinite(points).all() or steps.min() <= 0.0:
-            raise InputError("a backbone curve's points are finite, no two in a row the same")
-        spline = CubicSpline(np.concatenate([[0.0], steps.cumsum()]), points)
-        fine = np.linspace(0.0, spline.x[-1], 20 * len(points) + 2000)
-        way = np.linalg.norm(np.diff(spline(fine), axis=0), axis=1)
-        run = np.concatenate([[0.0], way.cumsum()])
-        if run[-1] < robot.length_m * (1.0 - 1e-6):
-            raise InputError(
-                f"the curve is {run[-1]:.3f} m long; robot {robot.name} has {robot.length_m:.3f} m"
-            )
-        count = int(np.ceil(run[-1] / robot.link_length_m * SAMPLES_A_LINK)) + 1
-        self.run_m = np.linspace(0.0, run[-1], count)
-        at = np.interp(self.run_m, run, fine)
-        self.points_m: Floats = np.asarray(spline(at))
-        self._by_run = CubicSpline(self.run_m, self.points_m)
-        tangents = self._by_run(self.run_m, 1)
-        self.tangents: Floats = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
-        self._tree = cKDTree(self.points_m)
-
-    def nearest(self, points: Floats) -> tuple[Floats, Floats]:
-        """Nearest points of the curve to points (N, 3), and the tangents there, (N, 3) each."""
-        run = self.run_m[self._tree.query(points)[1]]
-        for _ in range(2):
-            along = self._by_run(run, 1)
-            run = run + ((points - self._by_run(run)) * along).sum(axis=1)
-            run = np.clip(run, 0.0, self.run_m[-1])
-        along = self._by_run(run, 1)
-        along /= np.linalg.norm(along, axis=1, keepdims=True)
-        return np.asarray(self._by_run(run)), np.asarray(along)
-
-
-def _turn(vector: Floats) -> Floats:
-    """(3, 3) rotation about ``vector`` by its length."""
-    angle = float(np.linalg.norm(vector))
-    if angle < 1e-15:
-        return np.eye(3)
-    x, y, z = vector / angle
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k)

@@ -16,94 +16,19 @@ The phase differences ``phi_ij = beta_j - beta_i`` are those of a gait: with ``e
 neighbours are coupled and none in a ring, so every start but a set of measure 0 ends in step.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from config.robot import RobotConfig
-from controller.gaits.gait import Gait
+from controller.gaits.cpg_pattern import HARMONICS, Pattern
+from controller.gaits.damped import Damped
+from controller.gaits.wave import TURN
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-TURN = 2.0 * np.pi
 
-HARMONICS = 24
-SAMPLES = 256
 COUPLING_PER_S = 20.0
 LONGEST_STEP_S = 0.01
-STILL_RAD = 1e-6
-"""Amplitude below which a joint has no phase of its own."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pattern:
-    """What the oscillators go to."""
-
-    omega_rad_s: float
-    offset_rad: Floats
-    """(J,) X"""
-    bias_rad: Floats
-    """(J,) beta: phase of each joint's first harmonic; NaN where there is none."""
-    harmonics_rad: Complex
-    """(J, HARMONICS) amplitudes ``d`` of ``Re(d e^(i k theta))``; the first is R, real."""
-
-    @staticmethod
-    def of(gait: Gait, robot: RobotConfig, omega_rad_s: float) -> "Pattern":
-        """Fourier series of a gait's joints over its phase.
-
-        Raises:
-            InputError: the robot lacks joints that the gait needs.
-
-        """
-        joints = gait.joints_rad(robot, np.arange(SAMPLES) * TURN / SAMPLES)
-        series = np.fft.rfft(joints, axis=0).T / SAMPLES
-        waves = 2.0 * series[:, 1 : HARMONICS + 1]
-        moves = np.abs(waves[:, 0]) > STILL_RAD
-        bias = np.where(moves, np.angle(waves[:, 0]), np.nan)
-        order = np.arange(1, HARMONICS + 1)
-        waves = waves * np.exp(-1j * order * np.nan_to_num(bias)[:, None])
-        return Pattern(omega_rad_s, series[:, 0].real.copy(), bias, waves)
-
-    @staticmethod
-    def rest(joint_rad: Floats) -> "Pattern":
-        """Joints (J,) that stay where they are."""
-        count = len(joint_rad)
-        waves = np.zeros((count, HARMONICS), dtype=np.complex128)
-        return Pattern(0.0, np.array(joint_rad, dtype=float), np.full(count, np.nan), waves)
-
-
-@dataclass(frozen=True, slots=True)
-class _Damped:
-    """``z'' = a (a/4 (Z - z) - z')`` from a value and a rate: ``Z + (A + B t) e^(-a t/2)``."""
-
-    goal: Complex
-    left: Complex
-    slope: Complex
-    gain: float
-
-    @staticmethod
-    def start(value: Complex, rate: Complex, goal: Complex, gain: float) -> "_Damped":
-        left = value - goal
-        return _Damped(goal, left, rate + 0.5 * gain * left, gain)
-
-    def at(self, t_s: Floats) -> tuple[Complex, Complex]:
-        """Value and rate at times (T,): (T, n) each."""
-        t, h = t_s[:, None], 0.5 * self.gain
-        fading = np.exp(-h * t)
-        line = self.left + self.slope * t
-        return self.goal + line * fading, (self.slope - h * line) * fading
-
-    def sum(self, t_s: Floats) -> Complex:
-        """Integral of the value from 0 to times (T,): (T, n)."""
-        t, h = t_s[:, None], 0.5 * self.gain
-        fading = np.exp(-h * t)
-        fallen = (1.0 - fading) / h
-        ramp = (fallen - t * fading) / h
-        return np.asarray(self.goal * t + self.left * fallen + self.slope * ramp)
-
-
-CpgState = tuple[_Damped, _Damped, float, float, Pattern]
+CpgState = tuple[Damped, Damped, float, float, Pattern]
 
 
 class Cpg:
@@ -119,8 +44,8 @@ class Cpg:
         self._t_s = 0.0
         state = np.concatenate([self._pack(self.pattern, np.zeros(self.joints)), [0.0]])
         none = np.zeros_like(state)
-        self._slow = _Damped.start(state[:-1], none[:-1], state[:-1], 1.0)
-        self._clock = _Damped.start(state[-1:], none[-1:], state[-1:], 1.0)
+        self._slow = Damped.start(state[:-1], none[:-1], state[:-1], 1.0)
+        self._clock = Damped.start(state[-1:], none[-1:], state[-1:], 1.0)
 
     def become(self, pattern: Pattern, gain: float = 6.0, clock_gain: float | None = None) -> None:
         """Go to another pattern; amplitudes settle within about ``10 / gain`` seconds."""
@@ -132,8 +57,8 @@ class Cpg:
         bias = now + np.mod(turn + np.pi, TURN) - np.pi  # the shorter way round
         goal = self._pack(pattern, bias)
         wanted = np.array([pattern.omega_rad_s], dtype=np.complex128)
-        self._slow = _Damped.start(value[0], rate[0], goal, gain)
-        self._clock = _Damped.start(omega[0], omega_rate[0], wanted, clock_gain or gain)
+        self._slow = Damped.start(value[0], rate[0], goal, gain)
+        self._clock = Damped.start(omega[0], omega_rate[0], wanted, clock_gain or gain)
         self._t_s = 0.0
         self.pattern = pattern
 

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,10 +49,13 @@ class Needs:
                 )
 
 
+Frequency = Annotated[float, Field(ge=0.0, le=2.0, description="cycles a second")]
+
+
 class GaitParameters(Strict):
     """What every gait has."""
 
-    frequency_hz: float = Field(0.5, ge=0.0, le=2.0, description="cycles a second")
+    frequency_hz: Frequency = 0.5
     mirror: bool = Field(False, description="left and right exchanged")
 
 

@@ -7,7 +7,8 @@ slipping on what it holds, a body of radius r goes ``2 pi r cos g`` along the ax
 """
 
 import math
-from typing import ClassVar
+from abc import abstractmethod
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -53,28 +54,35 @@ def helix_joints_rad(
     return joints
 
 
+Turns = Annotated[float, Field(ge=0.0, le=2.0, description="turns of the body a second")]
+BodyRadius = Annotated[float, Field(ge=0.002, le=0.5, description="of the robot")]
+Rise = Annotated[float, Field(ge=0.05, le=1.2, description="of the helix")]
+LeftHanded = Annotated[bool, Field(description="helix; right-handed otherwise")]
+Backward = Annotated[bool, Field(description="tail first")]
+
+
 class HelixPoleParameters(GaitParameters):
     """What is held, and how tightly."""
 
-    frequency_hz: float = Field(0.2, ge=0.0, le=2.0, description="turns of the body a second")
+    frequency_hz: Turns = 0.2
     pole_radius_m: float = Field(0.09, ge=0.02, le=1.0, description="of the pole")
-    body_radius_m: float = Field(0.03, ge=0.002, le=0.5, description="of the robot")
+    body_radius_m: BodyRadius = 0.03
     grip_m: float = Field(0.012, ge=-0.05, le=0.2, description="helix tighter than the pole by")
-    rise_rad: float = Field(0.3, ge=0.05, le=1.2, description="of the helix")
-    left_handed: bool = Field(False, description="helix; right-handed otherwise")
-    backward: bool = Field(False, description="tail first")
+    rise_rad: Rise = 0.3
+    left_handed: LeftHanded = False
+    backward: Backward = False
 
 
 class HelixPipeParameters(GaitParameters):
     """What is pressed against, and how hard."""
 
-    frequency_hz: float = Field(0.2, ge=0.0, le=2.0, description="turns of the body a second")
+    frequency_hz: Turns = 0.2
     pipe_radius_m: float = Field(0.15, ge=0.04, le=1.0, description="inner")
-    body_radius_m: float = Field(0.03, ge=0.002, le=0.5, description="of the robot")
+    body_radius_m: BodyRadius = 0.03
     press_m: float = Field(0.025, ge=-0.05, le=0.3, description="helix wider than the pipe by")
-    rise_rad: float = Field(0.35, ge=0.05, le=1.2, description="of the helix")
-    left_handed: bool = Field(False, description="helix; right-handed otherwise")
-    backward: bool = Field(False, description="tail first")
+    rise_rad: Rise = 0.35
+    left_handed: LeftHanded = False
+    backward: Backward = False
 
 
 class _Helix(Gait):
@@ -86,8 +94,9 @@ class _Helix(Gait):
     p_gain = 300
     inside: ClassVar[bool]
 
+    @abstractmethod
     def _radius_m(self) -> float:
-        raise NotImplementedError
+        """Of the centre line."""
 
     def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
         p = self.params

@@ -6,13 +6,13 @@ modes drives Lighthill's travelling form here, and the printed form stays as the
 Amplitudes are printed without a unit: taken in that of ``u``, of which a body is 2 pi long.
 """
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from config.robot import RobotConfig
-from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
+from controller.gaits.gait import Floats, Frequency, Gait, GaitParameters, Needs
 from controller.gaits.wave import TURN
 
 SAMPLES = 257
@@ -23,16 +23,21 @@ SOURCE = (
     "M. J. Lighthill, Annual Review of Fluid Mechanics 1, 1969"
 )
 
+Nose = Annotated[float, Field(ge=0.0, le=1.5, description="amplitude at the head, body = 2 pi")]
+Tail = Annotated[float, Field(ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")]
+Waves = Annotated[float, Field(ge=0.1, le=3.0, description="on the body: alpha")]
+StandingPhase = Annotated[
+    float, Field(ge=-np.pi, le=np.pi, description="of the standing form only: phi")
+]
+
 
 class SpineParameters(GaitParameters):
     """One row of the table."""
 
-    nose: float = Field(0.0, ge=0.0, le=1.5, description="amplitude at the head, body = 2 pi")
-    tail: float = Field(0.3, ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")
-    waves: float = Field(1.5, ge=0.1, le=3.0, description="on the body: alpha")
-    phase_rad: float = Field(
-        float(np.pi / 2), ge=-np.pi, le=np.pi, description="of the standing form only: phi"
-    )
+    nose: Nose = 0.0
+    tail: Tail = 0.3
+    waves: Waves = 1.5
+    phase_rad: StandingPhase = float(np.pi / 2)
     standing: bool = Field(False, description="Eq. 11 as printed: no thrust")
     turn_rad: float = Field(0.0, ge=-2.5, le=2.5, description="bend over the body; positive: left")
 
@@ -91,7 +96,7 @@ class SpineGait(Gait):
 class AnguilliformParameters(SpineParameters):
     """Eel: Omega = 0.3 u / 2 pi, alpha 1.5, omega 1."""
 
-    frequency_hz: float = Field(1.0, ge=0.0, le=2.0, description="cycles a second")
+    frequency_hz: Frequency = 1.0
 
 
 class Anguilliform(SpineGait):
@@ -105,9 +110,9 @@ class Anguilliform(SpineGait):
 class SubcarangiformParameters(SpineParameters):
     """Trout: Omega = u / 2 pi, alpha 0.75, omega 2."""
 
-    frequency_hz: float = Field(2.0, ge=0.0, le=2.0, description="cycles a second")
-    tail: float = Field(1.0, ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")
-    waves: float = Field(0.75, ge=0.1, le=3.0, description="on the body: alpha")
+    frequency_hz: Frequency = 2.0
+    tail: Tail = 1.0
+    waves: Waves = 0.75
 
 
 class Subcarangiform(SpineGait):
@@ -121,10 +126,10 @@ class Subcarangiform(SpineGait):
 class CarangiformParameters(SpineParameters):
     """Tropical fish: Omega = 0.1, alpha 1, omega 2."""
 
-    frequency_hz: float = Field(2.0, ge=0.0, le=2.0, description="cycles a second")
-    nose: float = Field(0.1, ge=0.0, le=1.5, description="amplitude at the head, body = 2 pi")
-    tail: float = Field(0.1, ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")
-    waves: float = Field(1.0, ge=0.1, le=3.0, description="on the body: alpha")
+    frequency_hz: Frequency = 2.0
+    nose: Nose = 0.1
+    tail: Tail = 0.1
+    waves: Waves = 1.0
 
 
 class Carangiform(SpineGait):
@@ -138,10 +143,10 @@ class Carangiform(SpineGait):
 class ThunniformParameters(SpineParameters):
     """Shark: Omega = u / 2 pi, alpha 0.25, phi 0, omega 1."""
 
-    frequency_hz: float = Field(1.0, ge=0.0, le=2.0, description="cycles a second")
-    tail: float = Field(1.0, ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")
-    waves: float = Field(0.25, ge=0.1, le=3.0, description="on the body: alpha")
-    phase_rad: float = Field(0.0, ge=-np.pi, le=np.pi, description="of the standing form only: phi")
+    frequency_hz: Frequency = 1.0
+    tail: Tail = 1.0
+    waves: Waves = 0.25
+    phase_rad: StandingPhase = 0.0
 
 
 class Thunniform(SpineGait):
@@ -155,10 +160,10 @@ class Thunniform(SpineGait):
 class DolphinParameters(SpineParameters):
     """Dolphin: Omega = 1, alpha 0.75, omega 1.3; up and down."""
 
-    frequency_hz: float = Field(1.3, ge=0.0, le=2.0, description="cycles a second")
-    nose: float = Field(1.0, ge=0.0, le=1.5, description="amplitude at the head, body = 2 pi")
-    tail: float = Field(1.0, ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")
-    waves: float = Field(0.75, ge=0.1, le=3.0, description="on the body: alpha")
+    frequency_hz: Frequency = 1.3
+    nose: Nose = 1.0
+    tail: Tail = 1.0
+    waves: Waves = 0.75
 
 
 class Dolphin(SpineGait):

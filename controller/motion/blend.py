@@ -18,6 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.motion.easing import (
+    cubic,
+    cubic_slope,
+    cubic_sum,
+    quintic,
+    quintic_bend,
+    quintic_slope,
+)
 from controller.motion.source import MotionSource, Pace
 from controller.runtime.body import BodyView
 
@@ -54,7 +62,7 @@ class Join:
         """How far the target has gone by ``t_s``."""
         x = min(t_s / self.duration_s, 1.0) if self.duration_s > 0.0 else 1.0
         y = max(0.0, (x - DELAY) / (1.0 - DELAY))
-        sped_up = (1.0 - self.rate) * (1.0 - DELAY) * (y**3 - 0.5 * y**4)
+        sped_up = (1.0 - self.rate) * (1.0 - DELAY) * cubic_sum(y)
         blended = self.duration_s * (self.rate * x + sped_up)
         return float(blended + max(t_s - self.duration_s, 0.0))
 
@@ -62,7 +70,7 @@ class Join:
         """Rate s' of the target at ``t_s``."""
         x = min(t_s / self.duration_s, 1.0) if self.duration_s > 0.0 else 1.0
         y = max(0.0, (x - DELAY) / (1.0 - DELAY))
-        return float(self.rate + (1.0 - self.rate) * y * y * (3.0 - 2.0 * y))
+        return float(self.rate + cubic(y, 1.0 - self.rate))
 
     def error_at(self, t_s: float) -> tuple[Floats, Floats]:
         """(J,) what is left of the error in angle and in speed."""
@@ -71,13 +79,12 @@ class Join:
             return zero, zero
         x = t_s / self.duration_s
         y = min(t_s / self.brake_s, 1.0)
-        braked_s = min(t_s, self.brake_s) - self.brake_s * (y**3 - 0.5 * y**4)
-        left = 1.0 - y * y * (3.0 - 2.0 * y)
+        braked_s = min(t_s, self.brake_s) - self.brake_s * cubic_sum(y)
+        left = 1.0 - cubic(y)
         total = self.error_rad + 0.5 * self.brake_s * self.error_rad_s
-        p = x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
-        dp = 30.0 * x * x * (1.0 - x) ** 2 / self.duration_s
+        dp = quintic_slope(x) / self.duration_s
         return (
-            self.error_rad + self.error_rad_s * braked_s - total * p,
+            self.error_rad + self.error_rad_s * braked_s - total * quintic(x),
             self.error_rad_s * left - total * dp,
         )
 
@@ -115,13 +122,13 @@ def _within(
     duration = DURATIONS_S[:, None]
     brake = _brake_s(error_speed, limit, duration)
     z = np.maximum(0.0, (_X - DELAY) / (1.0 - DELAY))
-    r = rate + (1.0 - rate) * z * z * (3.0 - 2.0 * z)
-    dr = (1.0 - rate) * 6.0 * z * (1.0 - z) / ((1.0 - DELAY) * duration)
-    dp = 30.0 * _X**2 * (1.0 - _X) ** 2 / duration
-    ddp = 60.0 * _X * (1.0 - _X) * (1.0 - 2.0 * _X) / duration**2
+    r = rate + cubic(z, 1.0 - rate)
+    dr = cubic_slope(z, 1.0 - rate) / ((1.0 - DELAY) * duration)
+    dp = quintic_slope(_X) / duration
+    ddp = quintic_bend(_X) / duration**2
     y = np.minimum(_X * duration / brake, 1.0)
-    left = 1.0 - y * y * (3.0 - 2.0 * y)
-    dleft = -6.0 * y * (1.0 - y) / brake
+    left = 1.0 - cubic(y)
+    dleft = -cubic_slope(y) / brake
     good = np.ones(len(DURATIONS_S), dtype=bool)
     for j in range(len(error)):
         total = error[j] + 0.5 * brake * error_speed[j]

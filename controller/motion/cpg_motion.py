@@ -2,34 +2,21 @@
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RobotConfig
-from controller.gaits.cpg import Cpg, Pattern
+from controller.gaits.cpg import Cpg
+from controller.gaits.cpg_pattern import Pattern
 from controller.gaits.gait import Gait, Needs
-from controller.motion.gait_motion import Cycle
+from controller.motion.cpg_change import Part, quickest_change
+from controller.motion.gait_cycle import Cycle
 from controller.motion.source import Pace
 from controller.runtime.body import BodyView
 
 Floats = NDArray[np.float64]
-Part = tuple[Pattern, float, float]
-"""A pattern, and the gains with which amplitudes and frequency go to it."""
-
-GAINS = np.geomspace(10.0, 0.5, 10)
-"""Of amplitudes, 1/s, fastest first."""
-LEAST_DIRECT = 1.5
-"""Gains below this are for a change in two steps only."""
-CLOCK_GAIN = 6.0
-CRAWL = 0.2
-"""Of the slower of two gaits: in a change in two steps amplitudes change at this frequency."""
-TOLERANCE = 0.02
-SETTLE = 14.0
-"""Times 1 / gain: how long a change is looked at; 0.7 % of it are left then."""
-SAMPLE_S = 0.02
-MOST_SAMPLES = 600
 DONE_RAD, DONE_RAD_S = 0.01, 0.02
 
 
@@ -108,66 +95,25 @@ class CpgMotion:
     def _plan(self, gait: Gait | None) -> Change:
         """Plan a change from how the oscillators go now."""
         if gait is None:
-            resting = Pattern.rest(self.cpg.pattern.offset_rad)
-            return self._choose(resting, Pace.still(self.robot.joint_count), self.needs, stops=True)
-        cycle = Cycle(gait, self.robot)
-        pattern = Pattern.of(gait, self.robot, cycle.rate_rad_s)
-        return self._choose(pattern, cycle.pace(), gait.needs, stops=False)
+            pattern, needs = Pattern.rest(self.cpg.pattern.offset_rad), self.needs
+            settled = Pace.still(self.robot.joint_count)
+        else:
+            cycle = Cycle(gait, self.robot)
+            pattern, needs = Pattern.of(gait, self.robot, cycle.rate_rad_s), gait.needs
+            settled = cycle.pace()
+        parts, under_way = quickest_change(self.cpg, pattern, self._limit)
+        return Change(self._now_s, parts, needs, settled, under_way, stops=gait is None)
 
     def _begin(self, change: Change) -> float:
         """Begin a change; returns how long it takes, s."""
         self._due = ()
-        self.cpg.become(*change.parts[0])
+        change.parts[0].begin(self.cpg)
         self._next = change.parts[1:]
         self.needs, self._stopping = change.needs, change.stops
         self._settled, self._change = change.settled, change.under_way
-        self._part_s = self._time_s(change.parts[0])
-        self._left_s = sum(map(self._time_s, change.parts))
+        self._part_s = change.parts[0].time_s
+        self._left_s = sum(part.time_s for part in change.parts)
         return self._left_s
-
-    def _choose(self, pattern: Pattern, settled: Pace, needs: Needs, *, stops: bool) -> Change:
-        """Choose the fastest change that stays within the limits: each is known in closed form.
-
-        Where a wide slow gait becomes a narrow fast one, or back, amplitude times frequency would
-        pass its limits on the way: then the oscillators slow down, change, and speed up again.
-        """
-        start = self.cpg.now()
-        slow = CRAWL * min(self.cpg.pattern.omega_rad_s or np.inf, pattern.omega_rad_s or np.inf)
-        crawl = replace(pattern, omega_rad_s=slow if np.isfinite(slow) else 0.0)
-        ways = [[(pattern, g, g)] for g in GAINS if g >= LEAST_DIRECT]
-        ways += [[(crawl, g, CLOCK_GAIN), (pattern, g, CLOCK_GAIN)] for g in GAINS]
-        best, least = ways[-1], np.inf
-        change = settled
-        for way in ways:
-            self.cpg.restore(start)
-            excess, pace = self._judge(way)
-            if excess < least:
-                best, least, change = way, excess, pace
-            if excess <= 1.0 + TOLERANCE:
-                break
-        self.cpg.restore(start)
-        return Change(self._now_s, tuple(best), needs, settled, change, stops)
-
-    @staticmethod
-    def _time_s(part: Part) -> float:
-        return SETTLE / min(part[1], part[2])
-
-    def _judge(self, way: list[Part]) -> tuple[float, Pace]:
-        """Largest speed or acceleration over its limit, and their largest values."""
-        fast = hard = np.zeros(self.robot.joint_count)
-        for part in way:
-            time_s = self._time_s(part)
-            step_s = max(SAMPLE_S, time_s / MOST_SAMPLES)
-            self.cpg.become(*part)
-            speed = self.cpg.ahead(np.arange(0.0, time_s, step_s))[1]
-            self.cpg.skip(time_s)
-            fast = np.maximum(fast, np.abs(speed).max(axis=0))
-            hard = np.maximum(hard, np.abs(np.diff(speed, axis=0)).max(axis=0) / step_s)
-        over = max(
-            float((fast / self._limit.speed_rad_s).max()),
-            float((hard / self._limit.acceleration_rad_s2).max()),
-        )
-        return over, Pace(fast, hard)
 
     def goal_rad(self) -> Floats:
         """(J,) joint targets now."""
@@ -205,8 +151,9 @@ class CpgMotion:
                 self._begin(change)
                 self._due = tuple(later)
             else:
-                self.cpg.become(*self._next[0])
-                self._part_s, self._next = self._time_s(self._next[0]), self._next[1:]
+                part, *rest = self._next
+                part.begin(self.cpg)
+                self._part_s, self._next = part.time_s, tuple(rest)
 
     def _turn(self, dt_s: float) -> Floats:
         self._now_s += dt_s

@@ -1,4 +1,4 @@
-"""A gait in time: its phase runs, its parameters change live, it keeps to the robot's limits."""
+"""A gait that runs, changes live and stops, within the robot's limits."""
 
 from typing import Any
 
@@ -6,73 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RobotConfig
-from controller.gaits.gait import CYCLE_SAMPLES, Gait, Needs
+from controller.gaits.gait import Gait, Needs
+from controller.motion.coming_to_rest import ComingToRest
+from controller.motion.gait_cycle import Cycle
 from controller.motion.relay import Relay
 from controller.motion.source import Pace
 from controller.runtime.body import BodyView
 
 Floats = NDArray[np.float64]
-TURN = 2.0 * np.pi
-HEADROOM = 0.9
-"""Share of the robot's limits that a gait may take: the rest is left for joins."""
-STOP_S = 1.0
-
-
-class Cycle:
-    """One gait with fixed parameters, running; slowed down where its joints would be too fast."""
-
-    done = False
-
-    def __init__(self, gait: Gait, robot: RobotConfig, phase_rad: float = 0.0) -> None:
-        """Check the gait against the robot.
-
-        Raises:
-            InputError: joints are missing, or do not bend so far.
-
-        """
-        gait.check(robot)
-        self.gait = gait
-        self.phase_rad = phase_rad
-        self._robot = robot
-        step = TURN / (CYCLE_SAMPLES - 1)
-        phases = np.arange(-1, CYCLE_SAMPLES + 1, dtype=np.float64) * step
-        cycle = gait.joints_rad(robot, phases)
-        slope = np.abs(np.diff(cycle, axis=0)).max(axis=0) / step
-        bend = np.abs(np.diff(cycle, n=2, axis=0)).max(axis=0) / step**2
-        speed = HEADROOM * robot.joint_speed_limit_rad_s / max(float(slope.max()), 1e-9)
-        hard = HEADROOM * robot.joint_acceleration_limit_rad_s2 / max(float(bend.max()), 1e-9)
-        self.rate_rad_s = min(TURN * gait.params.frequency_hz, speed, float(np.sqrt(hard)))
-        """Of the phase."""
-        self._pace = Pace(slope * self.rate_rad_s, bend * self.rate_rad_s**2)
-
-    @property
-    def needs(self) -> Needs:
-        """Those of the gait."""
-        return self.gait.needs
-
-    @property
-    def frequency_hz(self) -> float:
-        """Cycles a second: as asked, or what the joints can follow."""
-        return float(self.rate_rad_s / TURN)
-
-    def goal_rad(self) -> Floats:
-        """(J,) at the phase now."""
-        return np.asarray(self.gait.joints_rad(self._robot, np.array([self.phase_rad]))[0])
-
-    def velocity_rad_s(self) -> Floats:
-        """(J,) central difference over 2e-4 rad of phase."""
-        around = self.phase_rad + np.array([-1e-4, 1e-4])
-        before, after = self.gait.joints_rad(self._robot, around)
-        return np.asarray((after - before) / 2e-4 * self.rate_rad_s)
-
-    def pace(self) -> Pace:
-        """Largest over a cycle."""
-        return self._pace
-
-    def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Turn the phase on."""
-        self.phase_rad = (self.phase_rad + dt_s * self.rate_rad_s) % TURN
-        return self.goal_rad()
 
 
 class GaitMotion:
@@ -96,7 +37,7 @@ class GaitMotion:
         self._cycle = Cycle(gait, robot, phase_rad)
         self._relay = Relay(robot, self._cycle)
         self._left_s = duration_s
-        self._stopping_s: float | None = None
+        self._rest = ComingToRest()
         self.cycles = 0.0
         """Gone through so far."""
 
@@ -113,7 +54,7 @@ class GaitMotion:
     @property
     def frequency_hz(self) -> float:
         """Cycles a second now."""
-        return self._cycle.frequency_hz * self._rate
+        return self._cycle.frequency_hz * self._rest.rate
 
     @property
     def needs(self) -> Needs:
@@ -123,12 +64,12 @@ class GaitMotion:
     @property
     def done(self) -> bool:
         """Whether it has come to rest after ``stop`` or its duration."""
-        return self._stopping_s is not None and self._stopping_s >= STOP_S
+        return self._rest.over
 
     @property
     def stopping(self) -> bool:
         """Whether it is coming to rest, or has."""
-        return self._stopping_s is not None
+        return self._rest.begun
 
     def change(self, **values: Any) -> float:
         """Give parameters new values, at the phase now; returns the time until they are in force.
@@ -153,16 +94,8 @@ class GaitMotion:
         return duration_s
 
     def stop(self) -> None:
-        """Come to rest within ``STOP_S``."""
-        if self._stopping_s is None:
-            self._stopping_s = 0.0
-
-    @property
-    def _rate(self) -> float:
-        if self._stopping_s is None:
-            return 1.0
-        x = min(self._stopping_s / STOP_S, 1.0)
-        return 1.0 - x * x * (3.0 - 2.0 * x)
+        """Come to rest as ``ComingToRest`` does."""
+        self._rest.stop()
 
     def goal_rad(self) -> Floats:
         """(J,) joint targets now."""
@@ -170,7 +103,7 @@ class GaitMotion:
 
     def velocity_rad_s(self) -> Floats:
         """(J,) how fast they move now."""
-        return self._rate * self._relay.velocity_rad_s()
+        return self._rest.rate * self._relay.velocity_rad_s()
 
     def pace(self) -> Pace:
         """That of the gait, or the robot's limits while it changes."""
@@ -182,10 +115,6 @@ class GaitMotion:
             self._left_s -= dt_s
             if self._left_s <= 0.0:
                 self.stop()
-        part_s = dt_s
-        if self._stopping_s is not None:
-            before = self._rate
-            self._stopping_s += dt_s
-            part_s = 0.5 * (before + self._rate) * dt_s
+        part_s = self._rest.step(dt_s)
         self.cycles += part_s * self._cycle.frequency_hz
         return self._relay.step(part_s, view)

@@ -9,6 +9,7 @@ from config.robot import RobotConfig
 from controller.gaits.gait import Needs
 from controller.motion.follow import Follower
 from controller.motion.source import MotionSource, Pace
+from controller.motion.steering import wrap
 from controller.runtime.body import BodyView
 
 Floats = NDArray[np.float64]
@@ -85,11 +86,11 @@ class HeadSteering:
         goal = self.source.step(dt_s, view)
         shoulders = float(view.headings_rad[self._neck[-1] + 1])
         if self._last_rad is not None and dt_s > 0.0:
-            turn = _wrapped(shoulders - self._last_rad)
+            turn = float(wrap(shoulders - self._last_rad))
             share = min(1.0, dt_s / 0.06)
             self._swing_rad_s += share * (turn / dt_s - self._swing_rad_s)
         self._last_rad = shoulders
-        wanted = _wrapped(self.look.heading_from(view.link_m[0]) - shoulders)
+        wanted = float(wrap(self.look.heading_from(view.link_m[0]) - shoulders))
         each = (wanted - LEAD_S * self._swing_rad_s) / len(self._neck)
         each = min(max(each, -self._reach), self._reach)
         angles = self._follower.step(dt_s, np.full(len(self._neck), each))
@@ -99,7 +100,3 @@ class HeadSteering:
         together = np.array(joints, dtype=float)
         together[self._neck] = neck
         return together
-
-
-def _wrapped(angle_rad: float) -> float:
-    return float((angle_rad + np.pi) % (2.0 * np.pi) - np.pi)

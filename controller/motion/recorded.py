@@ -7,11 +7,10 @@ from scipy.interpolate import CubicSpline
 from config.errors import InputError
 from config.robot import RobotConfig
 from controller.gaits.gait import Needs
-from controller.motion.source import Pace
+from controller.motion.source import HEADROOM, Pace
 from controller.runtime.body import BodyView
 
 Floats = NDArray[np.float64]
-HEADROOM = 0.9
 
 
 class Recorded:

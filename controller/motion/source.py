@@ -12,6 +12,9 @@ from controller.runtime.body import BodyView
 
 Floats = NDArray[np.float64]
 
+HEADROOM = 0.9
+"""Share of the robot's limits that a motion takes by itself: the rest is left for joins."""
+
 
 @dataclass(frozen=True, slots=True)
 class Pace:

@@ -5,8 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.motion.steering import wrap
 from controller.repertoire.frame import body_frame
-from controller.repertoire.search import AIM_SHARE, Moves, Route, search, start_pose
+from controller.repertoire.moves import Moves, start_pose
+from controller.repertoire.search import AIM_SHARE, Route, search
 from controller.runtime.body import BodyView
 
 Floats = NDArray[np.float64]
@@ -90,5 +92,4 @@ def _apart(found: Floats, said: Floats) -> Floats:
     if not len(found):
         return np.zeros((0, 2))
     off = found - said
-    turn = (off[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
-    return np.column_stack([np.hypot(off[:, 0], off[:, 1]), np.abs(turn)])
+    return np.column_stack([np.hypot(off[:, 0], off[:, 1]), np.abs(wrap(off[:, 2]))])

@@ -8,6 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from config.robot import RobotConfig
 from controller.gaits.gait import Needs
+from controller.motion.coming_to_rest import ComingToRest
 from controller.motion.relay import Relay
 from controller.motion.source import Pace
 from controller.repertoire.repertoire import Repertoire
@@ -15,7 +16,6 @@ from controller.repertoire.segment import Segment
 from controller.runtime.body import BodyView
 
 Floats = NDArray[np.float64]
-STOP_S = 1.0
 Choose = Callable[[BodyView], int | None]
 """Told where the body is when a cycle ends; returns the next action, or None to come to rest."""
 
@@ -83,7 +83,7 @@ class RepertoireMotion:
         self._cycle = SegmentCycle(repertoire.segments[first], robot)
         self._relay = Relay(robot, self._cycle)
         self._ends = 1
-        self._stopping_s: float | None = None
+        self._rest = ComingToRest()
 
     @property
     def needs(self) -> Needs:
@@ -93,24 +93,16 @@ class RepertoireMotion:
     @property
     def done(self) -> bool:
         """Whether it has come to rest."""
-        return self._stopping_s is not None and self._stopping_s >= STOP_S
+        return self._rest.over
 
     @property
     def stopping(self) -> bool:
         """Whether it is coming to rest, or has."""
-        return self._stopping_s is not None
+        return self._rest.begun
 
     def stop(self) -> None:
-        """Come to rest within ``STOP_S``."""
-        if self._stopping_s is None:
-            self._stopping_s = 0.0
-
-    @property
-    def _rate(self) -> float:
-        if self._stopping_s is None:
-            return 1.0
-        x = min(self._stopping_s / STOP_S, 1.0)
-        return 1.0 - x * x * (3.0 - 2.0 * x)
+        """Come to rest as ``ComingToRest`` does."""
+        self._rest.stop()
 
     def goal_rad(self) -> Floats:
         """(J,) joint targets now."""
@@ -118,7 +110,7 @@ class RepertoireMotion:
 
     def velocity_rad_s(self) -> Floats:
         """(J,) how fast they move now."""
-        return self._rate * self._relay.velocity_rad_s()
+        return self._rest.rate * self._relay.velocity_rad_s()
 
     def pace(self) -> Pace:
         """The robot's limits: actions follow each other."""
@@ -126,14 +118,9 @@ class RepertoireMotion:
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""
-        if self._stopping_s is None and self._cycle.cycles >= self._ends - 1e-6:
+        if not self._rest.begun and self._cycle.cycles >= self._ends - 1e-6:
             self._next(view)
-        part_s = dt_s
-        if self._stopping_s is not None:
-            before = self._rate
-            self._stopping_s += dt_s
-            part_s = 0.5 * (before + self._rate) * dt_s
-        return self._relay.step(part_s, view)
+        return self._relay.step(self._rest.step(dt_s), view)
 
     def _next(self, view: BodyView) -> None:
         chosen = self._choose(view)

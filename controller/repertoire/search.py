@@ -6,43 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from controller.repertoire.frame import Frame
-from controller.repertoire.repertoire import Repertoire
+from controller.motion.steering import wrap
+from controller.repertoire.moves import SAMPLES, Moves
 
 Floats = NDArray[np.float64]
-SAMPLES = 10
-"""Moments of a cycle at which the distance to a waypoint is looked at."""
-
 AIM_SHARE = 0.75
 """Of a waypoint's radius that is aimed at: the body does not end a cycle quite where predicted."""
-
-
-class Moves:
-    """What each action does in a cycle, in the plane."""
-
-    def __init__(self, repertoire: Repertoire, scale: float = 1.0) -> None:
-        travels = [segment.flat_travel() for segment in repertoire.segments]
-        stretch = np.array([scale, scale, 1.0])
-        marks = [np.linspace(0, len(t) - 1, SAMPLES + 1).round().astype(int)[1:] for t in travels]
-        self.way = np.array([t[m] * stretch for t, m in zip(travels, marks, strict=True)])
-        """(A, SAMPLES, 3) x, y, heading in the frame at the beginning of the cycle."""
-        self.duration_s = np.array([segment.duration_s for segment in repertoire.segments])
-        """(A,)"""
-        end = self.way[:, -1]
-        chord = np.hypot(end[:, 0], end[:, 1])
-        best = int(np.argmax(chord / self.duration_s))
-        self.speed_m_s = float(chord[best] / self.duration_s[best])
-        """Largest."""
-        self.turn_rad_s = max(float(np.abs(end[:, 2] / self.duration_s).max()), 1e-3)
-        """Largest."""
-        self.course_rad = float(np.arctan2(end[best, 1], end[best, 0]) - 0.5 * end[best, 2])
-        """Direction of travel against the body frame's x at the beginning of a cycle."""
-
-    def after(self, pose: Floats, action: int) -> Floats:
-        """(3,) where ``action`` leads from ``pose`` (3,) in a cycle."""
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        x, y, turn = self.way[action, -1]
-        return np.array([pose[0] + c * x - s * y, pose[1] + s * x + c * y, pose[2] + turn])
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +26,6 @@ class Route:
     duration_s: float
     candidates: int
     """Sequences that were scored; each took the prediction of one more cycle."""
-
-
-def start_pose(frame: Frame) -> Floats:
-    """(3,) x, y and heading."""
-    return np.array([frame.origin_m[0], frame.origin_m[1], frame.heading_rad])
 
 
 def search(
@@ -184,6 +148,5 @@ def _left_s(
     to = goals[which] - pose[:, :2]
     way = np.hypot(to[:, 0], to[:, 1])
     off = np.arctan2(to[:, 1], to[:, 0]) - pose[:, 2] - moves.course_rad
-    off = np.abs((off + np.pi) % (2.0 * np.pi) - np.pi)
     left = (np.maximum(way - radius_m, 0.0) + after[which]) / moves.speed_m_s
-    return np.where(count >= len(goals), 0.0, left + 0.5 * off / moves.turn_rad_s)
+    return np.where(count >= len(goals), 0.0, left + 0.5 * np.abs(wrap(off)) / moves.turn_rad_s)

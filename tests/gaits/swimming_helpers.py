@@ -9,7 +9,7 @@ from config.loader import load_robot, load_world
 from config.robot import RobotConfig
 from config.world import WorldConfig
 from controller.gaits.gait import Gait
-from controller.motion.gait_motion import Cycle
+from controller.motion.gait_cycle import Cycle
 from sim.bus.motor import MOTORS, make_drive, p_gain_per_rad
 from sim.physics.plant import MujocoPlant
 from sim.plant import ServoDrive

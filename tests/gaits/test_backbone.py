@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 
 from config.errors import InputError
 from config.loader import load_robot, load_world
-from controller.gaits.backbone import chain_points_m, fit_backbone
+from controller.gaits.backbone import fit_backbone
+from controller.gaits.chain import chain_points_m
 from sim.physics.plant import MujocoPlant
 
 Floats = NDArray[np.float64]

@@ -7,7 +7,7 @@ from config.loader import load_robot, load_world
 from config.world import PipeObstacle, PoleObstacle, WorldConfig
 from controller.gaits.gait import Gait
 from controller.gaits.helix import HelixPipe, HelixPole, helix_joints_rad
-from sim.physics.obstacles import fit_coil
+from sim.physics.coil import fit_coil
 from sim.physics.plant import MujocoPlant
 
 from .swimming_helpers import follow

@@ -7,12 +7,13 @@ import pytest
 from numpy.typing import NDArray
 
 from config.loader import load_robot
-from controller.gaits.cpg import Cpg, Pattern
+from controller.gaits.cpg import Cpg
+from controller.gaits.cpg_pattern import Pattern
 from controller.gaits.gait import Gait
 from controller.gaits.lateral_undulation import LateralUndulation
 from controller.gaits.registry import GAITS
 from controller.motion.cpg_motion import CpgMotion
-from controller.motion.gait_motion import Cycle
+from controller.motion.gait_cycle import Cycle
 
 Floats = NDArray[np.float64]
 ROBOT = load_robot("alternating16")

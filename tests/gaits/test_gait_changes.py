@@ -42,7 +42,8 @@ def test_a_schedule_does_not_depend_on_how_time_is_cut_up_and_plans_nothing_late
         return motion
 
     even, uneven = made(), made()
-    monkeypatch.setattr(CpgMotion, "_judge", lambda *_: pytest.fail("planned while it runs"))
+    chooses = "controller.motion.cpg_motion.quickest_change"
+    monkeypatch.setattr(chooses, lambda *_: pytest.fail("planned while it runs"))
     rng = np.random.default_rng(1)
     for _ in range(120):
         cut = rng.dirichlet(np.ones(5)) * 0.1

@@ -18,7 +18,8 @@ from controller.app.execute import execute
 from controller.app.gait_way import gait_way
 from controller.app.job import job_of
 from controller.app.prepare import prepare
-from controller.app.prepare_gait import PreparedGait, prepare_gait
+from controller.app.prepare_gait import prepare_gait
+from controller.app.prepared_gait import PreparedGait
 from controller.app.replay import differences, replay
 from controller.gaits.registry import GAITS
 from controller.motion.operator import Operator

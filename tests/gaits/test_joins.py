@@ -21,7 +21,8 @@ from controller.capture.fish.track_file import joint_motion
 from controller.gaits.ranges import ranges
 from controller.gaits.registry import GAITS, make_gait
 from controller.motion.cpg_motion import CpgMotion
-from controller.motion.gait_motion import Cycle, GaitMotion
+from controller.motion.gait_cycle import Cycle
+from controller.motion.gait_motion import GaitMotion
 from controller.motion.gait_sequence import GaitSequence
 from controller.motion.head_steering import HeadSteering, Look
 from controller.motion.operator import KEYS, Operator

@@ -11,7 +11,8 @@ from config.errors import InputError
 from config.loader import load_robot
 from controller.app.cli import app
 from controller.app.job import job_of
-from controller.app.prepare_playback import prepare_playback, recorded_joints
+from controller.app.prepare_playback import prepare_playback
+from controller.app.recorded_joints import recorded_joints
 from drivers.telemetry.reader import read_log
 
 

@@ -17,9 +17,10 @@ from controller.app.repertoire_planning import load_plan, plan_route, save_plan
 from controller.app.repertoire_timing import physics_route, search_cost
 from controller.repertoire.frame import Frame
 from controller.repertoire.motion import RepertoireMotion
+from controller.repertoire.moves import Moves, start_pose
 from controller.repertoire.repertoire import Repertoire
 from controller.repertoire.replay import replay
-from controller.repertoire.search import Moves, search, start_pose
+from controller.repertoire.search import search
 from controller.runtime.body import body_in_world
 from drivers.types import BodyPose
 

@@ -8,8 +8,8 @@ import pytest
 from config.robot import RobotConfig
 from controller.app.sweep.effort import link_rotations
 from controller.app.sweep.measure import Row, measure
+from controller.app.sweep.objective import Task, loss
 from controller.app.sweep.points import Point
-from controller.app.sweep.tune import Task, loss
 from controller.runtime.body import body_in_world
 from drivers.types import BodyPose
 

@@ -10,7 +10,8 @@ from rich.progress import track as progress
 from rich.table import Table
 
 from config.errors import InputError
-from controller.app.commands.common import Json, console
+from controller.app.commands.common import Json, console, refuse_existing
+from controller.app.picture_file import check_picture
 
 
 def analyse(
@@ -63,8 +64,6 @@ def _pictures(recordings: list[str], picture: Path | None, force: bool) -> list[
     """Where each recording's picture goes; refused before anything is measured."""
     if picture is None:
         return [None] * len(recordings)
-    from controller.app.body_map import check_picture  # noqa: PLC0415
-
     if picture.suffix and not picture.is_dir():
         check_picture(picture)
         if len(recordings) > 1:
@@ -74,9 +73,7 @@ def _pictures(recordings: list[str], picture: Path | None, force: bool) -> list[
         files = [picture / f"{Path(name).stem}.png" for name in recordings]
     if len(set(files)) < len(files):
         raise InputError(f"{picture}: two recordings have the same name; draw them one by one")
-    for file in files:
-        if file.exists() and not force:
-            raise InputError(f"{file}: exists; --force overwrites it")
+    refuse_existing(force, *files)
     return list(files)
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from config.errors import InputError
-from controller.app.commands.common import Json, show
+from controller.app.commands.common import Force, Json, refuse_existing, show
+from controller.app.picture_file import check_picture
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,7 +41,7 @@ def body(
     picture: Annotated[
         Path | None, typer.Option(help="draw widths, skin and solid here (.png, .svg, .pdf)")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="overwrite files")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Make the body's mesh: an ellipse at each skeleton point, with mirrored texture."""
@@ -51,14 +52,9 @@ def body(
     from controller.capture.mesh import body_mesh  # noqa: PLC0415
     from controller.capture.mesh_files import mesh_files, write_mesh  # noqa: PLC0415
 
-    if picture is not None:
-        from controller.app.body_map import check_picture  # noqa: PLC0415
-
-        check_picture(picture)
+    check_picture(picture)
     drawn = [] if picture is None else [picture]
-    for file in [*mesh_files(output, image is not None), *drawn]:
-        if file.exists() and not force:
-            raise InputError(f"{file}: exists; --force overwrites it")
+    refuse_existing(force, *mesh_files(output, image is not None), *drawn)
     if not output.parent.is_dir():
         raise InputError(f"{output.parent}: no such folder")
     texture, shown = None, None

@@ -1,11 +1,18 @@
 """What the commands share: options and the way a result is shown."""
 
 import json
-from typing import Annotated
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
+
+from config.errors import InputError
+
+if TYPE_CHECKING:
+    from controller.app.report.leave import Left
 
 console = Console(highlight=False)
 
@@ -17,6 +24,10 @@ Motion = Annotated[str | None, typer.Option(help="walk, walk-printed, walk-blind
 Port = Annotated[
     str | None, typer.Option(help="serial port; default: the only USB adapter there is")
 ]
+RunPort = Annotated[str | None, typer.Option(help="serial port; without it, the simulator")]
+Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
+RunFolder = Annotated[Path | None, typer.Option(help="folder for log and summary")]
+Force = Annotated[bool, typer.Option("--force", help="overwrite files")]
 Robot = Annotated[str | None, typer.Option(help="shipped robot, or a TOML file")]
 World = Annotated[str | None, typer.Option(help="shipped world, or a TOML file")]
 TrackFile = Annotated[
@@ -34,3 +45,25 @@ def show(found: dict[str, object], as_json: bool) -> None:
         text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
         table.add_row(key.replace("_", " "), str(text))
     console.print(table)
+
+
+def refuse_existing(force: bool, *files: Path | None) -> None:
+    """Refuse to overwrite files, before any work is done.
+
+    Raises:
+        InputError: the first that is there, without ``force``.
+
+    """
+    for file in files:
+        if file is not None and file.exists() and not force:
+            raise InputError(f"{file}: exists; --force overwrites it")
+
+
+def leave(log: Path, folder: Path, *, film: bool, fine: bool = False) -> "Left":
+    """Make report and film of a run; what could not be made is said on standard error."""
+    from controller.app.report.leave import leave_report  # noqa: PLC0415  heavy; --help stays quick
+
+    left = leave_report(log, folder, film=film, fine=fine)
+    for line in left.notes:
+        print(f"snakewalk: {line}", file=sys.stderr)
+    return left

@@ -8,14 +8,14 @@ from rich.console import Console
 from rich.progress import Progress
 
 from config.errors import InputError
-from controller.app.commands.common import Json, show
+from controller.app.commands.common import Force, Json, show
+from controller.app.picture_file import check_picture
 
 if TYPE_CHECKING:
     from controller.capture.fish.postures import Postures
 
 _Build = Annotated[str, typer.Option(help="carp (A0..A3 behind a rigid head) or eel (8 angles)")]
 _Rate = Annotated[float | None, typer.Option(help="frames a second, instead of what the file says")]
-_Force = Annotated[bool, typer.Option("--force", help="overwrite files")]
 _Picture = Annotated[Path | None, typer.Option(help="draw here (.png, .svg, .pdf)")]
 
 
@@ -29,7 +29,7 @@ def film(
     frames: Annotated[int | None, typer.Option(min=2, help="at most so many")] = None,
     side: Annotated[bool, typer.Option("--side", help="film from the side as well")] = False,
     seed: Annotated[int, typer.Option(min=0, help="of patterns and noise")] = 0,
-    force: _Force = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Render a fish whose every angle is known, with marks, shadow, blur and noise."""
@@ -75,18 +75,16 @@ def match(
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="postures")] = Path("postures.npz"),
     picture: _Picture = None,
-    force: _Force = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Lay a deformable fish over every frame: head, spine angles, and from the side its pitch."""
-    from controller.app.body_map import check_picture  # noqa: PLC0415  heavy
     from controller.app.fish_matching import MIDLINES, match_footage, read_midlines  # noqa: PLC0415
     from controller.capture.fish.accuracy import compare  # noqa: PLC0415
     from controller.capture.fish.postures import load_postures, save_postures  # noqa: PLC0415
 
     _free(force, output, picture)
-    if picture is not None:
-        check_picture(picture)
+    check_picture(picture)
     if length is not None and not 0.0 < length < 1e3:
         raise InputError(f"--length: a body length in metres, above 0; not {length:g}")
     known = None if truth is None else load_postures(truth)
@@ -140,17 +138,15 @@ def synthesise(
     robot: Annotated[str, typer.Option(help="whose joints are written along")] = "yaw16",
     output: Annotated[Path, typer.Option("--output", "-o", help="track")] = Path("track.npz"),
     picture: _Picture = None,
-    force: _Force = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Put segments of a film together anew, at random or through control points."""
-    from controller.app.body_map import check_picture  # noqa: PLC0415  heavy
     from controller.app.fish_synthesis import Wanted, synthesise_motion  # noqa: PLC0415
     from controller.capture.fish.postures import load_postures  # noqa: PLC0415
 
     _free(force, output, picture)
-    if picture is not None:
-        check_picture(picture)
+    check_picture(picture)
     wanted = Wanted(
         through=_points(through or []), seconds=seconds, seed=seed, radius=radius, limit_s=limit,
         mirror=mirror, within_deg=within, merge_deg=merge, reference=reference, blend_s=blend,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from config.errors import InputError
-from controller.app.commands.common import Json, Robot, show
+from controller.app.commands.common import Force, Json, Robot, show
+from controller.app.picture_file import check_picture
 
 if TYPE_CHECKING:
     from controller.gaits.backbone import BackboneFit
@@ -27,19 +28,17 @@ def fit_gait(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="joint angles and places (.npz)")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="overwrite files")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Lay the robot on a curve in space: joint angles, and how far the joints are from it."""
     import numpy as np  # noqa: PLC0415  heavy; --help stays quick
 
     from config.loader import load_robot  # noqa: PLC0415
-    from controller.app.gait_picture import check_picture  # noqa: PLC0415
     from controller.app.whole_file import refuse_to_overwrite, whole_file  # noqa: PLC0415
     from controller.gaits.backbone import fit_backbone  # noqa: PLC0415
 
-    if picture is not None:
-        check_picture(picture)
+    check_picture(picture)
     if output is not None and output.suffix.lower() != ".npz":
         raise InputError(f"{output}: joint angles go to a file that ends in .npz")
     refuse_to_overwrite([output, picture], force)

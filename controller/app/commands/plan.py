@@ -9,6 +9,7 @@ import typer
 from config.errors import InputError
 from controller.app.commands.common import (
     DEFAULT_RUN,
+    Force,
     Json,
     Motion,
     Robot,
@@ -41,14 +42,14 @@ def plan(
         Path | None, typer.Option("-o", "--out", help="write the sequence, as JSON")
     ] = None,
     carry: Annotated[bool, typer.Option("--run", help="run it in the simulator")] = False,
-    force: Annotated[bool, typer.Option("--force", help="overwrite files")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Judge a run on paper: library, path and joint limits, with no servo and no simulator."""
     if with_ not in {None, "repertoire"}:
         raise InputError(f"--with {with_}: no such planner; there is: repertoire")
     if with_ is not None:
-        from controller.app.commands.repertoire import plan_with_repertoire  # noqa: PLC0415
+        from controller.app.commands.plan_repertoire import plan_with_repertoire  # noqa: PLC0415
 
         if motion is not None or track is not None or seed is not None:
             raise InputError("--with repertoire: takes no --motion, --track or --seed")

@@ -1,13 +1,21 @@
 """``snakewalk play``: a recording in time on the robot."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from config.errors import InputError
-from controller.app.commands.common import Json, Robot, World, show
+from controller.app.commands.common import (
+    Film,
+    Json,
+    Robot,
+    RunFolder,
+    RunPort,
+    World,
+    leave,
+    show,
+)
 
 
 def play(
@@ -17,24 +25,21 @@ def play(
     speed: Annotated[
         str, typer.Option(help="times the animal's own; auto: as fast as the joints can, at most 1")
     ] = "auto",
-    port: Annotated[str | None, typer.Option(help="serial port; without it, the simulator")] = None,
-    film: Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")] = True,
-    out: Annotated[Path | None, typer.Option(help="folder for log and summary")] = None,
+    port: RunPort = None,
+    film: Film = True,
+    out: RunFolder = None,
     as_json: Json = False,
 ) -> None:
     """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
     from controller.app.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from controller.app.gait_progress import GaitProgress  # noqa: PLC0415
     from controller.app.prepare_playback import prepare_playback  # noqa: PLC0415
-    from controller.app.report.leave import leave_report  # noqa: PLC0415
+    from controller.app.progress import GaitProgress  # noqa: PLC0415
 
     prepared = prepare_playback(track, robot=robot, world=world, speed=_speed(speed))
     folder = out if out is not None else Path("runs") / f"play-{prepared.run.name}"
     with GaitProgress(prepared.run.name, prepared.duration_s) as progress:
         finished = execute(prepared, folder, port, (progress,), say=progress.note)
-    left = leave_report(finished.log, folder, film=film)
-    for line in left.notes:
-        print(f"snakewalk: {line}", file=sys.stderr)
+    left = leave(finished.log, folder, film=film)
     found: dict[str, object] = {
         "recording": track,
         "robot": prepared.robot.name,
@@ -45,8 +50,7 @@ def play(
         "peak_current_a": finished.summary["peak_current_a"],
         "log": str(finished.log),
         "summary": str(folder / "summary.json"),
-        "report": None if left.report is None else str(left.report),
-        "film": None if left.film is None else str(left.film),
+        **left.facts(),
     }
     show(found, as_json)
     if finished.outcome.tripped is not None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from controller.app.commands.common import Json, show
+from controller.app.commands.common import Json, leave, show
 
 
 def report(
@@ -17,15 +17,12 @@ def report(
     as_json: Json = False,
 ) -> None:
     """Make report.html, summary.json and film.mp4 again from a log."""
-    from controller.app.report.leave import leave_report  # noqa: PLC0415  heavy
-    from drivers.telemetry.reader import read_log  # noqa: PLC0415
+    from drivers.telemetry.reader import read_log  # noqa: PLC0415  heavy; --help stays quick
 
     note = read_log(log).note
     if note:
         print(f"snakewalk: {log}: {note}", file=sys.stderr)
-    left = leave_report(log, log.parent if out is None else out, film=film, fine=fine)
-    for line in left.notes:
-        print(f"snakewalk: {line}", file=sys.stderr)
+    left = leave(log, log.parent if out is None else out, film=film, fine=fine)
     if left.report is None:
         raise SystemExit(2)
     show(

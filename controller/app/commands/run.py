@@ -8,20 +8,24 @@ import typer
 
 from controller.app.commands.common import (
     DEFAULT_RUN,
+    Film,
     Json,
     Motion,
     Robot,
+    RunFolder,
     RunName,
+    RunPort,
     Seed,
     TrackFile,
     World,
+    leave,
     show,
 )
 
 
 def run(
     run: RunName = DEFAULT_RUN,
-    port: Annotated[str | None, typer.Option(help="serial port; without it, the simulator")] = None,
+    port: RunPort = None,
     robot: Robot = None,
     world: World = None,
     track: TrackFile = None,
@@ -30,15 +34,14 @@ def run(
     pose: Annotated[
         str | None, typer.Option(help="what measures the head: simulator, camera or joints")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="folder for log and summary")] = None,
-    film: Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")] = True,
+    out: RunFolder = None,
+    film: Film = True,
     as_json: Json = False,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
     from controller.app.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from controller.app.prepare import prepare  # noqa: PLC0415
     from controller.app.progress import PathProgress  # noqa: PLC0415
-    from controller.app.report.leave import leave_report  # noqa: PLC0415
 
     prepared = prepare(
         run, seed=seed, motion=motion, robot=robot, world=world, track=track, pose=pose
@@ -53,9 +56,7 @@ def run(
         asks = _confirm if sys.stdin.isatty() else None
         finished = execute(prepared, folder, port, (progress,), asks, progress.note)
     outcome = finished.outcome
-    left = leave_report(finished.log, folder, film=film)
-    for line in left.notes:
-        print(f"snakewalk: {line}", file=sys.stderr)
+    left = leave(finished.log, folder, film=film)
     show(
         {
             "run": name,
@@ -67,8 +68,7 @@ def run(
             **finished.pose,
             "log": str(finished.log),
             "summary": str(folder / "summary.json"),
-            "report": None if left.report is None else str(left.report),
-            "film": None if left.film is None else str(left.film),
+            **left.facts(),
         },
         as_json,
     )

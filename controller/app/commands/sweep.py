@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from controller.app.commands.common import Json, console
+from controller.app.picture_file import check_picture
 
 _HEADS = {
     "gait": "gait",
@@ -50,7 +51,6 @@ def sweep(
     as_json: Json = False,
 ) -> None:
     """Measure gaits over their parameters: speed, cost of transport, torque, heat, slip."""
-    from controller.app.gait_picture import check_picture  # noqa: PLC0415  heavy
     from controller.app.sweep.digest import digest  # noqa: PLC0415
     from controller.app.sweep.measure import measure  # noqa: PLC0415
     from controller.app.sweep.picture import draw_sweep  # noqa: PLC0415
@@ -59,8 +59,7 @@ def sweep(
     from controller.app.sweep.table import Table as Sweep  # noqa: PLC0415
     from controller.app.sweep.table import read_table  # noqa: PLC0415
 
-    if picture is not None:
-        check_picture(picture)
+    check_picture(picture)
     planned = plan_sweep(gaits, robot, points, seed=seed, seconds=seconds)
     for line in () if as_json else planned.left_out:
         console.print(f"left out: {line}", style="dim")

@@ -10,6 +10,7 @@ from rich.progress import track as progress
 from rich.table import Table
 
 from controller.app.commands.common import Json, console
+from controller.app.picture_file import check_picture
 
 if TYPE_CHECKING:
     from controller.shape.study import StudyResult
@@ -41,10 +42,7 @@ def walk(
     from controller.shape.study import run_study  # noqa: PLC0415
     from controller.shape.walks import RULES, check_rule  # noqa: PLC0415
 
-    if picture is not None:
-        from controller.app.walk_picture import check_file, draw  # noqa: PLC0415
-
-        check_file(picture)
+    check_picture(picture)
     graphs, rules = graph or ["er:1000:9"], rule or list(RULES)
     for spec in graphs:  # refuse bad input before any work starts
         graph_source(spec)
@@ -56,6 +54,8 @@ def walk(
         for spec, name in progress(cases, "walks", console=Console(stderr=True), transient=True)
     ]
     if picture is not None:
+        from controller.app.walk_picture import draw  # noqa: PLC0415
+
         draw(found, picture)
     if as_json:
         print(json.dumps([result.to_dict() for result in found]))

@@ -23,6 +23,13 @@ class Left:
     notes: tuple[str, ...]
     """One line each."""
 
+    def facts(self) -> dict[str, object]:
+        """Names of the files, for a command's answer."""
+        return {
+            "report": None if self.report is None else str(self.report),
+            "film": None if self.film is None else str(self.film),
+        }
+
 
 def leave_report(log: Path, folder: Path, *, film: bool = True, fine: bool = False) -> Left:
     """Make ``folder/film.mp4``, ``folder/summary.json`` and ``folder/report.html`` from a log.

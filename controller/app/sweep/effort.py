@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.app.footing import CLEAR_M
-from controller.motion.gait_motion import STOP_S
+from controller.motion.coming_to_rest import STOP_S
 from drivers.telemetry.record import RunRecord
 from sim.bus.motor import MOTORS
 

@@ -10,7 +10,8 @@ import numpy as np
 from config.errors import InputError
 from controller.app.execute import execute
 from controller.app.gait_way import SKIPPED_S, gait_way
-from controller.app.prepare_gait import PreparedGait, prepare_gait
+from controller.app.prepare_gait import prepare_gait
+from controller.app.prepared_gait import PreparedGait
 from controller.app.sweep.effort import effort
 from controller.app.sweep.points import Point
 from drivers.telemetry.reader import read_log

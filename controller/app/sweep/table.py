@@ -3,7 +3,6 @@
 import csv
 import io
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -93,10 +92,3 @@ class Table:
 def number(row: dict[str, str], key: str) -> float:
     """A cell as a number; NaN where it is empty."""
     return float(row[key]) if row[key] else float("nan")
-
-
-def rows_of(rows: list[dict[str, str]], gait: str, robot: str) -> Iterator[dict[str, str]]:
-    """Rows of one gait on one robot that ran."""
-    for row in rows:
-        if row["gait"] == gait and row["robot"] == robot and row["cycles"]:
-            yield row

@@ -10,7 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +18,12 @@ from scipy.optimize import Bounds, differential_evolution
 
 from config.errors import InputError
 from config.loader import load_robot
-from controller.app.sweep.measure import Row, measure
+from controller.app.sweep.measure import measure
+from controller.app.sweep.objective import Aim, Task, cost, loss, pace, task_of
 from controller.app.sweep.points import Point, Space
-from controller.gaits.gait import Aim as Goal
 from controller.gaits.registry import make_gait
 
 Floats = NDArray[np.float64]
-Aim = Literal["speed", "efficiency"]
-LAGGARD = 0.5
-"""For efficiency: share of the defaults' speed below which a gait does not count as moving."""
-_WORST = 1e3
 _GENERATION = 8
 """Points a parameter and generation would be scipy's 15; runs of physics are dear."""
 
@@ -58,43 +54,6 @@ class Tuned:
         return int((better if self.aim == "speed" else ~better).sum())
 
 
-@dataclass(frozen=True, slots=True)
-class Task:
-    """What is asked of a gait."""
-
-    aim: Aim
-    goal: Goal
-    toward: tuple[float, float] = (1.0, 0.0)
-    """Unit vector, forward and left: where the defaults go. Another way is another gait."""
-    least: float = 0.0
-    """Pace of the defaults."""
-
-
-def pace(row: Row, task: Task) -> float:
-    """How fast it does what it is there for, m/s or rad/s; 0 where it did not run to its end."""
-    if row.get("ended") != "ran to its end" or row.get("speed_m_s") is None:
-        return 0.0
-    if task.goal == "turn":
-        return abs(_value(row, "turn_rad_cycle")) * _value(row, "ran_hz")
-    if task.goal == "climb":
-        return abs(_value(row, "climb_m_s"))
-    way = _value(row, "forward_bl_cycle"), _value(row, "left_bl_cycle")
-    share = (way[0] * task.toward[0] + way[1] * task.toward[1]) / max(math.hypot(*way), 1e-12)
-    return max(0.0, _value(row, "speed_m_s") * share)
-
-
-def loss(row: Row, task: Task) -> float:
-    """What is made small; a gait that trips, is derated, or hardly moves is no answer."""
-    speed = pace(row, task)
-    if speed <= 0.0 or _value(row, "least_rate") < 1.0:
-        return _WORST
-    if task.aim == "speed":
-        return -speed
-    if speed < LAGGARD * task.least:
-        return _WORST * (1.0 - speed / max(task.least, 1e-9))
-    return _cost(row, task)
-
-
 def tune(
     gait: str,
     robot: str,
@@ -122,7 +81,7 @@ def tune(
     # fresh interpreters: forked ones would share MuJoCo's and numba's threads
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         first = measure(start)
-        task = _task(first, aim, kind.aim)
+        task = task_of(first, aim, kind.aim)
         if task.least <= 0.0:
             raise InputError(f"{gait} on {robot}: the defaults do not move it: {first['ended']}")
         done = 1
@@ -161,15 +120,6 @@ def tune(
     return Tuned(gait, body.name, aim, values, done, before, after)
 
 
-def _task(row: Row, aim: Aim, goal: Goal) -> Task:
-    """Judge others by what the defaults do."""
-    forward, left = _value(row, "forward_bl_cycle"), _value(row, "left_bl_cycle")
-    size = math.hypot(forward, left)
-    toward = (forward / size, left / size) if size > 1e-9 else (1.0, 0.0)
-    task = Task(aim, goal, toward)
-    return replace(task, least=pace(row, task))
-
-
 def _around(centre: Floats, people: int, rng: np.random.Generator) -> Floats:
     """First generation: the defaults, half of the others near them, the rest anywhere."""
     near = np.clip(centre + 0.15 * rng.standard_normal((people // 2, len(centre))), 0.0, 1.0)
@@ -189,16 +139,4 @@ def _scored(point: Point, vary: int, *, task: Task) -> float:
         return pace(row, task)
     if pace(row, task) <= 0.0:
         return math.inf
-    return _cost(row, task)
-
-
-def _cost(row: Row, task: Task) -> float:
-    """Cost of transport, or joules a radian."""
-    if task.goal == "turn":
-        return _value(row, "power_w") / pace(row, task)
-    return _value(row, "cost_of_transport")
-
-
-def _value(row: Row, key: str) -> float:
-    value = row.get(key)
-    return float(value) if isinstance(value, int | float) else math.nan
+    return cost(row, task)
