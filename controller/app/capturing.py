@@ -84,7 +84,7 @@ def capture_file(wanted: Wanted) -> dict[str, object]:
         if wanted.sheet is not None:
             contact_sheet(wanted.sheet, footage.read(), captured)
         if wanted.steps is not None:
-            number = int(np.argmax(captured.good))
+            number = int(np.argmax(captured.used))
             image = next(islice(footage.read(), number, None))
             step_picture(wanted.steps, image, eye, captured.points_px[number])
         if wanted.overlay is not None:
@@ -131,19 +131,23 @@ def _facts(
     wanted: Wanted, footage: Footage, eye: Eye, captured: Capture, m_per_px: float | None
 ) -> dict[str, object]:
     length_px = float(np.nanmedian(captured.length_px))
-    good = int(captured.good.sum())
+    known = captured.expected_px[np.isfinite(captured.expected_px)]
+    error_px = float(np.median(known)) if known.size else float("nan")
     unsure = int(np.count_nonzero(captured.margin < 0.1))
     return {
         "recording": str(wanted.recording),
         "track": str(wanted.output),
         "frames": len(captured.verdict),
-        "frames_used": good,
+        "frames_used": int(captured.used.sum()),
+        "frames_rough": int((captured.used & ~captured.good).sum()),
+        "frames_with_company": int(captured.accompanied.sum()),
         "verdicts": captured.counts,
         "rate_hz": footage.rate_hz,
         "rate_assumed": footage.rate_assumed,
         "background": eye.how,
         "animal": str(eye.look),
         "length_px": round(length_px, 2),
+        "expected_error_px": None if np.isnan(error_px) else round(error_px, 3),
         "length_m": None if m_per_px is None else round(length_px * m_per_px, 5),
         "head_by": captured.head_by,
         "head_sure": round(captured.head_sure, 3),

@@ -17,12 +17,11 @@ def refuse_to_overwrite(paths: Sequence[Path | None], force: bool) -> None:
 
     """
     wanted = [path for path in paths if path is not None]
-    faults = [f"{path}: exists; say --force to replace it" for path in wanted if path.exists()]
+    faults = [f"{path}: exists; --force overwrites it" for path in wanted if path.exists()]
     if force:
         faults = [f"{path}: is a folder" for path in wanted if path.is_dir()]
-    faults += [
-        f"{path}: there is no folder {path.parent}" for path in wanted if not path.parent.is_dir()
-    ]
+    folders = dict.fromkeys(path.parent for path in wanted)
+    faults += [f"{folder}: no such folder" for folder in folders if not folder.is_dir()]
     if len({path.absolute() for path in wanted}) < len(wanted):
         faults.append("two results have the same name")
     if faults:

@@ -72,7 +72,7 @@ def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Pat
 def test_nothing_is_overwritten_without_force(swim: Path, tmp_path: Path) -> None:
     track = tmp_path / "t.npz"
     track.write_bytes(b"mine")
-    with pytest.raises(InputError, match=r"t\.npz: exists; say --force"):
+    with pytest.raises(InputError, match=r"t\.npz: exists; --force overwrites it"):
         capture_file(Wanted(swim, track))
     assert track.read_bytes() == b"mine"
     capture_file(Wanted(swim, track, force=True))
@@ -146,7 +146,7 @@ def test_bad_files_end_with_exit_code_2_and_one_line(tmp_path: Path) -> None:
         ({"recording": "empty.mp4"}, "is an empty file"),
         ({"recording": "bare"}, "holds no images"),
         ({"output": "track.txt"}, "a track is an .npz"),
-        ({"output": "no/folder/t.npz"}, "there is no folder"),
+        ({"output": "no/folder/t.npz"}, "no/folder: no such folder"),
         ({"overlay": "o.gif"}, "an overlay film is one of"),
         ({"sheet": "s.doc"}, "a picture is one of"),
         ({"length_m": 0.0}, "longer than 0 m"),

@@ -78,8 +78,8 @@ def test_help_gives_an_example() -> None:
         (STRAIGHT, ["--robot", "hop"], "hop"),
         (STRAIGHT, ["--picture", "fit.txt"], "a picture ends in .png"),
         (STRAIGHT, ["-o", "joints.txt"], "ends in .npz"),
-        (STRAIGHT, ["-o", "curve.npz"], "curve.npz: exists; say --force"),
-        (STRAIGHT, ["-o", "nowhere/joints.npz"], "there is no folder nowhere"),
+        (STRAIGHT, ["-o", "curve.npz"], "curve.npz: exists; --force overwrites it"),
+        (STRAIGHT, ["-o", "nowhere/joints.npz"], "nowhere: no such folder"),
     ],
 )
 def test_bad_input_ends_with_code_2_and_one_line(

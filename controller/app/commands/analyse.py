@@ -10,8 +10,9 @@ from rich.progress import track as progress
 from rich.table import Table
 
 from config.errors import InputError
-from controller.app.commands.common import Json, console, refuse_existing
+from controller.app.commands.common import Json, console
 from controller.app.picture_file import check_picture
+from controller.app.whole_file import refuse_to_overwrite
 
 
 def analyse(
@@ -73,7 +74,7 @@ def _pictures(recordings: list[str], picture: Path | None, force: bool) -> list[
         files = [picture / f"{Path(name).stem}.png" for name in recordings]
     if len(set(files)) < len(files):
         raise InputError(f"{picture}: two recordings have the same name; draw them one by one")
-    refuse_existing(force, *files)
+    refuse_to_overwrite(files, force)
     return list(files)
 
 

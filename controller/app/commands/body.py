@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from config.errors import InputError
-from controller.app.commands.common import Force, Json, refuse_existing, show
+from controller.app.commands.common import Force, Json, show
 from controller.app.picture_file import check_picture
+from controller.app.whole_file import refuse_to_overwrite
 
 if TYPE_CHECKING:
     import numpy as np
@@ -54,9 +55,7 @@ def body(
 
     check_picture(picture)
     drawn = [] if picture is None else [picture]
-    refuse_existing(force, *mesh_files(output, image is not None), *drawn)
-    if not output.parent.is_dir():
-        raise InputError(f"{output.parent}: no such folder")
+    refuse_to_overwrite([*mesh_files(output, image is not None), *drawn], force)
     texture, shown = None, None
     if track in EMBEDDED:
         if image is not None or side is not None:

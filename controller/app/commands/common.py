@@ -9,8 +9,6 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from config.errors import InputError
-
 if TYPE_CHECKING:
     from controller.app.report.leave import Left
 
@@ -45,18 +43,6 @@ def show(found: dict[str, object], as_json: bool) -> None:
         text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
         table.add_row(key.replace("_", " "), str(text))
     console.print(table)
-
-
-def refuse_existing(force: bool, *files: Path | None) -> None:
-    """Refuse to overwrite files, before any work is done.
-
-    Raises:
-        InputError: the first that is there, without ``force``.
-
-    """
-    for file in files:
-        if file is not None and file.exists() and not force:
-            raise InputError(f"{file}: exists; --force overwrites it")
 
 
 def leave(log: Path, folder: Path, *, film: bool, fine: bool = False) -> "Left":

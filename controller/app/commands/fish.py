@@ -10,6 +10,7 @@ from rich.progress import Progress
 from config.errors import InputError
 from controller.app.commands.common import Force, Json, show
 from controller.app.picture_file import check_picture
+from controller.app.whole_file import refuse_to_overwrite
 
 if TYPE_CHECKING:
     from controller.capture.fish.postures import Postures
@@ -83,7 +84,7 @@ def match(
     from controller.capture.fish.accuracy import compare  # noqa: PLC0415
     from controller.capture.fish.postures import load_postures, save_postures  # noqa: PLC0415
 
-    _free(force, output, picture)
+    refuse_to_overwrite([output, picture], force)
     check_picture(picture)
     if length is not None and not 0.0 < length < 1e3:
         raise InputError(f"--length: a body length in metres, above 0; not {length:g}")
@@ -145,7 +146,7 @@ def synthesise(
     from controller.app.fish_synthesis import Wanted, synthesise_motion  # noqa: PLC0415
     from controller.capture.fish.postures import load_postures  # noqa: PLC0415
 
-    _free(force, output, picture)
+    refuse_to_overwrite([output, picture], force)
     check_picture(picture)
     wanted = Wanted(
         through=_points(through or []), seconds=seconds, seed=seed, radius=radius, limit_s=limit,
@@ -172,15 +173,6 @@ def _points(words: list[str]) -> list[tuple[float, float]]:
             raise InputError(f"--through {word}: a control point is X,Y, as in 3,-1.5") from None
         found.append((x, y))
     return found
-
-
-def _free(force: bool, *files: Path | None) -> None:
-    """Refuse to overwrite before any work is done."""
-    for file in files:
-        if file is not None and file.exists() and not force:
-            raise InputError(f"{file}: is there already; --force overwrites it")
-        if file is not None and file.is_dir():
-            raise InputError(f"{file}: is a folder; give a file")
 
 
 def _bar() -> Progress:

@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from controller.app.commands.common import show
-from controller.app.commands.repertoire import bar, carry_out, free
+from controller.app.commands.repertoire import bar, carry_out
+from controller.app.whole_file import refuse_to_overwrite
 
 
 def plan_with_repertoire(
@@ -27,7 +28,7 @@ def plan_with_repertoire(
     )
     from controller.app.repertoire_timing import search_cost  # noqa: PLC0415
 
-    free(out, force)
+    refuse_to_overwrite([out], force)
     job = plan_route(run, repertoire, robot=robot, world=world, beam=beam)
     found = plan_facts(job)
     if not as_json:

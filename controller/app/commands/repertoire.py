@@ -9,7 +9,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from config.errors import InputError
 from controller.app.commands.common import (
     Film,
     Force,
@@ -18,10 +17,10 @@ from controller.app.commands.common import (
     RunPort,
     console,
     leave,
-    refuse_existing,
     show,
 )
 from controller.app.picture_file import check_picture
+from controller.app.whole_file import refuse_to_overwrite
 
 if TYPE_CHECKING:
     from controller.app.repertoire_job import RepertoireJob
@@ -49,8 +48,7 @@ def record(
     body, ground = load_robot(robot), load_world(world)
     flat(ground)
     file = out or default_file(robot, world)
-    free(file, force)
-    free(picture, force)
+    refuse_to_overwrite([file, picture], force)
     check_picture(picture)
     with bar() as progress:
         task = progress.add_task("record", total=float(len(ACTIONS)))
@@ -80,7 +78,7 @@ def show_file(
     from controller.repertoire.repertoire import load_repertoire  # noqa: PLC0415
 
     repertoire = load_repertoire(file)
-    free(picture, force)
+    refuse_to_overwrite([picture], force)
     check_picture(picture)
     if picture is not None:
         draw_actions(repertoire, picture)
@@ -102,7 +100,7 @@ def run_plan(
     """Run a plan on servos or in the simulator, and compare predicted with measured poses."""
     from controller.app.repertoire_planning import load_plan  # noqa: PLC0415  heavy
 
-    free(picture, force)
+    refuse_to_overwrite([picture], force)
     job = load_plan(plan, replan=not open_loop)
     found, complete = carry_out(job, port, out, film, picture)
     show({"plan": str(plan), **found}, as_json)
@@ -128,18 +126,6 @@ def carry_out(
     if picture is not None:
         draw_way(job, read_log(log), picture)
     return ran.facts() | {"log": str(log)} | left.facts(), ran.complete
-
-
-def free(path: Path | None, force: bool) -> None:
-    """Refuse to overwrite, or to write where there is no folder.
-
-    Raises:
-        InputError: one line.
-
-    """
-    refuse_existing(force, path)
-    if path is not None and not path.parent.is_dir():
-        raise InputError(f"{path}: no such folder {path.parent}")
 
 
 def bar() -> Progress:

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from config.errors import InputError
 from controller.app.commands.common import Json, Robot, show
+from controller.app.whole_file import refuse_to_overwrite
 
 
 def tune(
@@ -35,8 +36,7 @@ def tune(
 
     if out is not None and out.suffix != ".toml":
         raise InputError(f"{out}: a set of parameters ends in .toml")
-    if out is not None and out.exists() and not force:
-        raise InputError(f"{out}: is there already; --force overwrites it")
+    refuse_to_overwrite([out], force)
     body = robot or ("alternating16" if make_gait(gait).needs.pitch else "yaw16")
     bar = progress.Progress(console=Console(stderr=True))
     with bar:
