@@ -11,8 +11,11 @@ Rules, each against something that happens on real buses:
 - Fast reads that keep failing are given up for plain ones, where damage ends with its packet.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +23,16 @@ from numpy.typing import NDArray
 from drivers.debts import Debts
 from drivers.group_answer import GroupAnswer, GroupQuestion
 from drivers.group_write import GroupWrite
-from drivers.port import AskingPort, BytePort
+from drivers.port import AskingPort, BytePort, FilePort
+
+if TYPE_CHECKING:
+    from drivers.express import Express
 
 _PATIENCE = 3
 """Reads in a row after which a silent servo no longer has a say in the length."""
 _KEPT_QUESTIONS = 64
+SPIN_S = 40e-6
+"""About how late a program is woken; awake sooner, it costs more of the processor than it saves."""
 
 
 @dataclass(slots=True)
@@ -57,6 +65,7 @@ class GroupCycle:
         fast_failures: int = 3,
         clean_reads: int = 50,
         debts: Debts | None = None,
+        spin_s: float = SPIN_S,
     ) -> None:
         """Prepare the packets.
 
@@ -72,12 +81,15 @@ class GroupCycle:
             fast_failures: fast reads failing in a row until plain ones are used.
             clean_reads: clean reads in a row until the order is the usual one again.
             debts: answers still open on this port, shared by all who ask on it; None: nobody else.
+            spin_s: on a device, sleep until so long before the answer should be complete, then look
+                without sleeping, at most twice as long: shorter cycles, more CPU; 0: sleep always.
 
         """
         self._port = port
         self._asking = port if isinstance(port, AskingPort) else None
         self._count = len(ids)
         self._goals = GroupWrite(ids, goal_address)
+        self._express: Express | None = None
         self._ids = tuple(ids)
         self._natural = tuple(range(len(ids)))
         self._order = self._natural
@@ -94,13 +106,27 @@ class GroupCycle:
         self._missed = np.zeros(len(ids), np.intp)
         self._sent_until_s = port.clock.now_s()
         self._usual = GroupQuestion(ids, read_address, read_bytes, fast=fast)
+        if isinstance(port, FilePort) and port.file is not None:
+            from drivers.express import Express  # noqa: PLC0415  slow, optional
+
+            delay_s = self._delay_s(self._usual)
+            self._express = Express(
+                port, self._goals, self._usual, delay_s=delay_s, latency_s=latency_s, spin_s=spin_s
+            )
         self.fast = fast
         """Whether the next read is a fast one."""
         self.counters = CycleCounters()
 
     def write_goals(self, goals: NDArray[np.int32]) -> None:
         """Send raw goals (N,); servos do not answer a sync write."""
-        self._send(self._goals.encode(goals))
+        if self._express is None:
+            self._send(self._goals.encode(goals))
+            return
+        sent = self._express.write(goals)
+        if not sent:
+            self._send(self._goals.encode(goals))
+        elif sent < self._goals.size:
+            self._port.write(self._goals.encode(goals)[sent:])
 
     def turn(self, goals: NDArray[np.int32]) -> GroupAnswer:
         """``write_goals`` and ``read`` in one: both packets leave in one write, back to back.
@@ -109,7 +135,7 @@ class GroupCycle:
             PortError: the port is gone.
 
         """
-        return self._read(self._goals.encode(goals))
+        return self._read(goals)
 
     def read(self) -> GroupAnswer:
         """Ask all servos for their block; ``data`` is (N, read_bytes).
@@ -118,13 +144,28 @@ class GroupCycle:
             PortError: the port is gone.
 
         """
-        return self._read(b"")
+        return self._read(None)
 
-    def _read(self, before: bytes) -> GroupAnswer:
-        """Ask, behind a packet that nobody answers."""
-        question, order = self._question(), self._order
+    def _read(self, goals: NDArray[np.int32] | None) -> GroupAnswer:
+        """Ask, behind goals if there are any."""
         self.counters.reads += 1
-        raw, answer = self._ask(question, before)
+        express, question, order = self._express, self._usual, self._order
+        raw = None
+        if (
+            express is not None
+            and order is self._natural
+            and self.fast is self._usual.fast
+            and (not self._debts.owed or self._debts.none)
+        ):
+            found = express.turn(goals)
+            if isinstance(found, GroupAnswer):
+                self._succeeded()
+                return found
+            if found is not None:
+                raw, answer = self._go_on(question, found, express.left_s)
+        if raw is None:
+            question = self._question()
+            raw, answer = self._ask(question, goals)
         heard = answer.answered
         if not self._debts.none:
             answer = self._believed(question, answer)
@@ -178,15 +219,36 @@ class GroupCycle:
 
     def _note_sent(self, count: int) -> float:
         """Note when bytes will have left the host (a write does not wait for that); and now."""
-        now_s = self._port.clock.now_s()
-        self._sent_until_s = max(now_s, self._sent_until_s) + self._wire_s(count)
+        now_s, wire_s = self._port.clock.now_s(), self._wire_s(count)
+        if self._express is None:
+            self._sent_until_s = max(now_s, self._sent_until_s) + wire_s
+        else:
+            self._sent_until_s = now_s + self._express.occupy(wire_s)
         return now_s
 
-    def _ask(self, question: GroupQuestion, before: bytes) -> tuple[bytes, GroupAnswer]:
+    def _go_on(
+        self, question: GroupQuestion, raw: bytes, left_s: float
+    ) -> tuple[bytes, GroupAnswer]:
+        """Take what still comes to what has come."""
+        deadline_s, missing = self._port.clock.now_s() + left_s, question.answer_bytes - len(raw)
+        if missing > 0:
+            raw += self._port.read_until(missing, deadline_s)
+        return self._complete(question, raw, deadline_s)
+
+    def _answer_s(self, question: GroupQuestion) -> float:
+        """How long the answer takes, return delays included."""
+        return self._wire_s(question.answer_bytes) + self._delay_s(question)
+
+    def _delay_s(self, question: GroupQuestion) -> float:
+        return (1 if question.fast else self._count) * self._return_delay_s
+
+    def _ask(
+        self, question: GroupQuestion, goals: NDArray[np.int32] | None
+    ) -> tuple[bytes, GroupAnswer]:
         """Ask, and take all that comes until the answer is complete or the deadline has passed."""
-        port, request = self._port, before + question.request
-        delays = 1 if question.fast else self._count
-        wait_s = self._wire_s(question.answer_bytes) + delays * self._return_delay_s
+        port, before = self._port, b"" if goals is None else self._goals.encode(goals)
+        request = before + question.request
+        wait_s = self._answer_s(question)
         if self._asking is not None:
             now_s = self._note_sent(len(request))
             deadline_s = self._sent_until_s + wait_s + self._latency_s
@@ -196,10 +258,16 @@ class GroupCycle:
             self._send(request)
             deadline_s = self._sent_until_s + wait_s + self._latency_s
             raw = port.read_until(question.answer_bytes, deadline_s)
+        return self._complete(question, raw, deadline_s)
+
+    def _complete(
+        self, question: GroupQuestion, raw: bytes, deadline_s: float
+    ) -> tuple[bytes, GroupAnswer]:
+        """Read the answer, and take what stuffing has added to it."""
         answer = question.parse(raw)
         while len(raw) >= question.answer_bytes and not answer.complete:
             more = question.missing_bytes(raw)  # stuffed bytes come on top
-            got = port.read_until(more, deadline_s + self._wire_s(more)) if more else b""
+            got = self._port.read_until(more, deadline_s + self._wire_s(more)) if more else b""
             if not got:
                 break
             raw += got
@@ -210,9 +278,9 @@ class GroupCycle:
         return count * 10.0 / self._port.getBaudRate()
 
     def _succeeded(self) -> None:
-        self._failed_in_a_row = 0
         self._clean_in_a_row += 1
         if self._clean_in_a_row == 1:
+            self._failed_in_a_row = 0
             self._missed[:] = 0
         if self._clean_in_a_row >= self._clean_reads:
             self._order = self._natural

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.protocol.crc import crc16
-from drivers.protocol.group_frames import FLAWLESS, IRREGULAR, Frames, quickest_frames
+from drivers.protocol.group_frames import FLAWLESS, HEAD, IRREGULAR, Frames, quickest_frames
 from drivers.protocol.packet import (
     BROADCAST_ID,
     HEADER,
@@ -75,8 +75,9 @@ class GroupQuestion:
             HEADER + bytes([servo_id]) + (length + 4).to_bytes(2, "little") + bytes([STATUS])
             for servo_id in ids
         )
-        self._heads = np.frombuffer(heads, np.uint8).reshape(count, 8).copy()
-        self._head = np.frombuffer(self._fast_head, np.uint8).copy()
+        heads = self._fast_head if fast else heads
+        self.heads = np.frombuffer(heads, np.uint8).reshape(-1, HEAD).copy()
+        """(N, 8) how the answers must begin; (1, 8) if fast."""
         self._id_bytes = np.array(self.ids, np.uint8)
         self._frames = frames
         self._error = np.zeros(count, np.uint8)
@@ -93,6 +94,14 @@ class GroupQuestion:
                 return answer
         return self._salvage_fast(raw) if self.fast else self._salvage_plain(raw)
 
+    def regular(self, found: int, data: Bytes, error: Bytes) -> GroupAnswer:
+        """All answers as they should be: what ``Frames`` found, and filled; ``data`` is kept."""
+        there = self._all_there
+        if found == FLAWLESS:
+            return GroupAnswer(data, there, self._no_error, there, clean=True)
+        error = error.copy()
+        return GroupAnswer(data, (error & _RESULT) == 0, error, there, clean=True)
+
     def missing_bytes(self, raw: bytes) -> int:
         """How many bytes more would complete plain answers that stuffing made longer; 0 if none."""
         if self.fast:
@@ -106,16 +115,12 @@ class GroupQuestion:
         """All answers as they should be; None if anything is otherwise."""
         data = np.empty((len(self.ids), self.length), np.uint8)
         if self.fast:
-            found = self._frames.read_fast(raw, self._head, self._id_bytes, data, self._error)
+            found = self._frames.read_fast(raw, self.heads[0], self._id_bytes, data, self._error)
         else:
-            found = self._frames.read_plain(raw, self._heads, data, self._error)
+            found = self._frames.read_plain(raw, self.heads, data, self._error)
         if found == IRREGULAR:
             return None
-        there = self._all_there
-        if found == FLAWLESS:
-            return GroupAnswer(data, there, self._no_error, there, clean=True)
-        error = self._error.copy()
-        return GroupAnswer(data, (error & _RESULT) == 0, error, there, clean=True)
+        return self.regular(found, data, self._error)
 
     def _salvage_plain(self, raw: bytes) -> GroupAnswer:
         reader = PacketReader()

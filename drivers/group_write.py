@@ -25,7 +25,13 @@ class GroupWrite:
         packet = InstructionPacket(BROADCAST_ID, Instruction.SYNC_WRITE, head + entries)
         self._frame = np.frombuffer(encode_instruction(packet), np.uint8).copy()
         self._values = np.zeros(len(ids), np.int32)
+        self.size = len(self._frame)
+        """Of the packet, unless it is stuffed."""
         self._fill = frames.fill
+
+    def template(self) -> NDArray[np.uint8]:
+        """Packet to fill, a new array."""
+        return self._frame.copy()
 
     def encode(self, values: NDArray[np.int32]) -> bytes:
         """Packet that writes ``values`` (N,); stuffed where the values need it."""

@@ -123,6 +123,22 @@ class AskingPort(Protocol):
         ...
 
 
+@runtime_checkable
+class FilePort(Protocol):
+    """A byte port on a file that compiled code may write and read in its place."""
+
+    file: int | None
+    """Descriptor, does not block; None: there is no compiler, or it is closed: use the port."""
+
+    def getBaudRate(self) -> int:
+        """As ``SdkPort`` says."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """As ``BytePort`` says."""
+        ...
+
+
 def reopen(port: BytePort) -> None:
     """Close and open again, after the port was gone.
 

@@ -49,6 +49,8 @@ class SerialPort:
         self._readable, self._writable = select.poll(), select.poll()
         self._answer = np.empty(_LONGEST, np.uint8)
         self._exchange = None
+        self.file: int | None = None
+        """Descriptor for compiled code, while there is any and the port is open."""
         if sys.platform == "linux" and find_spec("numba") is not None:
             from drivers.compiled_exchange import exchange  # noqa: PLC0415  slow, optional
 
@@ -138,11 +140,11 @@ class SerialPort:
             self.clearPort()
             self.write(request)
             return self.read_until(count, self._clock.now_s() + wait_s)
-        question, answer = np.frombuffer(request, np.uint8), self._answer
+        question, answer = np.frombuffer(request, np.uint8), self._answer[:count]
         begun_s = self._clock.now_s()
-        got = self._exchange(self._descriptor, question, answer, count, int(wait_s * 1e9))
+        got = self._exchange(self._descriptor, question, answer, int(wait_s * 1e9))
         if got == count:
-            return answer[:count].tobytes()
+            return answer.tobytes()
         if got < 0:
             self.write(request[-1 - got :])
             begun_s, got = self._clock.now_s(), 0
@@ -180,7 +182,7 @@ class SerialPort:
     def closePort(self) -> None:
         if self._serial is not None:
             self._serial.close()
-            self._serial = None
+            self._serial = self.file = None
         self.is_using = False
 
     def clearPort(self) -> None:
@@ -243,6 +245,7 @@ class SerialPort:
             self._serial.reset_input_buffer()
         except (serial.SerialException, OSError, ValueError) as error:
             raise PortError(self._why(error)) from error
+        self.file = int(self._serial.fileno()) if self._exchange is not None else None
         self._readable, self._writable = select.poll(), select.poll()
         self._readable.register(self._serial.fileno(), select.POLLIN)
         self._writable.register(self._serial.fileno(), select.POLLOUT)

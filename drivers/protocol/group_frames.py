@@ -19,6 +19,8 @@ HEAD = 8
 """Bytes of a status packet in front of its error byte, and of a fast answer in front of all."""
 PARAMS_AT, VALUES_AT = 8, 12
 """In a sync write: its parameters; behind address and length, the servos' shares."""
+SHARE_BYTES = 5
+"""In it, of each servo: ID and value."""
 
 
 class Frames(Protocol):
@@ -81,7 +83,7 @@ class NumpyFrames:
     @staticmethod
     def fill(frame: Bytes, values: NDArray[np.int32]) -> bool:
         """As ``Frames`` says."""
-        shares = frame[VALUES_AT:-2].reshape(len(values), 5)
+        shares = frame[VALUES_AT:-2].reshape(len(values), SHARE_BYTES)
         shares[:, 1:] = values.astype("<i4").view(np.uint8).reshape(len(values), 4)
         crc = crc16_long(frame[:-2])
         frame[-2:] = crc & 0xFF, crc >> 8

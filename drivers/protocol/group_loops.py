@@ -14,6 +14,7 @@ from drivers.protocol.group_frames import (
     HEAD,
     IRREGULAR,
     PARAMS_AT,
+    SHARE_BYTES,
     VALUES_AT,
     WITH_ERRORS,
 )
@@ -97,7 +98,7 @@ def fill(frame: Bytes, values: NDArray[np.int32]) -> bool:
     for servo in range(len(values)):
         value = int(values[servo])
         for k in range(4):
-            frame[VALUES_AT + 5 * servo + 1 + k] = (value >> (8 * k)) & 0xFF
+            frame[VALUES_AT + SHARE_BYTES * servo + 1 + k] = (value >> (8 * k)) & 0xFF
     end = len(frame) - 2
     crc = int(_crc(frame, 0, end))
     frame[end], frame[end + 1] = crc & 0xFF, crc >> 8
