@@ -6,8 +6,7 @@ to belong to the question, servo by servo.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +30,7 @@ _RESULT = 0x7F
 _FRAMES = quickest_frames()
 
 
-@dataclass(frozen=True, slots=True)
-class GroupAnswer:
+class GroupAnswer(NamedTuple):
     """One result per servo, in the order asked."""
 
     data: Bytes
@@ -45,11 +43,13 @@ class GroupAnswer:
     """(N,) whether a status packet came at all."""
     clean: bool
     """Nothing but the expected bytes was on the line."""
+    whole: bool = False
+    """Known to be complete, as it came in one piece."""
 
     @property
     def complete(self) -> bool:
         """Whether all have answered."""
-        return int(np.count_nonzero(self.answered)) == len(self.answered)
+        return self.whole or int(np.count_nonzero(self.answered)) == len(self.answered)
 
 
 class GroupQuestion:
@@ -98,9 +98,9 @@ class GroupQuestion:
         """All answers as they should be: what ``Frames`` found, and filled; ``data`` is kept."""
         there = self._all_there
         if found == FLAWLESS:
-            return GroupAnswer(data, there, self._no_error, there, clean=True)
+            return GroupAnswer(data, there, self._no_error, there, clean=True, whole=True)
         error = error.copy()
-        return GroupAnswer(data, (error & _RESULT) == 0, error, there, clean=True)
+        return GroupAnswer(data, (error & _RESULT) == 0, error, there, clean=True, whole=True)
 
     def missing_bytes(self, raw: bytes) -> int:
         """How many bytes more would complete plain answers that stuffing made longer; 0 if none."""

@@ -25,6 +25,7 @@ from drivers.types import BodyPose, JointCommand, JointState
 Floats = NDArray[np.float64]
 PoseSource = Callable[[JointState], BodyPose]
 _SETTLE_S = 0.3
+_LATCHED = suppress(SafetyTrippedError)
 
 
 class Watcher(Protocol):
@@ -167,7 +168,7 @@ class Drive:
     ) -> None:
         before_s = self._wire_s
         # a veto latches: torque is off, the loop ends, and the log gets this cycle all the same
-        with suppress(SafetyTrippedError):
+        with _LATCHED:
             self._link.write(JointCommand(self._clock.now_s(), goal))
         verdict = self._link.last_verdict
         self._wire_s = self._wire_busy_s()

@@ -70,6 +70,7 @@ class Pilot:
         self._fall_back = fall_back
         self._pitch_rad: Floats | None = None
         self._waypoints_m = np.asarray(waypoints_m, float)
+        self._goals_m: list[list[float]] = self._waypoints_m.tolist()  # to numbers once, for speed
         self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
         self._length_m = length_m
         self._lay_path(np.asarray(start_m, float), 0)
@@ -89,7 +90,7 @@ class Pilot:
     @property
     def done(self) -> bool:
         """Whether every waypoint has been reached."""
-        return self.reached == len(self._waypoints_m)
+        return self.reached == len(self._goals_m)
 
     @property
     def at_rest(self) -> bool:
@@ -146,7 +147,8 @@ class Pilot:
         """Count a waypoint when the centre is near it; when it was passed by, go back for it."""
         if self.done:
             return
-        if math.dist(self._waypoints_m[self.reached], centre_m) <= self._radius_m:
+        x_m, y_m = self._goals_m[self.reached]
+        if math.hypot(x_m - centre_m[0], y_m - centre_m[1]) <= self._radius_m:
             self.reached += 1
             self._fall_back(False)
         elif self._feedback and self.head >= self._patience and self._astray(centre_m):
@@ -159,7 +161,7 @@ class Pilot:
     def _astray(self, centre_m: Floats) -> bool:
         """Whether the next waypoint has been passed by, or the path been left by half a body."""
         path, end_m = self.path, self.path.length_m
-        along_m, gap_m = self._along_m[0], self._gap_m[0]
+        along_m, gap_m = float(self._along_m[0]), float(self._gap_m[0])
         if along_m >= end_m - 1e-6:  # how far beyond the end, the way that the path led there
             last = path.position([end_m - 0.05, end_m])
             ahead = (last[1] - last[0]) / 0.05
@@ -173,7 +175,7 @@ class Pilot:
         """Plan from a point through the waypoints from ``first`` on."""
         self.path = self._plan(np.vstack([from_m, self._waypoints_m[first:]]))
         self._along_m = np.zeros(2)  # of the body's centre, and of its head
-        self._passed_m = np.zeros(len(self._waypoints_m))
+        self._passed_m = [0.0] * len(self._waypoints_m)
         at = 0.0
         for k in range(first, len(self._waypoints_m)):
             at = self._passed_m[k] = self.path.first_pass(self._waypoints_m[k], at)

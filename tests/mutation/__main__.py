@@ -12,6 +12,8 @@ import tomllib
 from pathlib import Path
 from types import ModuleType
 
+os.environ["NUMBA_DISABLE_JIT"] = "1"  # a mutant's loops run as they stand: nothing to compile
+
 import hypothesis  # noqa: F401  loaded once, for all forks
 import numpy  # noqa: F401
 import pytest
