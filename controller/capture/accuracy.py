@@ -19,3 +19,8 @@ def swapped(found_px: Floats, true_px: Floats) -> bool:
     """Whether the head is where the tail should be; both (P, 2), the same P."""
     same = np.hypot(*(found_px - true_px).T).mean()
     return bool(np.hypot(*(found_px[::-1] - true_px).T).mean() < same)
+
+
+def point_error(found_px: Floats, true_px: Floats) -> float:
+    """Mean distance of corresponding points, both (P, 2), the same P, px: tips count, too."""
+    return float(np.hypot(*(found_px - true_px).T).mean())

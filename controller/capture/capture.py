@@ -8,16 +8,20 @@ from numpy.typing import NDArray
 
 from config.errors import InputError
 from controller.capture.eye import Eye
-from controller.capture.identity import follow, taper_of, travel_of
-from controller.capture.medial_axis import Skeleton, no_skeleton
+from controller.capture.glimpse import LONGEST_PX, Glimpse, glimpse
+from controller.capture.identity import follow, margins, taper_of, travel_of
+from controller.capture.medial_axis import Skeleton
+from controller.capture.refine import refine
+from controller.capture.softness import axis_error_px, blur_of, softness_px
 from controller.capture.track import track_from_points
+from controller.capture.unlike import beside_the_others
 from controller.capture.verdict import Verdict
 from controller.capture.wave import measure_wave
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
-_SHORT = 0.8  # of the usual length
-_THICK = 1.5  # of the usual greatest radius
+_COMPANY = 0.08  # of the body: more than dirt and noise
+_FOLLOWED = 5  # frames for which a small body that was lost may be where it was
 _STILL = 0.02  # of the length: less change than that is no motion
 _TRAVEL = 0.2  # from which the way it travels says which end is the head
 _TRAVEL_S = 0.25
@@ -25,7 +29,7 @@ _TRAVEL_S = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Capture:
-    """A recording as skeletons; T frames, all of them, NaN where the verdict is not ``good``."""
+    """A recording as skeletons; all its T frames, NaN where neither ``good`` nor ``rough``."""
 
     points_px: Floats
     """(T, 101, 2) x, y, head first, 100 equal chords; y downwards."""
@@ -34,6 +38,11 @@ class Capture:
     length_px: Floats
     """(T,)"""
     verdict: tuple[Verdict, ...]
+    expected_px: Floats
+    """(T,) expected mean error of a point; NaN where there is none. Above a hundredth of the length
+    the verdict is ``rough``: the points are there, but not as good as is wanted."""
+    company: Floats
+    """(T,) size of the next largest thing that stands out, of the body's."""
     margin: Floats
     """(T,) how surely the head is where it was in the frame before: ``identity.Followed``."""
     rate_hz: float
@@ -44,8 +53,18 @@ class Capture:
 
     @property
     def good(self) -> NDArray[np.bool_]:
-        """(T,) frames that hold a skeleton."""
+        """(T,) frames whose points are expected within a hundredth of the length."""
         return np.array([one is Verdict.GOOD for one in self.verdict])
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """(T,) frames that hold a skeleton, good or rough."""
+        return np.asarray(np.isfinite(self.length_px))
+
+    @property
+    def accompanied(self) -> NDArray[np.bool_]:
+        """(T,) frames in which something else stands out, no speck: perhaps a small animal."""
+        return self.company > _COMPANY
 
     @property
     def counts(self) -> dict[str, int]:
@@ -78,12 +97,30 @@ def capture(
         InputError: fewer than 2 frames can be used, or nothing moves.
 
     """
-    found = []
-    for frame in frames:
-        found.append(eye.see(frame).skeleton)
+    found: list[Skeleton] = []
+    area: list[float] = []
+    company: list[float] = []
+    expected: list[float] = []
+    glimpses: dict[int, Glimpse] = {}
+    last, points = -_FOLLOWED - 1, np.empty((0, 2))
+    for number, frame in enumerate(frames):
+        look = eye.see(frame)
+        body = look.skeleton
+        found.append(body)
+        area.append(look.silhouette.area_px)
+        company.append(look.silhouette.company)
+        expected.append(np.nan)
+        if body.length_px <= LONGEST_PX:
+            last, points = number, body.points_px
+            glimpses[number] = glimpse(frame, look.ground, points)
+        elif body.verdict is Verdict.GOOD:
+            soft = softness_px(look.silhouette.level, look.silhouette.threshold)
+            expected[-1] = axis_error_px(blur_of(soft), body.length_px)
+        elif body.verdict is Verdict.BLOB and number - last <= _FOLLOWED:
+            glimpses[number] = glimpse(frame, look.ground, points)
         if seen is not None:
             seen()
-    judged = _beside_the_others(found)
+    judged = beside_the_others(follow(found).skeletons, np.array(area))
     if sum(one.verdict is Verdict.GOOD for one in judged) < 2:
         raise InputError(f"{name}: {_fault(judged)}")
     followed = follow(judged)
@@ -95,34 +132,20 @@ def capture(
             f"{len(points)} frames"
         )
     score, by = _head_first(points, radius, rate_hz, head_px, fixed=fixed)
-    if score < 0.0:
-        points, radius = points[:, ::-1].copy(), radius[:, ::-1].copy()
+    skeletons = [one.reversed() if score < 0.0 else one for one in followed.skeletons]
+    refined = refine(skeletons, glimpses, followed.margin, np.array(expected), fixed=fixed)
     return Capture(
-        points_px=points,
-        radius_px=radius,
-        length_px=np.array([one.length_px for one in followed.skeletons]),
-        verdict=tuple(one.verdict for one in followed.skeletons),
-        margin=followed.margin,
+        points_px=np.stack([one.points_px for one in refined.skeletons]),
+        radius_px=np.stack([one.radius_px for one in refined.skeletons]),
+        length_px=np.array([one.length_px for one in refined.skeletons]),
+        verdict=tuple(one.verdict for one in refined.skeletons),
+        expected_px=refined.expected_px,
+        company=np.array(company),
+        margin=margins(refined.skeletons),
         rate_hz=rate_hz,
         head_by=by,
         head_sure=min(1.0, abs(score)),
     )
-
-
-def _beside_the_others(found: list[Skeleton]) -> list[Skeleton]:
-    """Bodies much shorter or thicker than usual lie on themselves: nothing is guessed of them."""
-    good = [one for one in found if one.verdict is Verdict.GOOD]
-    if not good:
-        return found
-    usual = float(np.median([one.length_px for one in good]))
-    thick = float(np.median([one.radius_px.max() for one in good]))
-    return [
-        no_skeleton(Verdict.SHORT)
-        if one.verdict is Verdict.GOOD
-        and (one.length_px < _SHORT * usual or one.radius_px.max() > _THICK * thick)
-        else one
-        for one in found
-    ]
 
 
 def _fault(judged: list[Skeleton]) -> str:

@@ -21,8 +21,9 @@ def save_capture(
     ``points`` (T, 101, 2) head first, m (pixels where there is no scale), y upwards; ``rate_hz``,
     ``length_m`` (NaN: no scale), ``name``, ``source``, ``licence`` are the track. Of every frame,
     used or not: ``verdict`` (T,) in words, ``points_px`` (T, 101, 2) as in the image,
-    ``radius_px`` (T, 101), ``length_px`` (T,), ``head_margin`` (T,). Once: ``m_per_px`` (NaN: no
-    scale), ``head_by``, ``head_sure``.
+    ``radius_px`` (T, 101), ``length_px`` (T,), ``head_margin`` (T,), ``expected_px`` (T,), the
+    error of a point, ``company`` (T,), the size of the next largest thing. Once: ``m_per_px``
+    (NaN: no scale), ``head_by``, ``head_sure``.
     """
     scale = 1.0 if m_per_px is None else m_per_px
     length_m = np.nan if m_per_px is None else float(np.nanmedian(captured.length_px)) * scale
@@ -40,6 +41,8 @@ def save_capture(
             radius_px=captured.radius_px,
             length_px=captured.length_px,
             head_margin=captured.margin,
+            expected_px=captured.expected_px,
+            company=captured.company,
             m_per_px=np.nan if m_per_px is None else m_per_px,
             head_by=captured.head_by,
             head_sure=captured.head_sure,

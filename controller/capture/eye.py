@@ -24,6 +24,8 @@ class Seen:
     silhouette: Silhouette
     skeleton: Skeleton
     """Its ends in no particular order; its verdict holds for the frame."""
+    ground: Image
+    """(H, W[, 3]) what the frame was compared with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +54,9 @@ class Eye:
             )
         body = silhouette_of(image, ground, self.look)
         if body.verdict is not Verdict.GOOD:
-            return Seen(body, no_skeleton(body.verdict))
-        return Seen(body, skeleton_of_level(body.level, body.threshold, body.origin_px, body.least))
+            return Seen(body, no_skeleton(body.verdict), ground)
+        skeleton = skeleton_of_level(body.level, body.threshold, body.origin_px, body.least)
+        return Seen(body, skeleton, ground)
 
 
 def open_eye(frames: Sequence[Image], background: Image | None = None) -> Eye:

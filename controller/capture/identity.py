@@ -49,12 +49,10 @@ def same_way(body: Skeleton, before: Skeleton) -> Skeleton:
 def follow(skeletons: Sequence[Skeleton]) -> Followed:
     """Put the same end first in every frame; the end of the first skeleton is kept."""
     out = list(skeletons)
-    margin = np.full(len(out), np.nan)
     good = [k for k, one in enumerate(out) if one.verdict is Verdict.GOOD]
     profile = np.zeros(0)
     for number, k in enumerate(good):
         if number == 0:
-            margin[k] = 1.0
             profile = _lopsided(out[k])
             continue
         before = good[number - 1]
@@ -64,9 +62,19 @@ def follow(skeletons: Sequence[Skeleton]) -> Followed:
             here = here if abs(here) > 2.0 * abs(thick) else thick
         if here < 0.0:
             out[k] = out[k].reversed()
-        margin[k] = margin_of(out[k], out[before])
         profile = profile + (_lopsided(out[k]) - profile) / min(number + 1, 200)
-    return Followed(tuple(out), margin)
+    return Followed(tuple(out), margins(out))
+
+
+def margins(skeletons: Sequence[Skeleton]) -> Floats:
+    """(T,) how much better each fits the one before as it is than reversed: ``Followed``."""
+    margin = np.full(len(skeletons), np.nan)
+    before: Skeleton | None = None
+    for k, one in enumerate(skeletons):
+        if np.isfinite(one.length_px):
+            margin[k] = 1.0 if before is None else margin_of(one, before)
+            before = one
+    return margin
 
 
 def _lopsided(body: Skeleton) -> Floats:

@@ -25,6 +25,7 @@ _LARGEST_PX = 8000  # side of the enlarged cut-out
 _HOLE = 0.35  # a larger hole, in squares of the width, is a loop of the body
 _THIN_TIP = 0.2  # of the contrast, where a body two pixels wide ends: blur takes its tips away
 _UNSURE_PX = 4.5  # a thinner body's line is used only where its blurred picture fits
+_LONG = 2.5  # widths: what is shorter is no long body
 _BRANCH = 0.14  # of the length: a longer side branch is a part of the body
 
 
@@ -144,7 +145,7 @@ def _width(mask: NDArray[np.bool_]) -> float | None:
     if square <= 0.0 or area < 6.0:
         return None
     wide = 0.5 * (half - np.sqrt(square))
-    return float(wide) if half > 4.0 * wide else None
+    return float(wide) if half > _LONG * wide + wide else None
 
 
 def _rescaled(level: Level, scale: float) -> Level:

@@ -42,6 +42,8 @@ class Scene:
     """How much brighter the light is in one corner than in the middle, of its strength."""
     shadow: float = 0.0
     """How much light the body's shadow takes away."""
+    taper: float = 0.45
+    """Part of the body over which the tail tapers."""
     texture: float = 0.0
     """Standard deviation of the pattern of the ground."""
     seed: int = 0
@@ -87,7 +89,7 @@ def half_width(scene: Scene) -> Floats:
     shape = np.sqrt(np.clip(s / 0.08, 0.0, 1.0)) * (
         0.8 + 0.2 * np.sin(np.pi * np.minimum(s / 0.8, 1.0))
     )
-    tail = np.clip((1.0 - s) / 0.45, 0.0, 1.0) ** 0.8
+    tail = np.clip((1.0 - s) / scene.taper, 0.0, 1.0) ** 0.8
     return np.asarray(0.5 * scene.length_px / scene.slender * np.minimum(shape, 0.15 + 0.85 * tail))
 
 

@@ -38,6 +38,8 @@ class Silhouette:
     origin_px: tuple[float, float]
     """x, y of the cut-out's first pixel in the image."""
     area_px: float
+    company: float
+    """Size of the next largest thing that stands out, of this body's; noise and dirt count."""
     verdict: Verdict
 
     @property
@@ -98,7 +100,7 @@ def silhouette_of(image: Image, background: Image, look: Look = Look.BOTH) -> Si
 def nothing() -> Silhouette:
     """No animal."""
     empty = np.zeros((1, 1), dtype=np.float32)
-    return Silhouette(empty, 0.5, 0.0, (0.0, 0.0), 0.0, Verdict.NOTHING)
+    return Silhouette(empty, 0.5, 0.0, (0.0, 0.0), 0.0, 0.0, Verdict.NOTHING)
 
 
 def _parts(mask: Image) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
@@ -128,7 +130,8 @@ def _cut_out(apart: Image, threshold: float, sure: float) -> Silhouette:
     left, top, wide, high, area = (int(v) for v in stats[best])
     rows, columns = apart.shape
     verdict = Verdict.GOOD
-    if np.sort(areas)[-2:-1].sum() > _RIVAL * area:
+    company = float(np.sort(areas)[-2:-1].sum()) / area
+    if company > _RIVAL:
         verdict = Verdict.SEVERAL
     elif left == 0 or top == 0 or left + wide == columns or top + high == rows:
         verdict = Verdict.CUT
@@ -141,4 +144,4 @@ def _cut_out(apart: Image, threshold: float, sure: float) -> Silhouette:
     if other.any():
         level[cv2.dilate(other.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = 0.0
     origin = (float(window[1].start), float(window[0].start))
-    return Silhouette(level, threshold, sure, origin, float(area), verdict)
+    return Silhouette(level, threshold, sure, origin, float(area), company, verdict)

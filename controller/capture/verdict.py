@@ -4,13 +4,20 @@ from enum import StrEnum
 
 
 class Verdict(StrEnum):
-    """``GOOD``: the skeleton can be used. Of every other frame only the reason is kept."""
+    """``GOOD`` and ``ROUGH`` frames hold points. Of every other one only the reason is kept."""
 
     GOOD = "good"
+    ROUGH = "rough: the points may be off by more than 1 % of the body"
     NOTHING = "nothing seen"
     SEVERAL = "several animals"
     CUT = "cut by the edge of the image"
     LOOP = "touches itself: the silhouette has a hole"
     BRANCH = "touches itself: the medial axis branches"
     SHORT = "touches itself: much shorter or thicker than in the other frames"
+    LARGER = "touches something: longer or larger than in the other frames"
     BLOB = "not a long body"
+
+    @property
+    def usable(self) -> bool:
+        """Whether the frame holds points."""
+        return self in {Verdict.GOOD, Verdict.ROUGH}

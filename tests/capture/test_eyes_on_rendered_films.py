@@ -6,25 +6,25 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from controller.capture.accuracy import distance, swapped
+from controller.capture.accuracy import point_error, swapped
 from controller.capture.capture import Capture, capture
 from controller.capture.eye import open_eye
 from controller.capture.render import Scene, empty, film, true_midlines
 from controller.capture.silhouette import Look
 
-CLEAN = Scene(rows=240, columns=320, frames=40, wave_hz=0.6)
+CLEAN = Scene(rows=240, columns=320, frames=20, wave_hz=0.6)
 HARSH = replace(CLEAN, noise=6.0, blur_px=1.2, light=0.3, shadow=0.25, texture=5.0)
 
 
 def watch(scene: Scene) -> Capture:
     frames = list(film(scene))
-    return capture(frames, open_eye(frames[::2]), scene.rate_hz)
+    return capture(frames, open_eye(frames[:: max(1, len(frames) // 5)]), scene.rate_hz)
 
 
 def median_error(scene: Scene, seen: Capture) -> float:
     truth = true_midlines(scene)
     good = np.flatnonzero(seen.good)
-    return float(np.median([distance(seen.points_px[k], truth[k]) for k in good]))
+    return float(np.median([point_error(seen.points_px[k], truth[k]) for k in good]))
 
 
 @pytest.mark.parametrize("length_px", [20.0, 40.0, 100.0])
@@ -43,7 +43,8 @@ def test_noise_blur_uneven_light_and_shadow_are_stood(length_px: float) -> None:
     scene = replace(HARSH, length_px=length_px)
     seen = watch(scene)
     truth = true_midlines(scene)
-    assert seen.good.mean() > 0.95
+    assert seen.used.all()
+    assert seen.good.mean() > 0.8
     assert median_error(scene, seen) < 0.01 * length_px
     assert not any(swapped(seen.points_px[k], truth[k]) for k in np.flatnonzero(seen.good))
 
@@ -61,20 +62,20 @@ def test_a_light_animal_on_dark_ground_with_a_given_background() -> None:
 def test_colours_of_equal_brightness_are_told_apart() -> None:
     scene = replace(CLEAN, length_px=90.0, frames=12)
     frames = [np.dstack([f, np.full_like(f, 90), 230 - f]) for f in film(scene)]
-    seen = capture(frames, open_eye(frames), scene.rate_hz)
+    seen = capture(frames, open_eye(frames[::2]), scene.rate_hz)
     assert median_error(scene, seen) < 0.01 * scene.length_px
 
 
 def test_the_head_stays_the_head_after_a_gap() -> None:
-    scene = replace(CLEAN, length_px=100.0, frames=60)
+    scene = replace(CLEAN, length_px=130.0, frames=44)
     frames = list(film(scene))
-    for k in range(20, 32):
+    for k in range(16, 28):
         frames[k] = empty(scene)
     seen = capture(frames, open_eye(frames[::3], empty(scene)), scene.rate_hz)
     truth = true_midlines(scene)
-    assert np.flatnonzero(~seen.good).tolist() == list(range(20, 32))
+    assert np.flatnonzero(~seen.good).tolist() == list(range(16, 28))
     assert seen.counts["nothing seen"] == 12
-    assert np.isnan(seen.points_px[20:32]).all()
+    assert np.isnan(seen.points_px[16:28]).all()
     assert not any(swapped(seen.points_px[k], truth[k]) for k in np.flatnonzero(seen.good))
 
 
@@ -91,10 +92,11 @@ def test_the_user_may_say_where_the_head_is() -> None:
 def test_a_body_cut_by_the_edge_is_told_not_guessed() -> None:
     scene = replace(CLEAN, length_px=100.0, frames=20)
     # the window's edge runs through the circle on which the animal swims
-    frames = [np.ascontiguousarray(frame[:, 100:]) for frame in film(replace(scene, frames=120))]
+    long = replace(scene, frames=40, rate_hz=10.0)
+    frames = [np.ascontiguousarray(frame[:, 100:]) for frame in film(long)]
     ground = np.ascontiguousarray(empty(scene)[:, 100:])
-    seen = capture(frames, open_eye(frames[::10], ground), scene.rate_hz)
-    truth = true_midlines(replace(scene, frames=120)) - [100.0, 0.0]
+    seen = capture(frames, open_eye(frames[::4], ground), long.rate_hz)
+    truth = true_midlines(long) - [100.0, 0.0]
     outside = truth[:, :, 0].min(axis=1) < 0.0
     assert outside.any()
     assert not (seen.good & outside).any()
@@ -129,5 +131,6 @@ def test_the_skeleton_s_thickness_is_the_body_s() -> None:
 
 
 def test_the_same_film_gives_the_same_skeletons_bit_for_bit() -> None:
-    scene = replace(CLEAN, length_px=60.0, frames=6)
-    assert watch(scene).points_px.tobytes() == watch(scene).points_px.tobytes()
+    scene = replace(CLEAN, length_px=30.0, frames=5)
+    one, other = watch(scene), watch(scene)
+    assert one.points_px.tobytes() == other.points_px.tobytes()
