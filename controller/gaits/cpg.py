@@ -19,12 +19,12 @@ neighbours are coupled and none in a ring, so every start but a set of measure 0
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.gaits.cpg_course import course, judged, pulled
 from controller.gaits.cpg_pattern import HARMONICS, Pattern
 from controller.gaits.damped import Damped
 from controller.gaits.wave import TURN
 
 Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 COUPLING_PER_S = 20.0
 LONGEST_STEP_S = 0.01
@@ -42,23 +42,22 @@ class Cpg:
         """(J,) eps: each oscillator's phase less that of the pattern; add to it to disturb them."""
         self._phase_rad = 0.0
         self._t_s = 0.0
-        state = np.concatenate([self._pack(self.pattern, np.zeros(self.joints)), [0.0]])
-        none = np.zeros_like(state)
-        self._slow = Damped.start(state[:-1], none[:-1], state[:-1], 1.0)
-        self._clock = Damped.start(state[-1:], none[-1:], state[-1:], 1.0)
+        state = _packed(self.pattern, np.zeros(self.joints))
+        still = np.zeros(1)
+        self._slow = Damped.start(state, np.zeros_like(state), state, 1.0)
+        self._clock = Damped.start(still, still, still, 1.0)
 
     def become(self, pattern: Pattern, gain: float = 6.0, clock_gain: float | None = None) -> None:
         """Go to another pattern; amplitudes settle within about ``10 / gain`` seconds."""
-        value, rate = self._slow.at(np.array([self._t_s]))
-        omega, omega_rate = self._clock.at(np.array([self._t_s]))
-        self._phase_rad = self._phase(np.array([self._t_s]))[0] % TURN
-        now = value[0, : self.joints].real
-        turn = np.nan_to_num(pattern.bias_rad - now)
+        value, rate = self._slow.at(self._t_s)
+        omega, omega_rate = self._clock.at(self._t_s)
+        self._phase_rad = float(self._phase_rad + self._clock.sum(self._t_s)[0]) % TURN
+        now = value[0]
+        turn = np.where(np.isnan(pattern.bias_rad), 0.0, pattern.bias_rad - now)
         bias = now + np.mod(turn + np.pi, TURN) - np.pi  # the shorter way round
-        goal = self._pack(pattern, bias)
-        wanted = np.array([pattern.omega_rad_s], dtype=np.complex128)
-        self._slow = Damped.start(value[0], rate[0], goal, gain)
-        self._clock = Damped.start(omega[0], omega_rate[0], wanted, clock_gain or gain)
+        wanted = np.array([pattern.omega_rad_s])
+        self._slow = Damped.start(value, rate, _packed(pattern, bias), gain)
+        self._clock = Damped.start(omega, omega_rate, wanted, clock_gain or gain)
         self._t_s = 0.0
         self.pattern = pattern
 
@@ -90,42 +89,55 @@ class Cpg:
 
     def angle_rad(self) -> Floats:
         """(J,) now."""
-        return np.asarray(self._read(np.array([self._t_s]))[0][0])
+        return np.asarray(self.ahead(np.zeros(1))[0][0])
 
     def velocity_rad_s(self) -> Floats:
         """(J,) now."""
-        return np.asarray(self._read(np.array([self._t_s]))[1][0])
+        return np.asarray(self.ahead(np.zeros(1))[1][0])
 
     def ahead(self, t_s: Floats) -> tuple[Floats, Floats]:
         """Angles and speeds (T, J) at times (T,) from now, ``astray_rad`` staying as it is."""
-        return self._read(self._t_s + t_s)
-
-    def _phase(self, t_s: Floats) -> Floats:
-        return np.asarray(self._phase_rad + self._clock.sum(t_s)[:, 0].real)
-
-    def _pack(self, pattern: Pattern, bias_rad: Floats) -> Complex:
-        waves = pattern.harmonics_rad.ravel()
-        return np.concatenate([bias_rad, pattern.offset_rad, waves]).astype(np.complex128)
-
-    def _read(self, t_s: Floats) -> tuple[Floats, Floats]:
-        value, rate = self._slow.at(t_s)
-        n, shape = self.joints, (len(t_s), self.joints, HARMONICS)
-        theta = self._phase(t_s)[:, None] + value[:, :n].real + self.astray_rad
-        omega = self._clock.at(t_s)[0].real
-        turning = omega + rate[:, :n].real + _pull(self.astray_rad)
-        order = np.arange(1, HARMONICS + 1)
-        wave = np.exp(1j * theta[:, :, None] * order)
-        d, d_rate = value[:, 2 * n :].reshape(shape), rate[:, 2 * n :].reshape(shape)
-        angle = value[:, n : 2 * n].real + (d * wave).sum(axis=2).real
-        spin = 1j * order * turning[:, :, None] * d
-        speed = rate[:, n : 2 * n].real + ((d_rate + spin) * wave).sum(axis=2).real
+        angle, speed = np.empty((2, len(t_s), self.joints))
+        course(*self._course(t_s), angle, speed)
         return angle, speed
+
+    def judge(
+        self, t_s: Floats, speed_rad_s: Floats, acceleration_rad_s2: Floats, enough: float
+    ) -> tuple[float, Floats, Floats]:
+        """Largest share of limits (J,) that is reached at even times (T,) from now.
+
+        Returns:
+            the share; the largest speeds and accelerations (J,). All are of the times up to the
+            first at which the share is above ``enough``.
+
+        """
+        fast, hard = np.zeros((2, self.joints))
+        limits = speed_rad_s, acceleration_rad_s2
+        return judged(*self._course(t_s), *limits, enough, fast, hard), fast, hard
+
+    def _course(
+        self, t_s: Floats
+    ) -> tuple[Floats, Floats, Floats, Floats, Floats, float, Floats, Floats]:
+        """Return what the loops of ``cpg_course`` take first."""
+        slow, turn = self._slow, self._clock
+        clock = np.array(
+            [self._phase_rad, turn.goal[0], turn.left[0], turn.slope[0], 0.5 * turn.gain]
+        )
+        astray = self.astray_rad, _pull(self.astray_rad)
+        return self._t_s + t_s, clock, slow.goal, slow.left, slow.slope, 0.5 * slow.gain, *astray
+
+
+def _packed(pattern: Pattern, bias_rad: Floats) -> Floats:
+    """(2 + 2 HARMONICS, J) biases, offsets, real and imaginary parts of the amplitudes."""
+    state = np.empty((2 + 2 * HARMONICS, len(bias_rad)))
+    state[0], state[1] = bias_rad, pattern.offset_rad
+    state[2 : 2 + HARMONICS] = pattern.harmonics_rad.real.T
+    state[2 + HARMONICS :] = pattern.harmonics_rad.imag.T
+    return state
 
 
 def _pull(astray_rad: Floats) -> Floats:
     """(J,) coupling of neighbours along the body."""
-    pull = COUPLING_PER_S * np.sin(np.diff(astray_rad))
-    out = np.zeros(len(astray_rad))
-    out[:-1] += pull
-    out[1:] -= pull
+    out = np.empty(len(astray_rad))
+    pulled(astray_rad, COUPLING_PER_S, out)
     return out

@@ -6,35 +6,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True)
 class Damped:
     """``z'' = a (a/4 (Z - z) - z')`` from a value and a rate: ``Z + (A + B t) e^(-a t/2)``."""
 
-    goal: Complex
-    left: Complex
-    slope: Complex
+    goal: Floats
+    left: Floats
+    slope: Floats
     gain: float
 
     @staticmethod
-    def start(value: Complex, rate: Complex, goal: Complex, gain: float) -> "Damped":
-        """Begin from (n,) values and rates."""
+    def start(value: Floats, rate: Floats, goal: Floats, gain: float) -> "Damped":
+        """Begin from values and rates of any one shape."""
         left = value - goal
         return Damped(goal, left, rate + 0.5 * gain * left, gain)
 
-    def at(self, t_s: Floats) -> tuple[Complex, Complex]:
-        """Value and rate at times (T,): (T, n) each."""
-        t, h = t_s[:, None], 0.5 * self.gain
-        fading = np.exp(-h * t)
-        line = self.left + self.slope * t
+    def at(self, t_s: Floats | float) -> tuple[Floats, Floats]:
+        """Value and rate at a time, or one value's at times (T,)."""
+        h = 0.5 * self.gain
+        fading = np.exp(-h * t_s)
+        line = self.left + self.slope * t_s
         return self.goal + line * fading, (self.slope - h * line) * fading
 
-    def sum(self, t_s: Floats) -> Complex:
-        """Integral of the value from 0 to times (T,): (T, n)."""
-        t, h = t_s[:, None], 0.5 * self.gain
-        fading = np.exp(-h * t)
+    def sum(self, t_s: Floats | float) -> Floats:
+        """Integral of the value from 0 to a time, or one value's to times (T,)."""
+        h = 0.5 * self.gain
+        fading = np.exp(-h * t_s)
         fallen = (1.0 - fading) / h
-        ramp = (fallen - t * fading) / h
-        return np.asarray(self.goal * t + self.left * fallen + self.slope * ramp)
+        ramp = (fallen - t_s * fading) / h
+        return np.asarray(self.goal * t_s + self.left * fallen + self.slope * ramp)

@@ -14,6 +14,7 @@ from pydantic import Field
 from config.robot import RobotConfig
 from controller.gaits.gait import Floats, Frequency, Gait, GaitParameters, Needs
 from controller.gaits.wave import TURN
+from drivers.compiling import compiled
 
 SAMPLES = 257
 """Of the spine, before it is divided into equal links."""
@@ -51,26 +52,50 @@ def spine_bends_rad(
     at the shares ``edges`` of it) before its headings are read: they are those of rigid links, not
     of slices in u.
     """
-    u = np.linspace(0.0, TURN, SAMPLES)
-    y = offset(u, phase_rad, p)
-    run = np.zeros_like(y)
-    run[:, 1:] = np.hypot(np.diff(u), np.diff(y, axis=1)).cumsum(axis=1)
     shares = np.linspace(0.0, 1.0, joints + 2) if edges is None else edges
-    headings = np.empty((len(y), len(shares) - 1))
-    for t, (way, side) in enumerate(zip(run, y, strict=True)):
-        at = shares * way[-1]
-        back, left = np.interp(at, way, u), np.interp(at, way, side)
-        headings[t] = np.arctan2(-np.diff(left), np.diff(back))  # of travel: towards the head
+    u = np.linspace(0.0, TURN, SAMPLES)
+    headings = np.empty((len(phase_rad), len(shares) - 1))
+    _headings(u, _shapes(u, p), np.cos(phase_rad), np.sin(phase_rad), shares, headings)
     return np.asarray(headings[:, :-1] - headings[:, 1:])
 
 
 def offset(u: Floats, phase_rad: Floats, p: SpineParameters) -> Floats:
     """(T, U) of the spine to its left, in the unit of ``u``; the phase is ``2 pi omega t``."""
+    return np.stack([np.cos(phase_rad), np.sin(phase_rad)], axis=1) @ _shapes(u, p)
+
+
+def _shapes(u: Floats, p: SpineParameters) -> Floats:
+    """(2, U) the parts of the offset that go with the cosine and the sine of the phase."""
     size = p.nose + (p.tail - p.nose) * u / TURN
-    phase = phase_rad[:, None]
-    if p.standing:
-        return np.asarray(size * np.cos(p.waves * u + p.phase_rad) * np.sin(phase))
-    return np.asarray(size * np.sin(p.waves * u - phase))
+    if p.standing:  # size cos(waves u + phi) sin(phase)
+        return np.stack([np.zeros_like(u), size * np.cos(p.waves * u + p.phase_rad)])
+    return np.stack([size * np.sin(p.waves * u), -size * np.cos(p.waves * u)])
+
+
+@compiled(
+    "void(float64[::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[:, ::1])"
+)
+def _headings(
+    u: Floats, shapes: Floats, cosine: Floats, sine: Floats, shares: Floats, headings: Floats
+) -> None:
+    """Write the headings (T, n) of travel, towards the head, of chords between ``shares``."""
+    run, side = np.zeros(len(u)), np.empty(len(u))
+    for t in range(len(cosine)):
+        for i in range(len(u)):
+            side[i] = shapes[0, i] * cosine[t] + shapes[1, i] * sine[t]
+        for i in range(1, len(u)):
+            du, dy = u[i] - u[i - 1], side[i] - side[i - 1]
+            run[i] = run[i - 1] + np.sqrt(du * du + dy * dy)
+        i, back, left = 0, u[0], side[0]
+        for k in range(len(shares)):
+            at = shares[k] * run[-1]
+            while i < len(u) - 2 and run[i + 1] < at:
+                i += 1
+            part = (at - run[i]) / (run[i + 1] - run[i])
+            here, aside = u[i] + part * (u[i + 1] - u[i]), side[i] + part * (side[i + 1] - side[i])
+            if k > 0:
+                headings[t, k - 1] = np.arctan2(left - aside, here - back)
+            back, left = here, aside
 
 
 class SpineGait(Gait):

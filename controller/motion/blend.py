@@ -18,14 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.motion.easing import (
-    cubic,
-    cubic_slope,
-    cubic_sum,
-    quintic,
-    quintic_bend,
-    quintic_slope,
-)
+from controller.motion.easing import cubic, cubic_sum, quintic, quintic_slope
+from controller.motion.join_time import DELAY, shortest_join_s
 from controller.motion.source import MotionSource, Pace
 from controller.runtime.body import BodyView
 
@@ -35,14 +29,6 @@ RATES = (1.0, 0.7, 0.4, 0.0)
 """Rates at which the target may start; slower ones are tried where faster ones take too long."""
 PATIENCE_S = (0.5, 1.0, 1.6, np.inf)
 """How long a join may take for each."""
-DURATIONS_S = np.geomspace(0.25, 32.0, 36)
-BRAKE_SHARE = 0.4
-"""Of the acceleration limit, for the brake of the error's speed."""
-TOLERANCE = 0.02
-"""A target at its limits and the last of an error add up to a little more than a limit."""
-DELAY = 0.3
-"""Share of a join before a slowed target speeds up: most of the error should be gone by then."""
-_X = np.linspace(0.0, 1.0, 25)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,46 +88,10 @@ def plan_join(angle_rad: Floats, speed_rad_s: Floats, target: MotionSource, limi
         error_speed = speed_rad_s - rate * velocity
         if rate == 1.0 and max(np.abs(error).max(), np.abs(error_speed).max()) < 1e-9:
             return Join(1.0, 0.0, 0.0, error, error_speed)
-        fits = np.flatnonzero(_within(rate, error, error_speed, pace, limit))
-        if len(fits) and (duration_s := float(DURATIONS_S[fits[0]])) <= patience_s:
-            brake = float(_brake_s(error_speed, limit, DURATIONS_S[fits[0]]))
-            return Join(rate, duration_s, brake, error, error_speed)
+        duration_s, brake_s = shortest_join_s(rate, error, error_speed, pace, limit)
+        if duration_s <= patience_s:
+            return Join(rate, duration_s, brake_s, error, error_speed)
     raise ValueError("a motion cannot be joined: it asks for more than the robot's limits")
-
-
-def _brake_s(error_speed: Floats, limit: Pace, duration_s: Floats) -> Floats:
-    """Time of the brake for each duration: by acceleration, at most half of the join."""
-    needed = (1.5 * np.abs(error_speed) / (BRAKE_SHARE * limit.acceleration_rad_s2)).max()
-    return np.asarray(np.minimum(0.5 * duration_s, max(float(needed), 0.02)))
-
-
-def _within(
-    rate: float, error: Floats, error_speed: Floats, pace: Pace, limit: Pace
-) -> NDArray[np.bool_]:
-    """For each of ``DURATIONS_S``: whether speed and acceleration stay within the limits."""
-    duration = DURATIONS_S[:, None]
-    brake = _brake_s(error_speed, limit, duration)
-    z = np.maximum(0.0, (_X - DELAY) / (1.0 - DELAY))
-    r = rate + cubic(z, 1.0 - rate)
-    dr = cubic_slope(z, 1.0 - rate) / ((1.0 - DELAY) * duration)
-    dp = quintic_slope(_X) / duration
-    ddp = quintic_bend(_X) / duration**2
-    y = np.minimum(_X * duration / brake, 1.0)
-    left = 1.0 - cubic(y)
-    dleft = -cubic_slope(y) / brake
-    good = np.ones(len(DURATIONS_S), dtype=bool)
-    for j in range(len(error)):
-        total = error[j] + 0.5 * brake * error_speed[j]
-        speed = r * pace.speed_rad_s[j] + np.abs(error_speed[j] * left - total * dp)
-        acceleration = (
-            dr * pace.speed_rad_s[j]
-            + r * r * pace.acceleration_rad_s2[j]
-            + np.abs(error_speed[j] * dleft - total * ddp)
-        )
-        most, hardest = limit.speed_rad_s[j], limit.acceleration_rad_s2[j]
-        good &= (speed <= (1.0 + TOLERANCE) * most).all(axis=1)
-        good &= (acceleration <= (1.0 + TOLERANCE) * hardest).all(axis=1)
-    return good
 
 
 class Blend:

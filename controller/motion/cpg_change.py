@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.gaits.cpg import Cpg
+from controller.gaits.cpg import Cpg, CpgState
 from controller.gaits.cpg_pattern import Pattern
 from controller.motion.source import Pace
 
@@ -19,6 +19,8 @@ CLOCK_GAIN = 6.0
 CRAWL = 0.2
 """Of the slower of two gaits: in a change in two steps amplitudes change at this frequency."""
 TOLERANCE = 0.02
+WIDER = 0.05
+"""By which the limits are widened where no change stays within them; twice that the next time."""
 SETTLE = 14.0
 """Times 1 / gain: how long a change is looked at; 0.7 % of it are left then."""
 SAMPLE_S = 0.02
@@ -60,30 +62,32 @@ def quickest_change(cpg: Cpg, pattern: Pattern, limit: Pace) -> tuple[tuple[Part
     crawl = replace(pattern, omega_rad_s=slow if np.isfinite(slow) else 0.0)
     ways: list[tuple[Part, ...]] = [(Part(pattern, g, g),) for g in GAINS if g >= LEAST_DIRECT]
     ways += [(Part(crawl, g, CLOCK_GAIN), Part(pattern, g, CLOCK_GAIN)) for g in GAINS]
-    tried: list[tuple[float, tuple[Part, ...], Pace]] = []
-    for way in ways:
-        cpg.restore(start)
-        excess, pace = _judge(cpg, way, limit)
-        tried.append((excess, way, pace))
-        if excess <= 1.0 + TOLERANCE:
-            break
+    enough, wider = 1.0 + TOLERANCE, WIDER
+    while True:
+        for way in ways:
+            excess, pace = _judge(cpg, start, way, limit, enough)
+            if excess <= enough:
+                cpg.restore(start)
+                return way, pace
+        enough, wider = enough * (1.0 + wider), 2.0 * wider
+
+
+def _judge(
+    cpg: Cpg, start: CpgState, way: tuple[Part, ...], limit: Pace, enough: float
+) -> tuple[float, Pace]:
+    """Largest share of a limit, and largest values; no more is looked at once it is ``enough``."""
     cpg.restore(start)
-    _, best, fastest = min(tried, key=lambda one: one[0])
-    return best, fastest
-
-
-def _judge(cpg: Cpg, way: tuple[Part, ...], limit: Pace) -> tuple[float, Pace]:
-    """Largest speed or acceleration over its limit, and their largest values."""
-    fast = hard = np.zeros(cpg.joints)
+    over, fast, hard = 0.0, np.zeros(cpg.joints), np.zeros(cpg.joints)
     for part in way:
         step_s = max(SAMPLE_S, part.time_s / MOST_SAMPLES)
         part.begin(cpg)
-        speed = cpg.ahead(np.arange(0.0, part.time_s, step_s))[1]
+        times_s = np.arange(0.0, part.time_s, step_s)
+        one, speed, change = cpg.judge(
+            times_s, limit.speed_rad_s, limit.acceleration_rad_s2, enough
+        )
+        over = max(over, one)
+        fast, hard = np.maximum(fast, speed), np.maximum(hard, change)
+        if over > enough:
+            break
         cpg.skip(part.time_s)
-        fast = np.maximum(fast, np.abs(speed).max(axis=0))
-        hard = np.maximum(hard, np.abs(np.diff(speed, axis=0)).max(axis=0) / step_s)
-    over = max(
-        float((fast / limit.speed_rad_s).max()),
-        float((hard / limit.acceleration_rad_s2).max()),
-    )
     return over, Pace(fast, hard)
