@@ -157,6 +157,7 @@ class Prepared:
             self.world.friction,
             start_m=np.array(self.run.start_m),
             heading_rad=self.start_heading_rad,
+            ground=self.ground,
             limit_s=self.run.time_limit_s,
         )
         faults = margin_faults(plan, self.robot)

@@ -1,7 +1,8 @@
 """A run on paper: the pilot steers a quasi-static body, so that a plan is judged before torque.
 
 Each step asks the pilot for joint goals, lets the shape change, and finds the rigid velocity that
-balances Coulomb friction (``controller.motion.rigid``). No inertia, no servo lag, level ground.
+balances Coulomb friction and the pull of the slope under each link (``controller.motion.rigid``).
+No servo lag; inertia only where nothing holds the body. Links lie flat in plan, bear equal weights.
 """
 
 from dataclasses import dataclass
@@ -9,15 +10,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from config.heightfield import HeightField
 from config.robot import RobotConfig
 from config.world import FrictionConfig
+from controller.motion.hillside import held_factor, pull_and_share
 from controller.motion.load import STANDARD_GRAVITY_M_S2, friction_n, yaw_load_n_m
-from controller.motion.rigid import rigid_velocity
+from controller.motion.rigid import NoBalanceError, carried_velocity, rigid_velocity
 from controller.runtime.body import BodyView, body_in_world
 from controller.runtime.pilot import Pilot
 from drivers.types import BodyPose
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Slide:
+    """Ground that was steeper than the body could hold."""
+
+    slope_rad: float
+    """Mean slope under the body, where it was held least."""
+    held_rad: float
+    """What it could have held there, in that shape."""
+    lasted_s: float
+    """All the time that nothing held it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +51,8 @@ class Forecast:
     """How far the shape has travelled along the body."""
     reached: int
     missed: int
+    slide: Slide | None
+    """None where friction held everywhere."""
 
     @property
     def duration_s(self) -> float:
@@ -80,6 +97,7 @@ def forecast(
     *,
     start_m: Floats,
     heading_rad: float,
+    ground: HeightField | None = None,
     step_s: float = 0.04,
     limit_s: float = 240.0,
 ) -> Forecast:
@@ -91,6 +109,7 @@ def forecast(
         friction: the ellipse, the same under every link.
         start_m: (2,) centre of the head link.
         heading_rad: of the mean body line.
+        ground: under the run; None is a level floor.
         step_s: of the simulation and of the pilot.
         limit_s: when to give up.
 
@@ -98,7 +117,8 @@ def forecast(
     joints = pilot.first_goal_rad()
     head_m = np.array(start_m[:2], dtype=float)
     head_rad = heading_rad - mean_heading_rad(robot, joints)
-    velocity = np.zeros(3)
+    velocity, moving_m_s = np.zeros(3), np.zeros((robot.joint_count + 1, 2))
+    slide: Slide | None = None
     times, angles, centres, pulse_m = [0.0], [joints], [], 0.0
     torques = [np.zeros(robot.joint_count)]
     yaw = np.array([axis == "y" for axis in robot.joint_axes])
@@ -111,16 +131,34 @@ def forecast(
         goal = pilot.step(step_s, view)
         before, after = _in_head_frame(robot, joints), _in_head_frame(robot, goal)
         shape_m_s = (after.link_m - before.link_m)[:, :2] / step_s
-        velocity = rigid_velocity(
-            before.link_m[:, :2], before.headings_rad, shape_m_s, friction, velocity
-        )
         points, headings = before.link_m[:, :2], before.headings_rad
+        c, s = np.cos(head_rad), np.sin(head_rad)
+        turn = np.array([[c, -s], [s, c]])
+        pull, share = pull_and_share(ground, view.link_m)
+        pull = pull @ turn
+        was_m_s = moving_m_s @ turn
+        try:
+            velocity = rigid_velocity(
+                points, headings, shape_m_s, friction, velocity, pull=pull, share=share
+            )
+            held = True
+        except NoBalanceError:
+            velocity = carried_velocity(
+                points, headings, shape_m_s, friction, was_m_s, step_s, velocity,
+                pull=pull, share=share,
+            )  # fmt: skip
+            held = False
         lever = np.stack([-points[:, 1], points[:, 0]], axis=1)
         moving = shape_m_s + velocity[:2] + velocity[2] * lever
-        force_n = friction_n(moving, headings, friction, weight_n)
+        force_n = (
+            friction_n(moving, headings, friction, weight_n) * share[:, None] + weight_n * pull
+        )
+        if not held:
+            slide = _worse(slide, points, headings, friction, pull, share, step_s)
+            force_n -= robot.link_mass_kg * (moving - was_m_s) / step_s
+        moving_m_s = moving @ turn.T
         torques.append(yaw * yaw_load_n_m(points, headings, robot.link_length_m, force_n))
-        c, s = np.cos(head_rad), np.sin(head_rad)
-        head_m = head_m + step_s * np.array([[c, -s], [s, c]]) @ velocity[:2]
+        head_m = head_m + step_s * turn @ velocity[:2]
         head_rad += step_s * velocity[2]
         joints = goal
         pulse_m += step_s * pilot.pulse_m_s
@@ -134,8 +172,28 @@ def forecast(
         pulse_m,
         pilot.reached,
         pilot.missed,
+        slide,
     )
 
 
 def _in_head_frame(robot: RobotConfig, joint_rad: Floats) -> BodyView:
     return body_in_world(robot, pose_at(np.zeros(2), 0.0), joint_rad)
+
+
+def _worse(
+    slide: Slide | None,
+    points_m: Floats,
+    headings_rad: Floats,
+    friction: FrictionConfig,
+    pull: Floats,
+    share: Floats,
+    step_s: float,
+) -> Slide:
+    """Add a step that nothing holds; keep where the body falls short most."""
+    factor = held_factor(points_m, headings_rad, friction, pull, share)
+    steepness = float(np.hypot(*(pull / share[:, None]).mean(axis=0)))
+    slope_rad, held_rad = float(np.arctan(steepness)), float(np.arctan(factor * steepness))
+    lasted_s = step_s + (slide.lasted_s if slide else 0.0)
+    if slide is not None and slide.held_rad - slide.slope_rad <= held_rad - slope_rad:
+        slope_rad, held_rad = slide.slope_rad, slide.held_rad
+    return Slide(slope_rad, held_rad, lasted_s)

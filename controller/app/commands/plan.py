@@ -82,6 +82,11 @@ def plan(
         "joint_torque_n_m": round(float(ahead.joint_torque_n_m.max()), 3),
         "predicted_gain": round(prepared.gain, 3),
     }
+    if ahead.slide is not None:
+        found["steeper_than_held"] = (
+            f"{math.degrees(ahead.slide.slope_rad):.1f} deg of "
+            f"{math.degrees(ahead.slide.held_rad):.1f}, for {ahead.slide.lasted_s:.2f} s"
+        )
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts
     if prepared.ground is not None:
