@@ -22,6 +22,7 @@ MODULES = tuple(
         "cycle_codec",
         "frames",
         "walk_step",
+        "joins",
         "capture",
         "overhead",
         "repertoire",
@@ -58,7 +59,10 @@ def main() -> int:
 
 def table(title: str, rows: list[Row]) -> Table:
     """Rows as a table."""
-    shown = Table(title=title, title_justify="left", title_style="bold")
+    shown = Table(
+        title=title, title_justify="left", title_style="bold", box=None, pad_edge=False,
+        padding=(0, 1, 0, 0),
+    )  # fmt: skip
     shown.add_column("")
     shown.add_column("value", justify="right")
     shown.add_column("unit")

@@ -248,7 +248,7 @@ def main() -> None:
 
 
 def _compare(device: str, baud: int, times: WireTimes, *, fast: bool, stamped: bool) -> list[Row]:
-    title = f"{baud / 1e6:g} Mbaud, {'fast' if fast else 'plain'}"
+    title = f"{baud / 1e6:g} Mbaud{', fast' if fast else ''}"
     wire_s = wire_budget(len(IDS), baud, fast=fast).cycle_s
     ways: dict[str, Way] = {
         "cycle": lambda: ours(device, baud, fast=fast),
@@ -264,7 +264,7 @@ def _compare(device: str, baud: int, times: WireTimes, *, fast: bool, stamped: b
     rows = []
     for name, cost in found.items():
         own = name.startswith("cycle")
-        rows.append(_cpu_row(f"{title}, {name}: CPU", cost, found["dynamixel-sdk"], own=own))
+        rows.append(_cpu_row(f"{title}: {name}", cost, found["dynamixel-sdk"], own=own))
         if own and rusty:
             ratio = cost.cpu_s / found["rustypot"].cpu_s
             rows.append(Row("  the same", cost.cpu_s * 1e6, "us", "rustypot", ratio, 1.0))

@@ -105,4 +105,5 @@ def _line(path: str, fault: dict[str, Any]) -> str:
     given = fault.get("input")
     shown = f" (got {given!r})" if isinstance(given, int | float | str | bool) else ""
     said = {"extra_forbidden": "unknown key", "missing": "is required"}
-    return f"{path}: {where or 'file'}: {said.get(str(fault['type']), fault['msg'])}{shown}"
+    text = said.get(str(fault["type"]), str(fault["msg"]).removeprefix("Value error, "))
+    return f"{path}: {where}: {text}{shown}" if where else f"{path}: {text}{shown}"

@@ -138,7 +138,10 @@ def load_plan(path: Path, *, replan: bool = True) -> RepertoireJob:
         )
         parts = about["run"], about["robot"], about["world"]
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: not a plan ({error})") from None
+        raise InputError(
+            f"{path}: not a plan ({type(error).__name__}: {error}); "
+            "snakewalk plan --with repertoire -o makes one"
+        ) from None
     if not actions:
         raise InputError(f"{path}: a plan without actions")
     run = checked(RunConfig, parts[0], str(path))

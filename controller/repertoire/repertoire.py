@@ -96,8 +96,10 @@ def load_repertoire(path: Path) -> Repertoire:
                 Segment(**plain, **{name: file[f"{k}/{name}"] for name in _ARRAYS})
                 for k, plain in enumerate(about["segments"])
             )
-    except (KeyError, TypeError, AttributeError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: not a repertoire ({error})") from None
+    except (KeyError, TypeError, AttributeError, ValueError, EOFError, zipfile.BadZipFile):
+        raise InputError(
+            f"{path}: not a repertoire; snakewalk repertoire record makes one"
+        ) from None
     if not segments:
         raise InputError(f"{path}: a repertoire without actions")
     return Repertoire(**{key: about[key] for key in _HEAD}, segments=segments)

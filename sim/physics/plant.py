@@ -125,8 +125,14 @@ class MujocoPlant:
         steps = math.floor(until_s / self.step_s + 1e-6) - self._count
         if steps <= 0:
             return
-        self._steps.run(steps, drive)
-        self._count += steps
+        count = self._count + steps
+        try:
+            self._steps.run(steps, drive)
+            self._count = count
+        except BaseException:
+            # A signal may end it anywhere; on the way out the body is stepped on from there.
+            self._count = round(self._data.time / self.step_s)
+            raise
         if (
             abs(self._data.time - self._count * self.step_s) > 0.5 * self.step_s
         ):  # MuJoCo resets what diverges

@@ -1,13 +1,14 @@
 """What mutation showed that no test noticed: small print of the judgement."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
 from config.loader import load_robot
 from config.run import SafetyConfig
-from drivers.safety import SafetyLimits, SafetyMemory, vet
+from drivers.safety import SafetyLimits, SafetyMemory, _oldest_s, vet
 from drivers.types import JointCommand
 
 from .test_safety_vet import (
@@ -84,6 +85,46 @@ def test_a_state_judged_before_is_still_watched_for_its_age() -> None:
     again = judge(0.05, now, first.memory, NOW + 0.1 + 1e-3)
     assert again.veto == "joint 0: not read for 0.101 s"
     assert judge(0.05, now, first.memory, NOW + 0.1 - 1e-3).veto is None
+
+
+def test_a_state_that_was_read_long_ago_is_old_when_it_is_first_judged() -> None:
+    assert judge(0.0, state(time_s=NOW - 0.1 - 1e-3)).veto == "joint 0: not read for 0.101 s"
+    assert judge(0.0, state(time_s=NOW - 0.1 + 1e-3)).veto is None
+
+
+def test_the_quick_look_takes_what_is_at_its_limit_and_nothing_beyond() -> None:
+    """It only spares the checks; but where it is wrong they are not asked."""
+    bent = LIMITS.limit_rad + LIMITS.limit_slack_rad
+    at_limits = state(
+        position_rad=-bent,
+        velocity_rad_s=np.full(J, -1e300),
+        current_a=np.full(J, -LIMITS.current_limit_a),
+        temperature_c=np.full(J, LIMITS.temperature_limit_c),
+        voltage_v=np.array([LIMITS.voltage_min_v, LIMITS.voltage_max_v, 12.0]),
+        age_s=np.array([0.0, 0.05, 0.01]),
+    )
+    assert _oldest_s(at_limits, memory(), LIMITS) == 0.05
+    beyond = {
+        "position_rad": [-bent * (1.0 + 1e-12), np.full(J, np.nan)],
+        "velocity_rad_s": [np.full(J, -np.inf), np.full(J, np.nan)],
+        "current_a": [np.full(J, -LIMITS.current_limit_a - 1e-9), np.full(J, np.nan)],
+        "temperature_c": [np.full(J, LIMITS.temperature_limit_c + 1e-9), np.full(J, np.nan)],
+        "voltage_v": [
+            np.full(J, LIMITS.voltage_min_v - 1e-9),
+            np.full(J, LIMITS.voltage_max_v + 1e-9),
+            np.full(J, np.nan),
+        ],
+        "age_s": [np.full(J, np.inf), np.full(J, np.nan)],
+        "error": [np.full(J, 1, np.uint8)],
+        "hardware_error": [np.full(J, 0x20, np.uint8)],
+    }
+    for name, values in beyond.items():
+        sound = getattr(at_limits, name)
+        for value, joint in product(values, range(J)):
+            bad = at_limits._replace(**{name: np.where(np.arange(J) == joint, value, sound)})
+            assert np.isnan(_oldest_s(bad, memory(), LIMITS)), (name, joint, value)
+    over = memory()._replace(over_current_since_s=one(NOW - 0.1, 1, np.nan))
+    assert np.isnan(_oldest_s(at_limits, over, LIMITS))
 
 
 def test_what_one_state_or_one_set_of_limits_kept_says_nothing_of_another() -> None:

@@ -47,7 +47,8 @@ def state(**changes: object) -> JointState:
 
 
 def memory(goal: float = 0.0, dt_s: float = DT) -> SafetyMemory:
-    return SafetyMemory(NOW - dt_s, np.full(J, goal), np.full(J, np.nan))
+    held = state(time_s=NOW - dt_s, position_rad=np.full(J, goal))
+    return SafetyMemory.at_rest(held)
 
 
 def judge(

@@ -6,6 +6,7 @@ import pytest
 from config.loader import load_robot, load_world
 from config.world import FrictionConfig
 from sim.bus.motor import MOTORS, make_drive, p_gain_per_rad
+from sim.physics.drive import drive_shafts
 from sim.physics.plant import MujocoPlant
 
 ROBOT = load_robot("yaw16")
@@ -67,3 +68,21 @@ def test_the_same_run_twice_is_the_same_bit_for_bit() -> None:
     crawl(one, 1.0)
     crawl(two, 1.0)
     assert one.qpos.tobytes() == two.qpos.tobytes()
+
+
+def test_steps_that_a_signal_ended_can_be_gone_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    body, servo, calls = plant(compiled=False), drive(), []
+
+    def interrupted(*given):
+        calls.append(given)
+        if len(calls) == 4:
+            raise KeyboardInterrupt
+        return drive_shafts(*given)
+
+    monkeypatch.setattr("sim.physics.interpreted.drive_shafts", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        body.advance(0.02, servo)
+    assert body.time_s == pytest.approx(0.006)
+    body.advance(0.02, servo)
+    assert body.time_s == pytest.approx(0.02)
+    assert len(calls) == 11

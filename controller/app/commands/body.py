@@ -35,7 +35,9 @@ def body(
     side: Annotated[
         Path | None, typer.Option(help="an .npz of the same body seen from the side: its heights")
     ] = None,
-    aspect: Annotated[float, typer.Option(help="height over width, without a side view")] = 0.85,
+    aspect: Annotated[
+        float, typer.Option(min=0.05, max=20.0, help="height over width, without a side view")
+    ] = 0.85,
     posed: Annotated[
         bool, typer.Option("--posed", help="bent as in --frame, not straight")
     ] = False,

@@ -34,15 +34,25 @@ TrackFile = Annotated[
 
 
 def show(found: dict[str, object], as_json: bool) -> None:
-    """Print a result as a table of two columns, or as JSON."""
+    """Print a result as a table of two columns, or as JSON; in the table no value is a dash."""
     if as_json:
         print(json.dumps(found))
         return
     table = Table(box=None, show_header=False)
     for key, value in found.items():
-        text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
-        table.add_row(key.replace("_", " "), str(text))
+        table.add_row(key.replace("_", " "), _said(value))
     console.print(table)
+
+
+def _said(value: object) -> str:
+    """A value for a reader: no brackets and quotes, no ``None``."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_said(one)}" for key, one in value.items()) or "-"
+    if isinstance(value, list | tuple):
+        return ", ".join(_said(one) for one in value) or "-"
+    return "-" if value is None else str(value)
 
 
 def leave(log: Path, folder: Path, *, film: bool, fine: bool = False) -> "Left":

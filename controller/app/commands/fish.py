@@ -86,6 +86,7 @@ def match(
 
     refuse_to_overwrite([output, picture], force)
     check_picture(picture)
+    _check_npz(output)
     if length is not None and not 0.0 < length < 1e3:
         raise InputError(f"--length: a body length in metres, above 0; not {length:g}")
     known = None if truth is None else load_postures(truth)
@@ -153,6 +154,7 @@ def synthesise(
         mirror=mirror, within_deg=within, merge_deg=merge, reference=reference, blend_s=blend,
         robot=robot,
     )  # fmt: skip
+    _check_npz(output)
     source: Postures = load_postures(postures)
     made = synthesise_motion(source, wanted)
     output.parent.mkdir(parents=True, exist_ok=True)
@@ -162,6 +164,11 @@ def synthesise(
 
         draw_synthesis(picture, made, wanted)
     show(made.facts | {"track": str(output)}, as_json)
+
+
+def _check_npz(path: Path) -> None:
+    if path.suffix.lower() != ".npz":
+        raise InputError(f"{path}: what is written is an .npz")
 
 
 def _points(words: list[str]) -> list[tuple[float, float]]:

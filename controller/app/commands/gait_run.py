@@ -23,7 +23,7 @@ def run_gait(
     param: Param = None,
     then: Annotated[
         list[str] | None,
-        typer.Option(help="NAME@SECONDS[,PARAM=VALUE...]: change gait; may be given again"),
+        typer.Option(help="NAME@SECONDS [,PARAM=VALUE...]: change gait; may be given again"),
     ] = None,
     by: Annotated[str, typer.Option(help="how gaits change: blend, or cpg: oscillators")] = "blend",
     seconds: Annotated[float, typer.Option(help="then it comes to rest")] = 20.0,

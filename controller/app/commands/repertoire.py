@@ -156,10 +156,16 @@ def _show_actions(file: Path, repertoire: "Repertoire", as_json: bool) -> None:
         about = {"file": str(file), "robot": repertoire.robot, "world": repertoire.world}
         print(json.dumps(about | {"actions": rows}))
         return
+    heads = {
+        "cycle_s": "cycle\ns",
+        "speed_m_s": "speed\nm/s",
+        "turn_rad_cycle": "turn, rad\na cycle",
+    }
+    heads |= {"closure_mm": "closure\nmm", "closure_mrad": "closure\nmrad"}
     table = Table(box=None, pad_edge=False)
-    for title in rows[0]:
-        name = title == "name"
-        table.add_column(title.replace("_", " "), justify="left" if name else "right", no_wrap=name)
+    for key in rows[0]:
+        name = key == "name"
+        table.add_column(heads.get(key, key), justify="left" if name else "right", no_wrap=name)
     for row in rows:
         table.add_row(*(str(value) for value in row.values()))
     console.print(f"{file}: {repertoire.robot} on {repertoire.world}")

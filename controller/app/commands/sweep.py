@@ -13,8 +13,6 @@ from controller.app.commands.common import Json, console
 from controller.app.picture_file import check_picture
 
 _HEADS = {
-    "gait": "gait",
-    "robot": "robot",
     "points": "n",
     "default_bl_cycle": "BL a\ncycle",
     "most_bl_cycle": "most",
@@ -81,9 +79,12 @@ def sweep(
         found = {"table": str(out), "run": len(missing), "held": len(planned.points)}
         print(json.dumps(found | {"left_out": planned.left_out, "gaits": rows}))
         return
-    grid = Table(box=None, pad_edge=False, title=str(out), title_justify="left")
+    console.print(str(out))
+    grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    grid.add_column("gait, robot")
     for key, head in _HEADS.items():
-        grid.add_column(head, justify="left" if key in {"gait", "robot"} else "right")
+        grid.add_column(head, justify="left" if key == "pace" else "right", no_wrap=True)
     for one in rows:
-        grid.add_row(*["" if one[key] is None else str(one[key]) for key in _HEADS])
+        named = f"{one['gait']} {one['robot']}"
+        grid.add_row(named, *["" if one[key] is None else str(one[key]) for key in _HEADS])
     console.print(grid)

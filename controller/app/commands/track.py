@@ -54,7 +54,7 @@ def _show(facts: dict[str, Any]) -> None:
     refused = ", ".join(f"{n} for {why}" for why, n in facts["states_refused"].items() if n)
     stall = facts["times_no_load_speed"]
     rows = {
-        "source": f"{facts['source']}; {facts['licence']}",
+        "source": "; ".join(dict.fromkeys((str(facts["source"]), str(facts["licence"])))),
         "frames": f"{facts['frames']}, {facts['frames_left_out']} left out, "
         f"{facts['rate_hz']:g} Hz{assumed}, {length}",
         "wave": f"{facts['waves_on_body']} on the body, {facts['wave_hz']} Hz, "

@@ -16,7 +16,7 @@ _HEADS = {
     "motion": "motion",
     "relief": "relief",
     "slope_deg": "slope\ndeg",
-    "complete": "complete",
+    "complete": "com-\nplete",
     "passed_by": "passed\nby",
     "duration_s": "time\ns",
     "path_error_m": "error\nm",
@@ -25,7 +25,7 @@ _HEADS = {
     "current_max_a": "peak\nA",
     "roll_max_deg": "roll\ndeg",
     "in_air": "in\nair",
-    "alarms": "alarms",
+    "alarms": "ala-\nrms",
     "trips": "trips",
     "why": "why",
 }
@@ -78,7 +78,11 @@ def trials(
     shown = [key for key in _HEADS if any(row[key] not in {"", None} for row in rows)]
     if len({case.relief for case in cases}) == 1:
         shown.remove("relief")
-    grid = Table(*[_HEADS[key] for key in shown], title=run, title_justify="left", box=None)
+    console.print(run)
+    grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    for key in shown:
+        text = key in {"robot", "motion", "why"}
+        grid.add_column(_HEADS[key], justify="left" if text else "right", no_wrap=key != "why")
     for row in rows:
         grid.add_row(*["" if row[key] is None else str(row[key]) for key in shown])
     console.print(grid)

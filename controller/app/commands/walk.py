@@ -20,7 +20,7 @@ def walk(
     graph: Annotated[
         list[str] | None,
         typer.Option(
-            help="er:STATES:DEGREE, ws:STATES:DEGREE:REWIRED or kp:TRACK[:THRESHOLD]; "
+            help="er:STATES:DEGREE, ws:STATES:DEGREE:REWIRED, kp:TRACK[:THRESHOLD] or a file; "
             "may be given again; default: er:1000:9"
         ),
     ] = None,

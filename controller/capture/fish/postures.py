@@ -159,8 +159,12 @@ def load_postures(path: Path) -> Postures:
             held = {name: np.asarray(data[name]) for name in data.files}
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; snakewalk fish match writes one") from None
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: holds no postures: {error}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; postures are an .npz") from None
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile):
+        raise InputError(
+            f"{path}: holds no postures; snakewalk fish match writes them, as .npz"
+        ) from None
     missing = {"base", "head_rad", "angles_rad_spine", "joints_at", "rate_hz"} - held.keys()
     if missing:
         raise InputError(
