@@ -24,7 +24,7 @@ Port = Annotated[
 ]
 RunPort = Annotated[str | None, typer.Option(help="serial port; without it, the simulator")]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
-RunFolder = Annotated[Path | None, typer.Option(help="folder for log and summary")]
+RunFolder = Annotated[Path | None, typer.Option(file_okay=False, help="folder for log and summary")]
 Force = Annotated[bool, typer.Option("--force", help="overwrite files")]
 Robot = Annotated[str | None, typer.Option(help="shipped robot, or a TOML file")]
 World = Annotated[str | None, typer.Option(help="shipped world, or a TOML file")]

@@ -11,7 +11,9 @@ from controller.app.commands.common import Json, leave, show
 
 def report(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
-    out: Annotated[Path | None, typer.Option(help="folder; default: the log's")] = None,
+    out: Annotated[
+        Path | None, typer.Option(file_okay=False, help="folder; default: the log's")
+    ] = None,
     film: Annotated[bool, typer.Option("--film/--no-film", help="draw the film again")] = True,
     fine: Annotated[bool, typer.Option("--fine", help="film in 1280 x 720; slow")] = False,
     as_json: Json = False,
