@@ -2,8 +2,10 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import typer
+from typer import rich_utils
 
 from config.errors import InputError
 from controller.app.commands.analyse import analyse
@@ -153,6 +155,7 @@ repertoire.command(
 
 def main() -> None:
     """Run the command line; bad input ends with exit code 2 and one line per fault."""
+    rich_utils.rich_format_error = _in_one_line  # type: ignore[assignment]
     try:
         app()
     except InputError as error:
@@ -165,3 +168,13 @@ def main() -> None:
     except OSError as error:
         print(f"snakewalk: {Path(str(error.filename or ''))}: {error.strerror}", file=sys.stderr)
         raise SystemExit(2) from None
+
+
+def _in_one_line(error: Any) -> None:
+    """Say what is wrong with the words of a command, in place of typer's box of five lines."""
+    if type(error).__name__ == "NoArgsIsHelpError":  # its help has been shown
+        return
+    context = getattr(error, "ctx", None)
+    path = "snakewalk" if context is None else context.command_path
+    said = " ".join(error.format_message().split())
+    print(f"snakewalk: {said} (see {path} --help)", file=sys.stderr)

@@ -3,7 +3,7 @@
 import pytest
 from typer.testing import CliRunner
 
-from controller.app.cli import app
+from controller.app.cli import app, main
 from controller.app.commands.common import show
 
 
@@ -19,7 +19,7 @@ def test_a_table_speaks_no_python(capsys: pytest.CaptureFixture[str]) -> None:
     ("words", "said"),
     [
         (["plan", "flat-square", "--motion", "gait"], "motion gait needs a table [gait]"),
-        (["body", "worm-like", "-o", "b.glb", "--aspect", "-1"], "--aspect"),
+        (["body", "worm-like", "-o", "b.glb", "--aspect", "-1"], "aspect: height over width"),
         (["fish", "match", ".", "-o", "postures.csv"], "is an .npz"),
         (["fish", "synthesise", "."], "is a folder"),
     ],
@@ -30,3 +30,29 @@ def test_wrong_input_is_said_plainly(words: list[str], said: str) -> None:
     assert result.exit_code != 0
     assert said in text
     assert "Value error" not in text
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["trials", "--seeds", "0"], "'--seeds'"),
+        (["run", "--bogus"], "No such option: --bogus"),
+        (["gait", "show"], "Missing argument 'name'"),
+        (["nosuch"], "No such command 'nosuch'"),
+        (["run", "flat-square", "--out", __file__], "is a file"),
+    ],
+)
+def test_wrong_words_are_one_line_and_exit_code_2(
+    words: list[str],
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("sys.argv", ["snakewalk", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    error = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert said in error
+    assert error.startswith("snakewalk: ")
+    assert error.count("\n") == 1

@@ -35,9 +35,7 @@ def body(
     side: Annotated[
         Path | None, typer.Option(help="an .npz of the same body seen from the side: its heights")
     ] = None,
-    aspect: Annotated[
-        float, typer.Option(min=0.05, max=20.0, help="height over width, without a side view")
-    ] = 0.85,
+    aspect: Annotated[float, typer.Option(help="height over width, without a side view")] = 0.85,
     posed: Annotated[
         bool, typer.Option("--posed", help="bent as in --frame, not straight")
     ] = False,
@@ -56,6 +54,8 @@ def body(
     from controller.capture.mesh_files import mesh_files, write_mesh  # noqa: PLC0415
 
     check_picture(picture)
+    if not 0.1 <= aspect <= 10.0:
+        raise InputError(f"aspect: height over width must be from 0.1 to 10, not {aspect:g}")
     drawn = [] if picture is None else [picture]
     refuse_to_overwrite([*mesh_files(output, image is not None), *drawn], force)
     texture, shown = None, None
