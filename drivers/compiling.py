@@ -10,6 +10,14 @@ from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., object])
 
+COMPILES = find_spec("numba") is not None
+"""Whether loops are compiled here."""
+
+
+def seen(number: str = "float64", dimensions: int = 1, layout: str = "A") -> str:
+    """Name of an array that is only read, as numba writes it; "A" is any layout, "C" no gaps."""
+    return f"Array({number}, {dimensions}, '{layout}', readonly=True)"
+
 
 def compiled(signature: Any, *, nogil: bool = False) -> Callable[[F], F]:
     """Compile for ``signature``, or hand the function back where numba is not installed.
@@ -21,7 +29,7 @@ def compiled(signature: Any, *, nogil: bool = False) -> Callable[[F], F]:
     """
 
     def decorate(function: F) -> F:
-        if find_spec("numba") is None:
+        if not COMPILES:
             return function
         from numba import njit  # noqa: PLC0415  optional and slow
 

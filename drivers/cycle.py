@@ -149,14 +149,9 @@ class GroupCycle:
     def _read(self, goals: NDArray[np.int32] | None) -> GroupAnswer:
         """Ask, behind goals if there are any."""
         self.counters.reads += 1
-        express, question, order = self._express, self._usual, self._order
+        express, question, order = self._express, self._question(), self._order
         raw = None
-        if (
-            express is not None
-            and order is self._natural
-            and self.fast is self._usual.fast
-            and (not self._debts.owed or self._debts.none)
-        ):
+        if express is not None and question is self._usual:
             found = express.turn(goals)
             if isinstance(found, GroupAnswer):
                 self._succeeded()
@@ -164,7 +159,6 @@ class GroupCycle:
             if found is not None:
                 raw, answer = self._go_on(question, found, express.left_s)
         if raw is None:
-            question = self._question()
             raw, answer = self._ask(question, goals)
         heard = answer.answered
         if not self._debts.none:

@@ -21,26 +21,26 @@ class Debts:
     def __init__(self, clock: Clock, horizon_s: float = HORIZON_S) -> None:
         self._clock = clock
         self._horizon_s = horizon_s
-        self.owed: dict[tuple[int, bool, int], float] = {}
-        """Servo, fast, length -> until when such an answer may come; may hold what is too old."""
+        # servo, fast, length -> until when such an answer may come; may hold what is too old
+        self._owed: dict[tuple[int, bool, int], float] = {}
         self._last_s = 0.0
 
     @property
     def none(self) -> bool:
         """Whether nothing is open; forgets what is too old."""
-        if self.owed and self._clock.now_s() >= self._last_s:
-            self.owed.clear()
-        return not self.owed
+        if self._owed and self._clock.now_s() >= self._last_s:
+            self._owed.clear()
+        return not self._owed
 
     def owe(self, servo_ids: Iterable[int], length: int, *, fast: bool) -> None:
         """Note that answers of ``length`` bytes have not come."""
         self._last_s = self._clock.now_s() + self._horizon_s
         for servo_id in servo_ids:
-            self.owed[servo_id, fast, length] = self._last_s
+            self._owed[servo_id, fast, length] = self._last_s
 
     def open(self, servo_id: int, length: int, *, fast: bool) -> bool:
         """Whether an answer of ``length`` bytes may be an old one."""
-        until_s = self.owed.get((servo_id, fast, length))
+        until_s = self._owed.get((servo_id, fast, length))
         return until_s is not None and self._clock.now_s() < until_s
 
     def free_length(self, servo_ids: Iterable[int], shortest: int, *, fast: bool) -> int:

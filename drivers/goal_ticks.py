@@ -1,11 +1,11 @@
 """Joint goals to raw goal positions inside the joint limits."""
 
 from collections.abc import Callable
-from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.compiling import COMPILES
 from drivers.types import Floats
 from drivers.units import ServoUnits
 
@@ -21,7 +21,7 @@ class GoalTicks:
         self._low, self._high = np.ascontiguousarray(limits.T, np.int32)
         self._scale = np.array([units.rad_per_position, float(units.zero_position)])
         self._loop: Callable[[Floats, Floats, Ticks, Ticks, Ticks], bool] | None = None
-        if find_spec("numba") is not None if compiled is None else compiled:
+        if COMPILES if compiled is None else compiled:
             from drivers.state_loops import ticks  # noqa: PLC0415  numba is optional
 
             self._loop = ticks

@@ -15,16 +15,14 @@ from numpy.typing import NDArray
 
 from config.robot import RobotConfig
 from config.run import SafetyConfig
-from drivers.compiling import compiled
+from drivers.compiling import compiled, seen
 from drivers.protocol.packet import ALERT
 from drivers.start_up import alarm_names
 from drivers.types import Bools, Floats, JointCommand, JointState
 
 Bytes = NDArray[np.uint8]
 
-# as numba writes them
-_FLOATS = "Array(float64, 1, 'A', readonly=True)"
-_BYTES = "Array(uint8, 1, 'A', readonly=True)"
+_FLOATS, _BYTES = seen(), seen("uint8")
 
 
 @dataclass(frozen=True, slots=True)

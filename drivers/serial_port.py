@@ -10,7 +10,6 @@ import select
 import sys
 import termios
 from contextlib import suppress
-from importlib.util import find_spec
 from types import TracebackType
 
 import numpy as np
@@ -18,6 +17,7 @@ import serial
 from serial.tools import list_ports
 
 from drivers.clock import Clock, WallClock
+from drivers.compiling import COMPILES
 from drivers.errors import PortError
 
 _LATENCY_MS = 16.0
@@ -51,7 +51,7 @@ class SerialPort:
         self._exchange = None
         self.file: int | None = None
         """Descriptor for compiled code, while there is any and the port is open."""
-        if sys.platform == "linux" and find_spec("numba") is not None:
+        if sys.platform == "linux" and COMPILES:
             from drivers.compiled_exchange import exchange  # noqa: PLC0415  slow, optional
 
             self._exchange = exchange

@@ -1,11 +1,11 @@
 """The state block of the control cycle: bytes of many servos to angle, velocity and current."""
 
 from collections.abc import Callable
-from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.compiling import COMPILES
 from drivers.control_table import ControlTable
 from drivers.errors import ControlTableError
 from drivers.types import Floats
@@ -45,7 +45,7 @@ class StateBlock:
         self._words = self._bytes.view("<i4").T
         self._word_scale = self._scale / [65_536.0, 1.0, 1.0]
         self._loop: Callable[[Bytes, Floats, Floats, Floats], None] | None = None
-        if find_spec("numba") is not None if compiled is None else compiled:
+        if COMPILES if compiled is None else compiled:
             from drivers.state_loops import motion  # noqa: PLC0415  numba is optional
 
             self._loop = motion

@@ -2,19 +2,19 @@
 
 Needs numba.
 """
-# mypy: disable-error-code="untyped-decorator"
 
 import numpy as np
-from numba import boolean, float64, int32, int64, njit, types, uint8, void
+from numba import boolean, float64, int32, int64, types, uint8, void
 from numpy.typing import NDArray
 
+from drivers.compiling import compiled
 from drivers.types import Floats
 
 _BLOCKS = types.Array(uint8, 2, "A", readonly=True)
 _GOALS = types.Array(float64, 1, "A", readonly=True)
 
 
-@njit(int64(_BLOCKS, int64, int64, int64), cache=True)
+@compiled(int64(_BLOCKS, int64, int64, int64))
 def _signed(data: NDArray[np.uint8], row: int, at: int, size: int) -> int:
     value = 0
     for k in range(size):
@@ -23,7 +23,7 @@ def _signed(data: NDArray[np.uint8], row: int, at: int, size: int) -> int:
     return value - 2 * half if value >= half else value
 
 
-@njit(void(_BLOCKS, float64[::1], float64[::1], float64[:, ::1]), cache=True)
+@compiled(void(_BLOCKS, float64[::1], float64[::1], float64[:, ::1]))
 def motion(data: NDArray[np.uint8], zero: Floats, scale: Floats, out: Floats) -> None:
     """Current, velocity and position of blocks (J, 10) into ``out`` (3, J)."""
     for row in range(len(data)):
@@ -32,7 +32,7 @@ def motion(data: NDArray[np.uint8], zero: Floats, scale: Floats, out: Floats) ->
         out[2, row] = (_signed(data, row, 6, 4) - zero[2]) * scale[2]
 
 
-@njit(boolean(_GOALS, float64[::1], int32[::1], int32[::1], int32[::1]), cache=True)
+@compiled(boolean(_GOALS, float64[::1], int32[::1], int32[::1], int32[::1]))
 def ticks(
     goal_rad: Floats,
     scale: Floats,

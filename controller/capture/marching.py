@@ -3,16 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.compiling import compiled
+from drivers.compiling import compiled, seen
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-_READ = "Array(float64, {}, 'C', readonly=True)"
 
 
 @compiled(
-    f"int64({_READ.format(2)}, {_READ.format(1)}, float64,"
-    " Array(int64, 1, 'C', readonly=True), float64[:, ::1], float64[::1])"
+    f"int64({seen(dimensions=2, layout='C')}, {seen(layout='C')}, float64,"
+    f" {seen('int64', layout='C')}, float64[:, ::1], float64[::1])"
 )
 def march(
     line: Floats, arc: Floats, chord: float, crossing: Ints, points: Floats, at: Floats

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RobotConfig
-from drivers.compiling import compiled
+from drivers.compiling import compiled, seen
 from drivers.types import BodyPose
 
 Floats = NDArray[np.float64]
@@ -60,8 +60,7 @@ def _yaws(joint_axes: str) -> NDArray[np.bool_]:
 
 
 @compiled(
-    "void(boolean[::1], Array(float64, 2, 'A', readonly=True),"
-    " Array(float64, 1, 'A', readonly=True), Array(float64, 1, 'A', readonly=True), float64,"
+    f"void(boolean[::1], {seen(dimensions=2)}, {seen()}, {seen()}, float64,"
     " float64[:, ::1], float64[:, ::1])"
 )
 def _carry(

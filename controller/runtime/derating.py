@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.run import SafetyConfig
-from drivers.compiling import compiled
+from drivers.compiling import compiled, seen
 from drivers.types import JointState
 
 Floats = NDArray[np.float64]
@@ -86,9 +86,7 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
 
 
 @compiled(
-    "boolean(float64[::1], Array(float64, 1, 'A', readonly=True), float64,"
-    " Array(float64, 1, 'A', readonly=True), Array(float64, 1, 'A', readonly=True),"
-    " float64, float64, float64)"
+    f"boolean(float64[::1], {seen()}, float64, {seen()}, {seen()}, float64, float64, float64)"
 )
 def _plenty(
     mean_a: Floats,

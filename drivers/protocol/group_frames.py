@@ -4,12 +4,12 @@ What is not exactly as expected is refused here and left to the careful reader. 
 the same three functions as loops, for a compiler; ``quickest_frames`` says which to use.
 """
 
-from importlib.util import find_spec
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.compiling import COMPILES
 from drivers.protocol.crc import crc16_long, crc16_rows
 
 Bytes = NDArray[np.uint8]
@@ -92,7 +92,7 @@ class NumpyFrames:
 
 def quickest_frames() -> Frames:
     """The quickest there is here: compiled where numba is installed."""
-    if find_spec("numba") is None:
+    if not COMPILES:
         return NumpyFrames()
     from drivers.protocol import group_loops  # noqa: PLC0415  optional, and slow to import
 

@@ -7,7 +7,7 @@ and plain numbers: numba takes five times longer to look at a tuple than at an a
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.compiling import compiled
+from drivers.compiling import compiled, seen
 
 Bytes = NDArray[np.uint8]
 Rows = NDArray[np.intp]
@@ -16,13 +16,12 @@ Ints = NDArray[np.int64]
 Registers = NDArray[np.integer]
 
 # as numba writes them; what is only read may be read-only, and a register's column has gaps
-_READ = "Array(uint8, 1, 'C', readonly=True)"
+_READ = seen("uint8", layout="C")
 _TABLE = "uint8[:, ::1]"
-_CRC = "Array(uint16, 1, 'C', readonly=True)"
-_COLUMN = "Array({}, 1, 'A', readonly=True)"
-_PLACES = "Array(int64, 1, 'C', readonly=True)"
-_SEEN = "Array(float64, 1, 'C', readonly=True)"
-_FRAME = "Array(float64, 2, 'C', readonly=True)"
+_CRC = seen("uint16", layout="C")
+_PLACES = seen("int64", layout="C")
+_SEEN = seen(layout="C")
+_FRAME = seen(dimensions=2, layout="C")
 
 
 @compiled(f"int64({_READ}, int64, int64, int64, {_CRC})")
@@ -110,7 +109,7 @@ def compose(
 
 
 @compiled(
-    f"void({_READ}, {_PLACES}, {_TABLE}, int64, int64, Array(int64, 2, 'C', readonly=True),"
+    f"void({_READ}, {_PLACES}, {_TABLE}, int64, int64, {seen('int64', 2, 'C')},"
     f" {_FRAME}, float64, float64[::1], boolean[::1])"
 )
 def take_goals(
@@ -178,10 +177,7 @@ def warm_up(temperature_c: Floats, heat_j: Floats, slice_s: float, thermal: Floa
         heat_j[row] = 0.0
 
 
-@compiled(
-    f"boolean({_SEEN}, {_COLUMN.format('uint8')}, int64,"
-    f" {_COLUMN.format('uint16')}, {_COLUMN.format('uint16')})"
-)
+@compiled(f"boolean({_SEEN}, {seen('uint8')}, int64, {seen('uint16')}, {seen('uint16')})")
 def out_of_range(
     temperature_c: Floats,
     hottest_c: Registers,

@@ -1,7 +1,6 @@
 """The plant of ``sim.plant`` in MuJoCo: stepped, placed, and looked at."""
 
 import math
-from importlib.util import find_spec
 from typing import Protocol
 
 import mujoco
@@ -11,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from config.heightfield import HeightField
 from config.robot import RobotConfig
 from config.world import WorldConfig
-from drivers.compiling import compiled
+from drivers.compiling import COMPILES, compiled
 from drivers.types import BodyPose
 from sim.physics.interpreted import InterpretedSteps
 from sim.physics.layout import step_layout
@@ -236,7 +235,7 @@ class MujocoPlant:
 def _steps(mechanics: Mechanics, compiled: bool | None) -> Steps:
     if compiled is False:
         return InterpretedSteps(mechanics)
-    layout = step_layout() if find_spec("numba") else None
+    layout = step_layout() if COMPILES else None
     if layout is not None:
         from sim.physics.compiled import CompiledSteps  # noqa: PLC0415  numba is optional and slow
 
