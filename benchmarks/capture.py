@@ -11,12 +11,12 @@ import cv2
 import numpy as np
 
 from benchmarks.rows import Row, cpu_s
-from controller.capture.accuracy import distance, point_error, swapped
-from controller.capture.capture import capture
-from controller.capture.equipartition import equipartition
-from controller.capture.eye import Eye, open_eye
-from controller.capture.render import Scene, empty, film, true_midlines
-from controller.capture.silhouette import Look
+from snakewalk.controller.capture.body_detector import Eye, open_eye
+from snakewalk.controller.capture.capture import capture
+from snakewalk.controller.capture.image.equipartition import equipartition
+from snakewalk.controller.capture.image.silhouette import Look
+from tests.oracles.rendered_snake import Scene, empty, film, true_midlines
+from tests.oracles.skeleton_accuracy import distance, point_error, swapped
 
 TITLE = "Capture: image to skeleton on one core, and its error on rendered films"
 

@@ -1,11 +1,12 @@
 """The control cycle of 16 servos: goals out, current, velocity and position back.
 
-Ours is ``drivers.cycle`` on ``drivers.serial_port``. Beside it the group calls of ``dynamixel-sdk``
-on its own port handler, with the values taken out as a user must, and ``rustypot`` where it is
-installed (its call takes and gives lists of bytes per servo). All talk to the same servos on a
-paced pseudo-terminal in another process, on another core, and CPU time is that of the process with
-the program: while bytes are on the wire it waits or spins, as each of them does on metal. They take
-turns, a short window each, so that whatever else the machine does meets all of them alike.
+Ours is ``drivers.bus.control_cycle`` on ``drivers.port.serial_port``. Beside it the group calls of
+``dynamixel-sdk`` on its own port handler, with the values taken out as a user must, and
+``rustypot`` where it is installed (its call takes and gives lists of bytes per servo). All talk to
+the same servos on a paced pseudo-terminal in another process, on another core, and CPU time is that
+of the process with the program: while bytes are on the wire it waits or spins, as each of them does
+on metal. They take turns, a short window each, so that whatever else the machine does meets all of
+them alike.
 
 The wire begins when ``write`` has returned (``benchmarks.wire_times``), and the last byte of an
 answer is handed to the kernel when it is due. So what a cycle takes beyond the wire time is: from
@@ -36,9 +37,9 @@ from numpy.typing import NDArray
 
 from benchmarks.rows import Row
 from benchmarks.wire_times import Answer, WireTimes, build_library
-from drivers.budget import wire_budget
-from drivers.cycle import GroupCycle
-from drivers.serial_port import SerialPort
+from snakewalk.drivers.bus.budget import wire_budget
+from snakewalk.drivers.bus.control_cycle import GroupCycle
+from snakewalk.drivers.port.serial_port import SerialPort
 
 TITLE = "Control cycle of 16 servos on a paced pseudo-terminal"
 

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.rows import Row, cpu_s
-from config.heightfield import HeightField
-from controller.app.prepare import prepare
-from controller.motion.ground_step import GroundStep
-from controller.motion.synthesis import synthesise
-from controller.motion.velocity import SpeedLaw
-from controller.motion.walker import Walker
+from snakewalk.config.heightfield import HeightField
+from snakewalk.controller.app.runs.prepare import prepare
+from snakewalk.controller.mechanics.ground_step import GroundStep
+from snakewalk.controller.mechanics.speed_law import SpeedLaw
+from snakewalk.controller.walk.synthesis import synthesise
+from snakewalk.controller.walk.walker import Walker
 
 TITLE = "Synthesis of 250 frames, 100 points, a world of 10,000 vertices"
 

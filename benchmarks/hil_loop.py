@@ -25,8 +25,8 @@ from benchmarks.simulated_robot import (
     Stopwatch,
     travelling_wave,
 )
-from controller.app.prepare import Prepared, prepare
-from drivers.telemetry.writer import RunLog
+from snakewalk.controller.app.runs.prepare import Prepared, prepare
+from snakewalk.controller.runlog.writer import RunLog
 
 TITLE = "Simulated loop against bare mj_step: 16 servos, 50 Hz, 2 ms"
 

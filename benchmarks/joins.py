@@ -14,13 +14,13 @@ from itertools import product
 import numpy as np
 
 from benchmarks.rows import Row
-from config.loader import load_robot
-from config.robot import RobotConfig
-from controller.gaits.gait import Gait
-from controller.gaits.registry import GAITS
-from controller.motion.cpg_motion import CpgMotion
-from controller.motion.gait_cycle import Cycle
-from controller.motion.gait_motion import GaitMotion
+from snakewalk.config.loader import load_robot
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Gait
+from snakewalk.controller.gaits.registry import GAITS
+from snakewalk.controller.motion.cpg_motion import CpgMotion
+from snakewalk.controller.motion.gait_cycle import Cycle
+from snakewalk.controller.motion.gait_motion import GaitMotion
 
 TITLE = "Joins inside a control cycle: every gait of alternating16 to every other"
 

@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 
 from benchmarks.rows import Row, cpu_s
-from config.camera import CameraConfig
-from config.loader import load_robot
-from controller.capture.overhead import CameraModel, OverheadEye
-from controller.capture.overhead_scene import DrawnView
-from controller.capture.verdict import Verdict
-from controller.runtime.forecast import pose_at
-from controller.runtime.pose_fit import both_ways
+from snakewalk.config.camera import CameraConfig
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.kinematics.links import pose_at
+from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadEye
+from snakewalk.controller.localization.pose_fit import both_ways
+from tests.oracles.overhead_scene import DrawnView
 
 TITLE = "Overhead camera: a frame of 640 x 480 to head, heading and links, on one core"
 

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.wire_times import Answer, WireTimes
-from drivers.protocol.crc import crc16
-from drivers.protocol.packet import HEADER, STATUS, Instruction
-from sim.bus.fast_answer import fast_head
+from snakewalk.drivers.protocol.crc import crc16
+from snakewalk.drivers.protocol.packet import HEADER, STATUS, Instruction, fast_head
 
 USB_BYTES = 62
 _SPINS_TO_CLOSE = 4096

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.bus.bench import BenchPlant
-from sim.bus.gearbox import GEARBOXES, Gearbox
-from sim.bus.motor import MOTORS, make_drive, p_gain_per_rad
+from snakewalk.sim.servo.bench import BenchPlant
+from snakewalk.sim.servo.gearbox import GEARBOXES, Gearbox
+from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
 
 Floats = NDArray[np.float64]
 MASS_KG, ARM_M = 0.49, 0.10  # SOURCE.txt of the recordings

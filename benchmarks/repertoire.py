@@ -12,13 +12,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks.rows import Row, cpu_s
-from config.loader import load_robot, load_world
-from controller.app.repertoire_physics import FRAME_S, PhysicsBody
-from controller.app.repertoire_planning import plan_route
-from controller.app.repertoire_recording import ACTIONS, record
-from controller.app.repertoire_timing import search_cost
-from controller.repertoire.crowd import Crowd
-from controller.repertoire.repertoire import Repertoire
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.controller.app.studies.repertoire_physics import FRAME_S, PhysicsBody
+from snakewalk.controller.app.studies.repertoire_planning import plan_route
+from snakewalk.controller.app.studies.repertoire_recording import ACTIONS, record
+from snakewalk.controller.app.studies.repertoire_timing import search_cost
+from snakewalk.controller.repertoire.crowd import Crowd
+from snakewalk.controller.repertoire.repertoire import Repertoire
 
 TITLE = "Repertoire: 17 links, 60 frames a second, one core"
 

@@ -7,19 +7,19 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.app.drive import Drive
-from controller.app.prepare import Prepared
-from controller.runtime.guide import Guide
-from controller.runtime.loop import ticks
-from drivers.bus import DynamixelBus
-from drivers.chain import ServoChain
-from drivers.safe_link import SafeLink
-from drivers.safety import SafetyLimits
-from drivers.telemetry.writer import RunLog
-from drivers.types import JointCommand
-from sim.bus.bank import ServoBank
-from sim.bus.line import SimLine
-from sim.physics.plant import MujocoPlant
+from snakewalk.controller.app.runs.prepare import Prepared
+from snakewalk.controller.runlog.writer import RunLog
+from snakewalk.controller.runtime.drive import Drive
+from snakewalk.controller.runtime.guide import Guide
+from snakewalk.controller.runtime.loop import ticks
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.vet import SafetyLimits
+from snakewalk.drivers.types import JointCommand
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.physics.plant import MujocoPlant
+from snakewalk.sim.servo.bank import ServoBank
 
 Floats = NDArray[np.float64]
 State = tuple[Floats, Floats, Floats, Floats]

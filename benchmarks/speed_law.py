@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from controller.motion.velocity import identify
-from drivers.telemetry.reader import read_log
+from snakewalk.controller.mechanics.speed_law import identify
+from snakewalk.controller.runlog.reader import read_log
 
 SMOOTH_S, START_S, END_S, EVERY_S = 1.0, 4.0, 3.0, 0.5
 

@@ -12,10 +12,10 @@ from random import Random
 import numpy as np
 
 from benchmarks.rows import Row, cpu_s
-from controller.shape.graph_spec import graph_source
-from controller.shape.graphs import Graph
-from controller.shape.star import star_order
-from controller.shape.walks import walk
+from snakewalk.controller.app.studies.graph_study import graph_source
+from snakewalk.controller.shape.graphs import Graph
+from snakewalk.controller.shape.star import star_order
+from snakewalk.controller.shape.walks import walk
 
 TITLE = "A step of the snake walk"
 

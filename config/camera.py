@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from config.base import Strict
+from snakewalk.config.base import Strict
 
 PoseName = Literal["simulator", "camera", "joints"]
 Place = tuple[float, float]

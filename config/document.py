@@ -1,4 +1,4 @@
-"""The configuration's reference, written from the schema: ``python -m config.document``."""
+"""The configuration's reference, from the schema: ``python -m snakewalk.config.document``."""
 
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -7,9 +7,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from config.robot import RobotConfig
-from config.run import RunConfig
-from config.world import WorldConfig
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
 
 _HEAD = """# Configuration
 
@@ -35,7 +35,7 @@ voltage_max_v = 6.0
 ```
 
 Units are in the names: `_m`, `_rad`, `_s`, `_a` (ampere), `_v`, `_c` (Celsius), `_kg`, `_n_m`.
-This page is written from the schema by `python -m config.document`; a test keeps it true.
+This page is written from the schema by `python -m snakewalk.config.document`; a test keeps it true.
 """
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from config.base import Strict
+from snakewalk.config.base import Strict
 
 ServoId = Annotated[int, Field(ge=0, le=252)]
 

@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from config.base import Strict
+from snakewalk.config.base import Strict
 
 Parameters = dict[str, bool | int | float]
 

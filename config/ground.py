@@ -4,14 +4,12 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
-from config.errors import ConfigError
-from config.heightfield import HeightField
-from config.world import ElevationGround, WorldConfig
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import ConfigError
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.world import ElevationGround, WorldConfig
 
 
 def build_ground(world: WorldConfig) -> HeightField | None:

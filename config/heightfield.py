@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)

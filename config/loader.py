@@ -7,11 +7,11 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from config.errors import ConfigError
-from config.gait import GaitSetConfig
-from config.robot import RobotConfig
-from config.run import RunConfig
-from config.world import WorldConfig
+from snakewalk.config.errors import ConfigError
+from snakewalk.config.gait import GaitSetConfig
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
 
 M = TypeVar("M", bound=BaseModel)
 Kind = Literal["robots", "worlds", "runs", "recordings", "gaits"]

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from config.base import Strict
+from snakewalk.config.base import Strict
 
 
 class PlaybackConfig(Strict):

@@ -2,7 +2,7 @@
 
 from pydantic import Field, model_validator
 
-from config.base import Strict
+from snakewalk.config.base import Strict
 
 
 class EpisodeConfig(Strict):

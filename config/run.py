@@ -4,10 +4,10 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from config.base import Strict
-from config.camera import CameraConfig, PoseName
-from config.gait import GaitConfig
-from config.playback import PlaybackConfig
+from snakewalk.config.base import Strict
+from snakewalk.config.camera import CameraConfig, PoseName
+from snakewalk.config.gait import GaitConfig
+from snakewalk.config.playback import PlaybackConfig
 
 MotionName = Literal[
     "walk", "walk-printed", "walk-blind", "serpenoid", "gait", "playback", "repertoire"

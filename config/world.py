@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
-from config.base import Strict
+from snakewalk.config.base import Strict
 
 
 class FrictionConfig(Strict):

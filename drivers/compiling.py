@@ -9,7 +9,6 @@ from importlib.util import find_spec
 from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., object])
-
 COMPILES = find_spec("numba") is not None
 """Whether loops are compiled here."""
 

@@ -18,7 +18,7 @@ The last four say what a user gave that cannot be used, one line a fault; the co
 the lines and ends with exit code 2.
 """
 
-from config.errors import InputError
+from snakewalk.config.errors import InputError
 
 
 class DriverError(Exception):

@@ -1,8 +1,10 @@
 """The joint link: the one door between whatever decides motion and whatever moves."""
 
-from typing import Protocol
+from types import TracebackType
+from typing import Protocol, Self
 
-from drivers.types import JointCommand, JointState
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.drivers.types import JointCommand, JointState
 
 
 class JointLink(Protocol):
@@ -27,4 +29,46 @@ class JointLink(Protocol):
 
     def write(self, command: JointCommand) -> None:
         """Send goal positions."""
+        ...
+
+
+class Judgement(Protocol):
+    """What became of one command."""
+
+    @property
+    def goal_rad(self) -> Floats:
+        """(J,) goals that were sent; the last ones again where there was a veto."""
+        ...
+
+    @property
+    def clamped(self) -> Bools:
+        """(J,) goals that were changed."""
+        ...
+
+
+class VettedLink(JointLink, Protocol):
+    """A joint link that vets every command, and switches torque off when it is left."""
+
+    @property
+    def tripped(self) -> str | None:
+        """Why nothing passes any more, one line; None: all is well."""
+        ...
+
+    @property
+    def last_verdict(self) -> Judgement | None:
+        """On the newest command; None before the first."""
+        ...
+
+    def __enter__(self) -> Self:
+        """Leave it with torque off, whatever happens."""
+        ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+        /,
+    ) -> None:
+        """Switch torque off."""
         ...

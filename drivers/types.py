@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from snakewalk.config.arrays import Bools, Floats
 
 
 class JointCommand(NamedTuple):

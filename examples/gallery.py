@@ -7,10 +7,10 @@ from tempfile import TemporaryDirectory
 import av
 from PIL import Image
 
-from controller.app.execute import execute
-from controller.app.prepare_gait import prepare_gait
-from controller.app.report.leave import leave_report
-from controller.gaits.registry import GAITS
+from snakewalk.controller.app.report.artifacts import leave_report
+from snakewalk.controller.app.runs.execute import execute
+from snakewalk.controller.app.runs.prepare_gait import prepare_gait
+from snakewalk.controller.gaits.registry import GAITS
 
 WIDTH, HEIGHT = 400, 225
 SHOWN_S = 5.0

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from config.camera import CameraConfig
-from config.loader import load_robot, load_world
-from controller.capture.overhead import CameraModel, OverheadEye
-from controller.runtime.pose_fit import both_ways
-from sim.physics.plant import MujocoPlant
-from sim.physics.top_view import TopView
+from snakewalk.config.camera import CameraConfig
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadEye
+from snakewalk.controller.localization.pose_fit import both_ways
+from snakewalk.sim.physics.plant import MujocoPlant
+from snakewalk.sim.rendering.top_view import TopView
 
 
 def main(file: Path) -> None:

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)

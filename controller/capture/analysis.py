@@ -4,21 +4,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.capture.pulse_speed import NEIGHBOURS, PulseSpeed, measure_pulse_speed
-from controller.capture.track import Track
-from controller.capture.undulation import (
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.pulse_speed import NEIGHBOURS, PulseSpeed, measure_pulse_speed
+from snakewalk.controller.capture.track import Track
+from snakewalk.controller.capture.undulation import (
     Undulation,
     along_speed,
     even_points,
     measure_undulation,
 )
-from controller.capture.wave import Wave, measure_wave
-from controller.shape.states import StateRange, energy_kept, state_range, to_states
+from snakewalk.controller.capture.wave import Wave, measure_wave
+from snakewalk.controller.shape.states import StateRange, energy_kept, state_range, to_states
 
-Floats = NDArray[np.float64]
 WANTED_SHIFT = 4.0
 """Points that the pattern should move between the frames that are compared."""
 COEFFICIENTS = 7

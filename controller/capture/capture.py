@@ -6,20 +6,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.capture.eye import Eye
-from controller.capture.glimpse import LONGEST_PX, Glimpse, glimpse
-from controller.capture.identity import follow, margins, taper_of, travel_of
-from controller.capture.medial_axis import Skeleton
-from controller.capture.refine import refine
-from controller.capture.softness import axis_error_px, blur_of, softness_px
-from controller.capture.track import track_from_points
-from controller.capture.unlike import beside_the_others
-from controller.capture.verdict import Verdict
-from controller.capture.wave import measure_wave
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.body_detector import Eye
+from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.identity import follow, margins, taper_of, travel_of
+from snakewalk.controller.capture.image.medial_axis import Skeleton
+from snakewalk.controller.capture.outlier_frames import beside_the_others
+from snakewalk.controller.capture.small_body.blur_estimate import (
+    axis_error_px,
+    blur_of,
+    softness_px,
+)
+from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Glimpse, glimpse
+from snakewalk.controller.capture.small_body.fit import refine
+from snakewalk.controller.capture.track import track_from_points
+from snakewalk.controller.capture.wave import measure_wave
 
-Floats = NDArray[np.float64]
-Image = NDArray[np.uint8]
 _COMPANY = 0.08  # of the body: more than dirt and noise
 _FOLLOWED = 5  # frames for which a small body that was lost may be where it was
 _STILL = 0.02  # of the length: less change than that is no motion

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from controller.capture.capture import Capture
+from snakewalk.controller.capture.capture import Capture
 
 
 def save_capture(

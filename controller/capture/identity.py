@@ -9,12 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.capture.medial_axis import Skeleton
-from controller.capture.verdict import Verdict
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.image.medial_axis import Skeleton
 
-Floats = NDArray[np.float64]
 _SURE = 0.2  # margin from which one frame is enough to tell the ends apart
 _GAP = 3  # frames without a skeleton after which the place alone is no longer trusted
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+
 NEIGHBOURS = 9
 """Points that decide together, [PT] 2.4."""
 LEAST_SLOPE = 0.2

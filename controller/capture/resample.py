@@ -1,10 +1,10 @@
 """Equal arc lengths: a few points along a body become 100 segments and their tangent angles."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+
 SEGMENTS = 100
 """Segments of a skeleton, [PT] 2.5."""
 _FINE = 8  # samples per segment when the spline's arc length is measured

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import InputError
+from snakewalk.config.arrays import Image
+from snakewalk.config.errors import InputError
 
-Image = NDArray[np.uint8]
 _FAMILIES = (
     cv2.aruco.DICT_4X4_50,
     cv2.aruco.DICT_5X5_50,

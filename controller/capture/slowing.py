@@ -8,10 +8,10 @@ time, with a cut well above the wave's frequency; the unsmoothed speed stays bes
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+
 CUT_CYCLES = 5.0
 """Where smoothing leaves exp(-1/2), in multiples of the wave's frequency: the wave keeps 98 %."""
 

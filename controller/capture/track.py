@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.capture.resample import equal_arc_length, tangent_angles
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.resample import equal_arc_length, tangent_angles
 
 
 @dataclass(frozen=True, slots=True)

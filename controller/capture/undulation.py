@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from controller.capture.resample import body_points, equal_arc_length
-from controller.capture.track import Track
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.resample import body_points, equal_arc_length
+from snakewalk.controller.capture.track import Track
 
 
 @dataclass(frozen=True, slots=True)

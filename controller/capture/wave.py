@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import hilbert
 
-from controller.capture.track import Track
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.track import Track
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,13 +13,13 @@ chain fitting and keyframe wave extraction, Autonomous Robots 28, 2010.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from config.robot import RobotConfig
-from controller.gaits.chain import chain_points_m, chain_slopes, rotation_by
-from controller.gaits.space_curve import SAMPLES_A_LINK, SpaceCurve
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.space_curve import SAMPLES_A_LINK, SpaceCurve
+from snakewalk.controller.kinematics.chain import chain_points_m, chain_slopes
+from snakewalk.controller.kinematics.rotations import rotation_by
 
 ROUNDS = 40
 STEP_RAD = 0.3

@@ -3,9 +3,10 @@
 import numpy as np
 from pydantic import Field
 
-from config.robot import RobotConfig
-from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
-from controller.gaits.wave import TURN, bends_rad, group_places
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
+from snakewalk.controller.gaits.wave import TURN, bends_rad, group_places
 
 EDGE = 0.7
 """Share of the folded part over which the folds grow and vanish."""

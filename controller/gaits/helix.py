@@ -13,9 +13,10 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from config.robot import RobotConfig
-from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
-from controller.gaits.wave import places
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
+from snakewalk.controller.gaits.wave import places
 
 SOURCE = (
     "M. Tesch et al., Parameterized and scripted gaits for modular snake robots, Advanced "

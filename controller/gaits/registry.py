@@ -2,23 +2,23 @@
 
 from typing import Any
 
-from config.errors import InputError
-from controller.gaits.compound_serpenoid import CompoundSerpenoid
-from controller.gaits.concertina import Concertina
-from controller.gaits.gait import Gait
-from controller.gaits.helix import HelixPipe, HelixPole
-from controller.gaits.lateral_undulation import LateralUndulation
-from controller.gaits.rectilinear import Rectilinear
-from controller.gaits.rolling import Rolling
-from controller.gaits.sidewinding import Sidewinding
-from controller.gaits.spine import (
+from snakewalk.config.errors import InputError
+from snakewalk.controller.gaits.compound_serpenoid import CompoundSerpenoid
+from snakewalk.controller.gaits.concertina import Concertina
+from snakewalk.controller.gaits.gait import Gait
+from snakewalk.controller.gaits.helix import HelixPipe, HelixPole
+from snakewalk.controller.gaits.lateral_undulation import LateralUndulation
+from snakewalk.controller.gaits.rectilinear import Rectilinear
+from snakewalk.controller.gaits.rolling import Rolling
+from snakewalk.controller.gaits.sidewinding import Sidewinding
+from snakewalk.controller.gaits.spine import (
     Anguilliform,
     Carangiform,
     Dolphin,
     Subcarangiform,
     Thunniform,
 )
-from controller.gaits.turn_in_place import TurnInPlace
+from snakewalk.controller.gaits.turn_in_place import TurnInPlace
 
 GAITS: dict[str, type[Gait]] = {
     gait.name: gait

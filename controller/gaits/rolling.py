@@ -3,8 +3,9 @@
 import numpy as np
 from pydantic import Field
 
-from config.robot import RobotConfig
-from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
 
 
 class RollingParameters(GaitParameters):

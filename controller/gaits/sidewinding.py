@@ -3,9 +3,10 @@
 import numpy as np
 from pydantic import Field
 
-from config.robot import RobotConfig
-from controller.gaits.gait import Floats, Gait, GaitParameters, Needs
-from controller.gaits.wave import joint_amplitude_rad, travelling
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
+from snakewalk.controller.gaits.wave import joint_amplitude_rad, travelling
 
 
 class SidewindingParameters(GaitParameters):

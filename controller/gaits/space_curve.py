@@ -1,14 +1,13 @@
 """A curve in space by its arc length, along which a body can be laid."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
-from config.errors import InputError
-from config.robot import RobotConfig
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
 
 SAMPLES_A_LINK = 24
 """Of the curve, over the length of a link."""

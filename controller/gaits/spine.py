@@ -11,10 +11,11 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from config.robot import RobotConfig
-from controller.gaits.gait import Floats, Frequency, Gait, GaitParameters, Needs
-from controller.gaits.wave import TURN
-from drivers.compiling import compiled
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Frequency, Gait, GaitParameters, Needs
+from snakewalk.controller.gaits.wave import TURN
+from snakewalk.drivers.compiling import compiled
 
 SAMPLES = 257
 """Of the spine, before it is divided into equal links."""
@@ -23,7 +24,6 @@ SOURCE = (
     "differential equations, The Visual Computer 26, 2010, Table 1; travelling form: "
     "M. J. Lighthill, Annual Review of Fluid Mechanics 1, 1969"
 )
-
 Nose = Annotated[float, Field(ge=0.0, le=1.5, description="amplitude at the head, body = 2 pi")]
 Tail = Annotated[float, Field(ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")]
 Waves = Annotated[float, Field(ge=0.1, le=3.0, description="on the body: alpha")]

@@ -5,11 +5,10 @@ alpha). They do not depend on the number of joints; these functions make joint a
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.robot import RobotConfig
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
 
-Floats = NDArray[np.float64]
 TURN = 2.0 * np.pi
 
 

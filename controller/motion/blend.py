@@ -16,14 +16,12 @@ states, and those of the error, keep together within the limits.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.motion.easing import cubic, cubic_sum, quintic, quintic_slope
-from controller.motion.join_time import DELAY, shortest_join_s
-from controller.motion.source import MotionSource, Pace
-from controller.runtime.body import BodyView
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.join_time import DELAY, shortest_join_s
+from snakewalk.controller.motion.smoothstep import cubic, cubic_sum, quintic, quintic_slope
+from snakewalk.controller.motion.source import MotionSource, Pace
 
 RATES = (1.0, 0.7, 0.4, 0.0)
 """Rates at which the target may start; slower ones are tried where faster ones take too long."""

@@ -1,15 +1,13 @@
 """One gait in time: its phase runs as fast as asked, or as the robot's joints can follow."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.robot import RobotConfig
-from controller.gaits.gait import CYCLE_SAMPLES, Gait, Needs
-from controller.gaits.wave import TURN
-from controller.motion.source import HEADROOM, Pace
-from controller.runtime.body import BodyView
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import CYCLE_SAMPLES, Gait, Needs
+from snakewalk.controller.gaits.wave import TURN
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.source import HEADROOM, Pace
 
 
 class Cycle:

@@ -2,18 +2,14 @@
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from config.robot import RobotConfig
-from controller.gaits.gait import Gait, Needs
-from controller.motion.coming_to_rest import ComingToRest
-from controller.motion.gait_cycle import Cycle
-from controller.motion.relay import Relay
-from controller.motion.source import Pace
-from controller.runtime.body import BodyView
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Gait, Needs
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.gait_cycle import Cycle
+from snakewalk.controller.motion.source import Pace
+from snakewalk.controller.motion.source_switch import Relay
+from snakewalk.controller.motion.stop_profile import ComingToRest
 
 
 class GaitMotion:

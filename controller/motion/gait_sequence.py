@@ -2,15 +2,11 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from controller.gaits.gait import Gait, Needs
-from controller.motion.gait_motion import GaitMotion
-from controller.motion.source import Pace
-from controller.runtime.body import BodyView
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.gaits.gait import Gait, Needs
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.gait_motion import GaitMotion
+from snakewalk.controller.motion.source import Pace
 
 
 class GaitSequence:

@@ -3,16 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.robot import RobotConfig
-from controller.gaits.gait import Needs
-from controller.motion.follow import Follower
-from controller.motion.source import MotionSource, Pace
-from controller.motion.steering import wrap
-from controller.runtime.body import BodyView
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Needs
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.motion.rate_limiter import Follower
+from snakewalk.controller.motion.source import MotionSource, Pace
 
-Floats = NDArray[np.float64]
 LEAD_S = 0.12
 """How far the swing of the body is foreseen: the servos' lag and the follower's."""
 RANGE_SHARE = 0.9

@@ -1,13 +1,11 @@
 """How long a join has to take: the shortest time in which it stays within the limits."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.motion.easing import cubic, cubic_slope, quintic_bend, quintic_slope
-from controller.motion.source import Pace
-from drivers.compiling import compiled
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.motion.smoothstep import cubic, cubic_slope, quintic_bend, quintic_slope
+from snakewalk.controller.motion.source import Pace
+from snakewalk.drivers.compiling import compiled
 
 DURATIONS_S = np.geomspace(0.25, 32.0, 36)
 BRAKE_SHARE = 0.4

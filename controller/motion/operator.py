@@ -6,19 +6,15 @@ any other change of motion, so nothing that an operator presses can make a step.
 
 from collections.abc import Callable, Iterable
 
-import numpy as np
-from numpy.typing import NDArray
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Needs, Range, ranges
+from snakewalk.controller.gaits.registry import GAITS, make_gait
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.gait_motion import GaitMotion
+from snakewalk.controller.motion.source import Pace
 
-from config.errors import InputError
-from config.robot import RobotConfig
-from controller.gaits.gait import Needs
-from controller.gaits.ranges import Range, ranges
-from controller.gaits.registry import GAITS, make_gait
-from controller.motion.gait_motion import GaitMotion
-from controller.motion.source import Pace
-from controller.runtime.body import BodyView
-
-Floats = NDArray[np.float64]
 KEYS = {
     "up": "the parameter before",
     "down": "the next parameter",

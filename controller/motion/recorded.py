@@ -1,16 +1,14 @@
 """Recorded joint angles as a motion: splined, and slowed as far as the robot needs."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from config.errors import InputError
-from config.robot import RobotConfig
-from controller.gaits.gait import Needs
-from controller.motion.source import HEADROOM, Pace
-from controller.runtime.body import BodyView
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Needs
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.source import HEADROOM, Pace
 
 
 class Recorded:

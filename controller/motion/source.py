@@ -4,13 +4,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.robot import RobotConfig
-from controller.gaits.gait import Needs
-from controller.runtime.body import BodyView
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Needs
+from snakewalk.controller.kinematics.links import BodyView
 
 HEADROOM = 0.9
 """Share of the robot's limits that a motion takes by itself: the rest is left for joins."""

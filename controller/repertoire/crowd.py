@@ -4,11 +4,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from controller.repertoire.frame import Frame
-from controller.repertoire.repertoire import Repertoire
-from controller.repertoire.warp import bridge_frames, tip_way_m
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.frame import Frame
+from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.warp import bridge_frames, tip_way_m
 
-Floats = NDArray[np.float64]
 Whole = NDArray[np.int32]
 LANES = 8
 """Links are padded to a multiple of this, so that a vector unit takes them without a rest."""

@@ -3,19 +3,18 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from config.robot import RobotConfig
-from controller.gaits.gait import Needs
-from controller.motion.coming_to_rest import ComingToRest
-from controller.motion.relay import Relay
-from controller.motion.source import Pace
-from controller.repertoire.repertoire import Repertoire
-from controller.repertoire.segment import Segment
-from controller.runtime.body import BodyView
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Needs
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.source import Pace
+from snakewalk.controller.motion.source_switch import Relay
+from snakewalk.controller.motion.stop_profile import ComingToRest
+from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.segment import Segment
 
-Floats = NDArray[np.float64]
 Choose = Callable[[BodyView], int | None]
 """Told where the body is when a cycle ends; returns the next action, or None to come to rest."""
 

@@ -1,12 +1,11 @@
 """What the actions of a repertoire do in a cycle, in the plane."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.repertoire.frame import Frame
-from controller.repertoire.repertoire import Repertoire
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.frame import Frame
+from snakewalk.controller.repertoire.repertoire import Repertoire
 
-Floats = NDArray[np.float64]
 SAMPLES = 10
 """Moments of a cycle at which the distance to a waypoint is looked at."""
 

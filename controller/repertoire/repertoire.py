@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from config.errors import InputError
-from config.robot import RobotConfig
-from controller.repertoire.segment import Segment
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.repertoire.segment import Segment
 
 FORMAT = "snakewalk-repertoire-1"
 _HEAD = ("robot", "joint_axes", "world", "length_m")

@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.repertoire.frame import Frame
-from controller.repertoire.segment import Segment
-from controller.repertoire.warp import bridge
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.frame import Frame
+from snakewalk.controller.repertoire.segment import Segment
+from snakewalk.controller.repertoire.warp import bridge
 
 
 @dataclass(frozen=True, slots=True)

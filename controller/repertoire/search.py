@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from controller.motion.steering import wrap
-from controller.repertoire.moves import SAMPLES, Moves
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.repertoire.moves import SAMPLES, Moves
 
-Floats = NDArray[np.float64]
 AIM_SHARE = 0.75
 """Of a waypoint's radius that is aimed at: the body does not end a cycle quite where predicted."""
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.repertoire import Repertoire
 
 
 class SecondaryController:

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.repertoire.frame import Frame
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.frame import Frame
 
-Floats = NDArray[np.float64]
 Kind = Literal["forward", "left", "right"]
 
 

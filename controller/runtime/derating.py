@@ -8,13 +8,11 @@ back slowly. Safety below stays as it is: what gets worse all the same still tri
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.run import SafetyConfig
-from drivers.compiling import compiled, seen
-from drivers.types import JointState
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.run import SafetyConfig
+from snakewalk.drivers.compiling import compiled, seen
+from snakewalk.drivers.types import JointState
 
 LEAST = 0.25
 """Of the rate; a motion that stood still could not be told from one that hangs."""

@@ -1,26 +1,28 @@
 """A run on paper: the pilot steers a quasi-static body, so that a plan is judged before torque.
 
 Each step asks the pilot for joint goals, lets the shape change, and finds the rigid velocity that
-balances Coulomb friction and the pull of the slope under each link (``controller.motion.rigid``).
-No servo lag; inertia only where nothing holds the body. Links lie flat in plan, bear equal weights.
+balances Coulomb friction and the pull of the slope under each link
+(``controller.mechanics.rigid_motion``). No servo lag; inertia only where nothing holds the body.
+Links lie flat in plan, bear equal weights.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.heightfield import HeightField
-from config.robot import RobotConfig
-from config.world import FrictionConfig
-from controller.motion.hillside import held_factor, pull_and_share
-from controller.motion.load import STANDARD_GRAVITY_M_S2, friction_n, yaw_load_n_m
-from controller.motion.rigid import NoBalanceError, carried_velocity, rigid_velocity
-from controller.runtime.body import BodyView, body_in_world
-from controller.runtime.pilot import Pilot
-from drivers.types import BodyPose
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.kinematics.links import BodyView, body_in_world, mean_heading_rad, pose_at
+from snakewalk.controller.mechanics.load import STANDARD_GRAVITY_M_S2, friction_n, yaw_load_n_m
+from snakewalk.controller.mechanics.rigid_motion import (
+    NoBalanceError,
+    carried_velocity,
+    rigid_velocity,
+)
+from snakewalk.controller.mechanics.slope_load import held_factor, pull_and_share
+from snakewalk.controller.walk.pilot import Pilot
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,18 +78,6 @@ class Forecast:
     def joint_torque_n_m(self) -> Floats:
         """(J,) largest torque that each joint must hold."""
         return np.asarray(np.abs(self.torque_n_m).max(axis=0))
-
-
-def pose_at(position_m: Floats, heading_rad: float, time_s: float = 0.0) -> BodyPose:
-    """Build the pose of a level head link."""
-    c, s = np.cos(heading_rad), np.sin(heading_rad)
-    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return BodyPose(time_s, np.append(position_m[:2], 0.0), rotation)
-
-
-def mean_heading_rad(robot: RobotConfig, joint_rad: Floats) -> float:
-    """Mean link heading relative to the head link; a body is laid out by it, not by its head."""
-    return float(body_in_world(robot, pose_at(np.zeros(2), 0.0), joint_rad).headings_rad.mean())
 
 
 def forecast(

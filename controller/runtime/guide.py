@@ -2,15 +2,11 @@
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-from controller.motion.source import MotionSource
-from controller.motion.steering import Path
-from controller.motion.walker import Decision
-from controller.runtime.body import BodyView
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.walk.steering import Path
+from snakewalk.controller.walk.walker import Decision
 
 
 class Guide(Protocol):

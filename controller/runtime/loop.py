@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from drivers.clock import Clock
+from snakewalk.drivers.clock import Clock
 
 
 class Tick(NamedTuple):

@@ -2,13 +2,11 @@
 
 import numpy as np
 
-from config.robot import RobotConfig
-from controller.runtime.forecast import Forecast
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.runtime.forecast import Forecast
 
 _HEADROOM = 1.05
 """A piece that is appended may ask for a brake that is a little late."""
-
-
 _ROUNDING = 1e-9
 
 

@@ -1,9 +1,9 @@
 """The start ramp: from where the joints are to where the motion begins, within their limits."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+
 # Peak speed and acceleration of the quintic 10 t^3 - 15 t^4 + 6 t^5 on [0, 1].
 _PEAK_SPEED = 1.875
 _PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)

@@ -3,11 +3,9 @@
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Indices = NDArray[np.intp]
+from snakewalk.config.arrays import Bools, Floats, Indices
+
 _AT_ONCE = 256  # bodies in memory
 _GROUP = 4  # segments
 

@@ -8,9 +8,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 from scipy.spatial.distance import pdist, squareform
 
-from config.errors import InputError
-
-Integers = NDArray[np.int64]
+from snakewalk.config.arrays import Ints
+from snakewalk.config.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +21,9 @@ class Graph:
 
     """
 
-    indptr: Integers
+    indptr: Ints
     """(V + 1,)"""
-    indices: Integers
+    indices: Ints
     """(2 E,) ascending for each state."""
 
     def __post_init__(self) -> None:
@@ -43,7 +42,7 @@ class Graph:
         return len(self.indptr) - 1
 
     @property
-    def degree(self) -> Integers:
+    def degree(self) -> Ints:
         """(V,) neighbours of each state."""
         return np.diff(self.indptr)
 
@@ -53,7 +52,7 @@ class Graph:
         return len(self.indices) / self.states
 
 
-def graph_from_edges(states: int, edges: Integers) -> Graph:
+def graph_from_edges(states: int, edges: Ints) -> Graph:
     """Build from undirected edges (E, 2); loops and repeated edges are left out.
 
     Raises:
@@ -65,7 +64,7 @@ def graph_from_edges(states: int, edges: Integers) -> Graph:
     return Graph(*_lists(states, edges))
 
 
-def largest_part(states: int, edges: Integers) -> Graph:
+def largest_part(states: int, edges: Ints) -> Graph:
     """Build from undirected edges (E, 2) and keep the largest connected part, renumbered.
 
     Raises:
@@ -80,7 +79,7 @@ def largest_part(states: int, edges: Integers) -> Graph:
     return graph_from_edges(int(largest.sum()), name[edges[largest[edges[:, 0]]]])
 
 
-def random_edges(states: int, degree: float, rng: np.random.Generator) -> Integers:
+def random_edges(states: int, degree: float, rng: np.random.Generator) -> Ints:
     """Erdos-Renyi: each pair with the probability that gives mean ``degree``, (E, 2)."""
     count = int(rng.binomial(states * (states - 1) // 2, degree / (states - 1)))
     keys = np.empty(0, dtype=np.int64)
@@ -91,9 +90,7 @@ def random_edges(states: int, degree: float, rng: np.random.Generator) -> Intege
     return np.stack(np.divmod(keys, states), axis=1)
 
 
-def small_world_edges(
-    states: int, degree: int, rewired: float, rng: np.random.Generator
-) -> Integers:
+def small_world_edges(states: int, degree: int, rewired: float, rng: np.random.Generator) -> Ints:
     """Watts-Strogatz: a ring with ``degree`` near neighbours, edges moved to random ends, (E, 2).
 
     At an odd degree every second state gets one edge more, to the next distance.
@@ -137,7 +134,7 @@ def threshold_graph(states: NDArray[np.complex128], threshold: float | None) -> 
         ) from None
 
 
-def _lists(states: int, edges: Integers) -> tuple[Integers, Integers]:
+def _lists(states: int, edges: Ints) -> tuple[Ints, Ints]:
     """Both ways of each edge, sorted: (V + 1,) starts and (2 E,) neighbours."""
     both = np.concatenate([edges, edges[:, ::-1]])
     keys = np.unique(both[both[:, 0] != both[:, 1]] @ np.array([states, 1]))
@@ -145,7 +142,7 @@ def _lists(states: int, edges: Integers) -> tuple[Integers, Integers]:
     return ends.astype(np.int64), keys % states
 
 
-def _parts(indptr: Integers, indices: Integers) -> tuple[int, NDArray[np.int32]]:
+def _parts(indptr: Ints, indices: Ints) -> tuple[int, NDArray[np.int32]]:
     """Number of connected parts and the part of each state (V,)."""
     ones = np.ones(len(indices), dtype=np.int8)
     shape = (len(indptr) - 1, len(indptr) - 1)

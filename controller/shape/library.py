@@ -6,13 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.shape.states import energy_kept, random_states, to_angles, to_states
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.shape.states import energy_kept, random_states, to_angles, to_states
 
-Floats = NDArray[np.float64]
 Refuse = Callable[[Floats], NDArray[np.bool_]]
 """Shapes (S, N) to a mask (S,) of those that cannot be used."""
-
 _ROUNDS = 50
 
 

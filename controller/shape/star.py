@@ -9,13 +9,11 @@ that of a state with F > 0; the classes are what the paper says of W, and they a
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from snakewalk.config.arrays import Floats, Ints
 
 
-def star_order(M: Integers, F: Integers, heading_error_rad: Floats) -> Iterator[int]:
+def star_order(M: Ints, F: Ints, heading_error_rad: Floats) -> Iterator[int]:
     """Candidates, best first; the first takes O(V), only then are the others sorted.
 
     Args:
@@ -36,7 +34,7 @@ def star_order(M: Integers, F: Integers, heading_error_rad: Floats) -> Iterator[
     yield from order[1:].tolist()
 
 
-def _best(M: Integers, F: Integers, heading_error_rad: Floats) -> int:
+def _best(M: Ints, F: Ints, heading_error_rad: Floats) -> int:
     """First of the order, in a few passes."""
     tied = np.flatnonzero(M == 0)
     if len(tied) == 0:

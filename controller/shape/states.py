@@ -8,10 +8,9 @@ energy in seven coefficients holds up to four or five waves on the body, not bey
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from snakewalk.config.arrays import Complexes, Floats
+
 PADDING = 0.28
 """Samples appended per sample of the body: 100 become 128.
 

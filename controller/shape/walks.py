@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.shape.graphs import Graph
+from snakewalk.config.errors import InputError
+from snakewalk.controller.shape.graphs import Graph
 
 RULES = ("snake", "snake-printed", "stack", "random", "degree")
 

@@ -5,9 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.terrain.path import SplinePath
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.terrain.path import SplinePath
 
 _CHORD_M = 0.05  # the path is tabulated every centimetre; a shorter arc has no curvature
 _WORTH = 1.1  # a change must widen the sharpest bend by this much

@@ -1,13 +1,13 @@
 """A smooth path: a cubic spline through points in order, by arc length ([PT] 2.6.1)."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from config.errors import InputError
-from drivers.compiling import compiled
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.drivers.compiling import compiled
 
-Floats = NDArray[np.float64]
 _STEP_M = 0.01
 WINDOW_M = 1.5
 """How far along the path a follower is looked for: on its own lap, where a path crosses itself."""

@@ -3,18 +3,16 @@
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from config.errors import InputError
-from config.heightfield import HeightField
-from config.world import PlannerConfig
-from controller.terrain.bends import widen
-from controller.terrain.path import SplinePath
-from controller.terrain.relief import Relief
-from controller.terrain.safe_graph import SafeGraph
-from controller.terrain.straighten import straighten
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.world import PlannerConfig
+from snakewalk.controller.terrain.bends import widen
+from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.terrain.relief import Relief
+from snakewalk.controller.terrain.safe_graph import SafeGraph
 
 _LOOK_M = 0.02  # how densely a spline is checked again
 _ROUNDS = 7  # halvings: a corner's pieces end at a hundredth of their length
@@ -160,3 +158,30 @@ def _fault(planner: TerrainPlanner, k: int, point: Floats) -> list[str]:
 
 def _name(k: int, point: Floats) -> str:
     return f"{'start' if k == 0 else f'waypoint {k}'} ({point[0]:.2f}, {point[1]:.2f})"
+
+
+_REACH = 14  # nodes a straight piece may skip; also the whole leg at once is tried
+_CORNER_M = 0.3  # what a corner costs, as metres of path: few corners make wide bends
+
+
+def straighten(way_m: Floats, graph: SafeGraph) -> Floats:
+    """(k, 2) corners of the cheapest safe polygon from the first to the last of (m, 2) points.
+
+    Consecutive points of the way are taken to be joined; any other piece must be safe all along.
+    """
+    last = len(way_m) - 1
+    pairs = [(i, j) for j in range(1, last + 1) for i in range(max(0, j - _REACH), j)]
+    if last > _REACH:
+        pairs.append((0, last))
+    a, b = np.array(pairs).T
+    price, safe = graph.price(way_m[a], way_m[b])
+    price = np.where(safe | (b - a == 1), price, np.inf) + _CORNER_M * graph.length_weight
+    best, back = np.full(last + 1, np.inf), np.zeros(last + 1, dtype=int)
+    best[0] = 0.0
+    for i, j, cost in zip(a.tolist(), b.tolist(), price.tolist(), strict=True):
+        if best[i] + cost < best[j]:
+            best[j], back[j] = best[i] + cost, i
+    corners = [last]
+    while corners[-1] != 0:
+        corners.append(int(back[corners[-1]]))
+    return way_m[corners[::-1]]

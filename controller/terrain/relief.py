@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 from scipy.signal import fftconvolve
 
-from config.heightfield import HeightField
-from config.world import PlannerConfig
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.world import PlannerConfig
 
 
 class Relief:

@@ -5,13 +5,12 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from controller.terrain.relief import Relief
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from snakewalk.config.arrays import Floats, Indices
+from snakewalk.controller.terrain.relief import Relief
 
 # A tenth is kept back for the nodes and edges: the spline may leave the polygon by a little.
 IN_HAND = 0.9
+
 # Half of the sixteen neighbours; the other half are the same edges seen from the other end.
 _STEPS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (2, -1), (1, -2))
 _SAMPLE_M = 0.05
@@ -43,7 +42,7 @@ class SafeGraph:
         self.safe_share = float(safe.mean()) if safe.size else 0.0
         """Safe nodes over all nodes inside the margin."""
         self._edges = self._joined(index)
-        self._trees: dict[int, tuple[Floats, Ints]] = {}
+        self._trees: dict[int, tuple[Floats, Indices]] = {}
 
     def nearest(self, point_m: Floats, among: NDArray[np.bool_] | None = None) -> int | None:
         """Return the safe node nearest to a point; None if there is none."""
@@ -80,7 +79,7 @@ class SafeGraph:
         per_m = np.asarray(variance, float) / config.node_spacing_m + config.length_weight
         return length * per_m, safe
 
-    def _tree(self, target: int) -> tuple[Floats, Ints]:
+    def _tree(self, target: int) -> tuple[Floats, Indices]:
         """Score to ``target`` and the next node towards it, from every node.
 
         Kept: a path laid again has the same waypoints and another start, and costs no search.
@@ -92,7 +91,7 @@ class SafeGraph:
             self._trees[target] = score[0], towards[0].astype(np.intp)
         return self._trees[target]
 
-    def _joined(self, index: Ints) -> csr_array:
+    def _joined(self, index: Indices) -> csr_array:
         rows, columns = index.shape
         pairs = []
         for up, right in _STEPS:

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.terrain.bends import sharpest_bend
-from controller.terrain.path import SplinePath
-from controller.terrain.planner import TerrainPlanner
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.terrain.bends import sharpest_bend
+from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.terrain.planner import TerrainPlanner
 
 _STEP_M = 0.02
 

@@ -4,12 +4,12 @@
 counts all behind itself. Source: e-manual, DYNAMIXEL Protocol 2.0.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 
-from drivers.errors import ProtocolError
-from drivers.protocol.crc import crc16
-from drivers.protocol.stuffing import stuff
+from snakewalk.drivers.errors import ProtocolError, StuffingError
+from snakewalk.drivers.protocol.crc import crc16
 
 HEADER = b"\xff\xff\xfd\x00"
 BROADCAST_ID = 0xFE
@@ -125,3 +125,47 @@ def _frame(servo_id: int, instruction: int, payload: bytes) -> bytes:
         HEADER + bytes([servo_id]) + length.to_bytes(2, "little") + bytes([instruction]) + payload
     )
     return body + crc16(body).to_bytes(2, "little")
+
+
+_HEADER = b"\xff\xff\xfd"
+_STUFFED = b"\xff\xff\xfd\xfd"
+
+
+def stuff(params: bytes) -> bytes:
+    """Add ``FD`` behind every ``FF FF FD``; ``params`` is all between instruction and CRC."""
+    return params.replace(_HEADER, _STUFFED)
+
+
+def unstuff(params: bytes) -> bytes:
+    """Exact inverse of ``stuff``.
+
+    Raises:
+        StuffingError: ``params`` holds a bare ``FF FF FD``, so no sender stuffed it.
+
+    """
+    plain = params.replace(_STUFFED, _HEADER)
+    if stuff(plain) != params:
+        raise StuffingError("FF FF FD without its stuffed FD in a payload")
+    return plain
+
+
+def fast_head(parts_bytes: int) -> bytes:
+    """Header, length and instruction byte of a fast answer with ``parts_bytes``, CRCs included."""
+    head = HEADER + bytes((BROADCAST_ID,))
+    return head + (parts_bytes + 1).to_bytes(2, "little") + bytes((STATUS,))
+
+
+def encode_fast(parts: Iterable[tuple[int, int, bytes]], parts_bytes: int | None = None) -> bytes:
+    """Joint answer of servos to a fast sync or bulk read, with ``parts`` (error, ID, data).
+
+    One status packet from the broadcast ID that the servos write one after the other: each adds
+    error, ID, data, and the CRC of *everything* on the wire so far, earlier CRCs included. It is
+    not stuffed. ``parts_bytes`` is what the header announces where servos are missing at the end.
+    """
+    bodies = [bytes((error, servo_id)) + data for error, servo_id, data in parts]
+    announced = sum(len(body) + 2 for body in bodies) if parts_bytes is None else parts_bytes
+    packet = bytearray(fast_head(announced))
+    for body in bodies:
+        packet += body
+        packet += crc16(bytes(packet)).to_bytes(2, "little")
+    return bytes(packet)

@@ -1,8 +1,8 @@
 """Bytes to packets, through noise, cuts and false headers."""
 
-from drivers.errors import StuffingError
-from drivers.protocol.crc import crc16
-from drivers.protocol.packet import (
+from snakewalk.drivers.errors import StuffingError
+from snakewalk.drivers.protocol.crc import crc16
+from snakewalk.drivers.protocol.packet import (
     BROADCAST_ID,
     HEADER,
     MAX_ID,
@@ -10,8 +10,8 @@ from drivers.protocol.packet import (
     InstructionPacket,
     Packet,
     StatusPacket,
+    unstuff,
 )
-from drivers.protocol.stuffing import unstuff
 
 _FIXED = 7  # header, id and length field, in front of what the length counts
 

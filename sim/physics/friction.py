@@ -9,9 +9,8 @@ the link within the step, so a link comes to rest without chatter at any step.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
 
 STOP_SHARE = 1.8
 """Share of a contact's momentum that friction may take in one step; the explicit step is stable

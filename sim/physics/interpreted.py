@@ -9,15 +9,13 @@ as a loss of 6 % of speed under isotropic friction at 2 ms.
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from sim.physics.drive import drive_shafts
-from sim.physics.friction import ellipse_forces, stop_drag
-from sim.physics.mechanics import LEAST_DEPTH_M, Mechanics, velocities
-from sim.physics.water import add_water
-from sim.plant import ServoDrive
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.sim.physics.friction import ellipse_forces, stop_drag
+from snakewalk.sim.physics.mechanics import LEAST_DEPTH_M, Mechanics, velocities
+from snakewalk.sim.physics.servo_drive import drive_shafts
+from snakewalk.sim.physics.water import add_water
+from snakewalk.sim.plant import ServoDrive
 
 
 class InterpretedSteps:

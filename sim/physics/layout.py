@@ -24,7 +24,6 @@ _PLAIN: dict[str, type] = {
     "mjtBool": ctypes.c_uint8,
     "mjtByte": ctypes.c_uint8,
 }
-
 _BALL = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
 <body pos="0 0 .09"><freejoint/><geom size=".1"/></body></worldbody></mujoco>"""
 

@@ -4,13 +4,11 @@ from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from config.robot import RobotConfig
-from config.world import WorldConfig
-from sim.physics.water import water_constants
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.sim.physics.water import water_constants
 
 LEAST_DEPTH_M = 1e-9
 """Contacts of one link share its load by depth; this is the depth of one that just touches."""

@@ -2,15 +2,14 @@
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from config.heightfield import HeightField
-from config.robot import RobotConfig
-from config.world import WaterGround, WorldConfig
-from sim.physics.mechanics import Mechanics
-from sim.physics.water import floating_height_m
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WaterGround, WorldConfig
+from snakewalk.sim.physics.mechanics import Mechanics
+from snakewalk.sim.physics.water import floating_height_m
 
 DRAPE_ROUNDS = 8
 DRAPE_STIFF_M_RAD = 0.01

@@ -5,22 +5,21 @@ from typing import Protocol
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from config.heightfield import HeightField
-from config.robot import RobotConfig
-from config.world import WorldConfig
-from drivers.compiling import COMPILES, compiled
-from drivers.types import BodyPose
-from sim.physics.interpreted import InterpretedSteps
-from sim.physics.layout import step_layout
-from sim.physics.mechanics import Mechanics
-from sim.physics.model import ARMATURE_KG_M2, build_model
-from sim.physics.obstacles import place_at
-from sim.physics.placing import float_at, place
-from sim.plant import ServoDrive
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.drivers.compiling import COMPILES, compiled
+from snakewalk.drivers.types import BodyPose
+from snakewalk.sim.physics.body import ARMATURE_KG_M2, build_model
+from snakewalk.sim.physics.interpreted import InterpretedSteps
+from snakewalk.sim.physics.layout import step_layout
+from snakewalk.sim.physics.mechanics import Mechanics
+from snakewalk.sim.physics.obstacles import place_at
+from snakewalk.sim.physics.placing import float_at, place
+from snakewalk.sim.plant import ServoDrive
 
 GEAR_DRAG_N_M_S = 0.03
 """Assumed, for lack of a published figure: 4 % of what the back-EMF of an XM430-W350 brakes."""
@@ -237,7 +236,7 @@ def _steps(mechanics: Mechanics, compiled: bool | None) -> Steps:
         return InterpretedSteps(mechanics)
     layout = step_layout() if COMPILES else None
     if layout is not None:
-        from sim.physics.compiled import CompiledSteps  # noqa: PLC0415  numba is optional and slow
+        from snakewalk.sim.physics.stepper import CompiledSteps  # noqa: PLC0415  numba is optional and slow
 
         return CompiledSteps(mechanics, layout)
     if compiled:

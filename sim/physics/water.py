@@ -14,12 +14,10 @@ links are braked too. Added mass is left out: MuJoCo's bodies weigh the same in 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.robot import RobotConfig
-from config.world import WaterGround, WorldConfig
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WaterGround, WorldConfig
 
 GAUSS = 0.5 / math.sqrt(3.0)
 """Of a link's length, from its middle."""

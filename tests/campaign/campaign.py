@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from drivers.errors import DriverError, PortError, SafetyTrippedError
-from drivers.port import reopen
-from drivers.recovery import Policy
-from drivers.types import JointCommand
+from snakewalk.drivers.errors import DriverError, PortError, SafetyTrippedError
+from snakewalk.drivers.port.byte_port import reopen
+from snakewalk.drivers.safety.recovery import Policy
+from snakewalk.drivers.types import JointCommand
 
 from .rig import JOINTS, PATIENCE_S, ROBOT, SAFETY, Rig
 from .scenarios import plan

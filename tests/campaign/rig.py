@@ -9,22 +9,22 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from config.faults import FaultPlan
-from config.robot import RobotConfig
-from config.run import SafetyConfig
-from drivers.bus import DynamixelBus
-from drivers.chain import ServoChain
-from drivers.protocol.packet import Instruction, InstructionPacket
-from drivers.protocol.parser import PacketReader
-from drivers.recovery import Policy, Recovery
-from drivers.safe_link import SafeLink
-from drivers.safety import SafetyLimits
-from drivers.types import JointState
-from drivers.units import ServoUnits
-from sim.bus.bank import ServoBank
-from sim.bus.bench import BenchPlant
-from sim.bus.fault_player import FaultPlayer
-from sim.bus.line import SimLine
+from snakewalk.config.faults import FaultPlan
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import SafetyConfig
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
+from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.registers import ServoUnits
+from snakewalk.drivers.safety.recovery import Policy, Recovery
+from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.vet import SafetyLimits
+from snakewalk.drivers.types import JointState
+from snakewalk.sim.faults.fault_player import FaultPlayer
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
 
 ROBOT = RobotConfig(name="campaign", joint_axes="ypypyp")
 SAFETY = SafetyConfig()

@@ -3,7 +3,7 @@
 import random
 from itertools import combinations
 
-from config.faults import FaultPlan
+from snakewalk.config.faults import FaultPlan
 
 from .rig import ROBOT
 

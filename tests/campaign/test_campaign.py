@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from config.faults import FaultPlan
-from drivers.types import JointState
-from sim.bus.arrivals import Arrivals
+from snakewalk.config.faults import FaultPlan
+from snakewalk.drivers.types import JointState
+from snakewalk.sim.line.rx_queue import Arrivals
 
 from .campaign import Tally, campaign, run_scenario
 from .report import table

@@ -2,15 +2,17 @@
 
 from pathlib import Path
 
-from config.document import reference
-from config.run import RunConfig
+from snakewalk.config.document import reference
+from snakewalk.config.run import RunConfig
 
 PAGE = Path(__file__).parents[2] / "docs" / "configuration.md"
 
 
 def test_the_page_says_what_the_schema_says() -> None:
     written = PAGE.read_text(encoding="utf-8")
-    assert written == reference(), "run: python -m config.document > docs/configuration.md"
+    assert written == reference(), (
+        "run: python -m snakewalk.config.document > docs/configuration.md"
+    )
 
 
 def test_every_key_of_a_run_has_its_line_or_its_table() -> None:

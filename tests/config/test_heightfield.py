@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from config.heightfield import HeightField
+from snakewalk.config.heightfield import HeightField
 
 RNG = np.random.default_rng(3)
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from config.errors import ConfigError
-from config.loader import digest, load_robot, load_run, load_world, shipped
+from snakewalk.config.errors import ConfigError
+from snakewalk.config.loader import digest, load_robot, load_run, load_world, shipped
 
 
 @pytest.mark.parametrize(

@@ -12,25 +12,24 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from config.loader import load_robot
-from config.robot import RobotConfig
-from config.run import SafetyConfig
-from config.world import WorldConfig
-from drivers.bus import DynamixelBus
-from drivers.chain import ServoChain
-from drivers.errors import ChainError, DriverError
-from drivers.link import JointLink
-from drivers.port import BytePort
-from drivers.safe_link import SafeLink
-from drivers.safety import SafetyLimits
-from drivers.types import JointCommand, JointState
-from sim.bus.bank import ServoBank
-from sim.bus.bench import BenchPlant
-from sim.bus.line import SimLine
-from sim.bus.pty import PtyServer
-from sim.plant import Plant
-
-from .pty_port import PtyPort, ServedClock
+from snakewalk.config.loader import load_robot
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import SafetyConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.errors import ChainError, DriverError
+from snakewalk.drivers.link import JointLink
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.vet import SafetyLimits
+from snakewalk.drivers.types import JointCommand, JointState
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.plant import Plant
+from snakewalk.sim.serve.pty import PtyServer
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+from tests.helpers.pty_port import PtyPort, ServedClock
 
 PERIOD_S = 0.02
 TRIO = RobotConfig(name="trio", joint_axes="ypy")
@@ -75,7 +74,7 @@ def bench() -> Plant:
 
 
 def mujoco() -> Plant:
-    from sim.physics.plant import MujocoPlant
+    from snakewalk.sim.physics.plant import MujocoPlant
 
     plant = MujocoPlant(TRIO, WorldConfig(name="flat"), compiled=False)
     plant.reset((0.0, 0.0), 0.0, START_RAD)
@@ -127,7 +126,7 @@ def bus(request: pytest.FixtureRequest) -> Iterator[Bus]:
     device = request.config.getoption("--port")
     if device is None:
         pytest.skip("give the bus with --port")
-    from drivers.serial_port import SerialPort
+    from snakewalk.drivers.port.serial_port import SerialPort
 
     robot = load_robot(request.config.getoption("--robot"))
     with SerialPort(device, robot.servo.baud) as port:

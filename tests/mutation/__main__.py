@@ -27,13 +27,18 @@ DOC = ROOT / "docs" / "mutation.md"
 BEGIN, END = "<!-- mutation begins -->", "<!-- mutation ends -->"
 TIME_LIMIT_S = 60
 TARGETS = {
-    "drivers.safety": ("test_safety_edges.py", "test_safety_vet.py", "test_safe_link.py"),
-    "drivers.protocol.parser": (
+    "snakewalk.drivers.safety.vet": (
+        "test_safety_edges.py",
+        "test_safety_vet.py",
+        "test_safe_link.py",
+    ),
+    "snakewalk.drivers.protocol.parser": (
         *("test_reader_edges.py", "test_packet_reader.py", "test_packets.py"),
         "test_crc_and_stuffing.py",
     ),
-    "drivers.protocol.packet": ("test_reader_edges.py", "test_packets.py"),
-    "drivers.protocol.stuffing": ("test_crc_and_stuffing.py",),
+    "snakewalk.drivers.protocol.packet": (
+        *("test_reader_edges.py", "test_packets.py", "test_crc_and_stuffing.py"),
+    ),
 }
 
 
@@ -60,7 +65,7 @@ def _try(module: str, mutant: Mutant, tests: tuple[str, ...]) -> int:
         setattr(__import__(parent, fromlist=[name]), name, changed)
     except Exception:
         return 1
-    files = [str(ROOT / "tests" / "drivers" / name) for name in tests]
+    files = [str(file) for name in tests for file in (ROOT / "tests" / "drivers").rglob(name)]
     words = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0"]
     return int(pytest.main([*words, *files]))
 

@@ -4,19 +4,19 @@ import json
 from importlib.util import find_spec
 from pathlib import Path
 
-from config.errors import InputError
-from controller.app.report.film import film_html
-from controller.app.report.html import Section, page
-from controller.app.report.summary import Summary, summary
-from drivers.telemetry.reader import read_log
-from drivers.telemetry.record import RunRecord
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.report.film_on_page import film_html
+from snakewalk.controller.app.report.page import Section, page
+from snakewalk.controller.metrics.summary import Summary, summary
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runlog.record import RunRecord
 
 
 def build_report(log_path: Path, out_dir: Path, film: Path | None = None) -> Path:
     """Make ``out_dir/report.html`` (returned) and ``out_dir/summary.json`` from a log alone.
 
     Raises:
-        drivers.telemetry.reader.LogError: the log cannot be read.
+        controller.runlog.reader.LogError: the log cannot be read.
         InputError: the film cannot be used, or matplotlib is not installed.
 
     """
@@ -47,6 +47,6 @@ def write_summary(record: RunRecord, out_dir: Path) -> Summary:
 def _sections(record: RunRecord) -> list[Section]:
     if find_spec("matplotlib") is None:
         raise InputError("the report draws with matplotlib: pip install 'snakewalk[view]'")
-    from controller.app.report.figures.all import sections  # noqa: PLC0415  (an extra)
+    from snakewalk.controller.app.report.figures.all import sections  # noqa: PLC0415  (an extra)
 
     return sections(record)

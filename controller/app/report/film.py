@@ -1,36 +1,104 @@
-"""The film on the page: inside it if small, beside it if not."""
+"""From a log to its film: the measured head pose and joints are all that it takes, on metal too."""
 
-import base64
-import os
-from html import escape
+from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
-from urllib.parse import quote
 
-from config.errors import InputError
+import numpy as np
+from scipy.spatial.transform import Rotation
 
-INLINE_BYTES: Final = 8_000_000
-_TYPES: Final = {".mp4": "video/mp4", ".webm": "video/webm", ".gif": "image/gif"}
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.ground import build_ground
+from snakewalk.config.heightfield import HeightField
+from snakewalk.controller.runlog.record import Header, RunRecord
+
+FPS, FINE_FPS = 15, 25
+SIZE, FINE_SIZE = (800, 450), (1280, 720)
+_LONGEST_S: Final = 27.0
+"""Of the film: a longer run is shown faster."""
 
 
-def film_html(film: Path, out_dir: Path) -> str:
-    """HTML for a film; one above ``INLINE_BYTES`` is linked relative to ``out_dir``.
+def film_run(
+    record: RunRecord,
+    path: Path,
+    *,
+    fine: bool = False,
+    on_frame: Callable[[int, int], None] | None = None,
+) -> int:
+    """Draw the film of a run into ``path`` (.mp4); the number of its frames.
+
+    Args:
+        record: the run.
+        path: of the film; its folder is made.
+        fine: larger, smoother, and eight times slower to draw.
+        on_frame: told (frames done, of).
 
     Raises:
-        InputError: there is no such file, or browsers do not play its type.
+        InputError: the simulator or PyAV is not installed, nothing draws here without a screen, or
+            the log holds no two poses.
 
     """
-    kind = _TYPES.get(film.suffix.lower())
-    if kind is None:
-        raise InputError(f"{film}: a film on the page is one of {', '.join(_TYPES)}")
-    if not film.is_file():
-        raise InputError(f"{film}: no such film")
-    if film.stat().st_size <= INLINE_BYTES:
-        source = f"data:{kind};base64," + base64.b64encode(film.read_bytes()).decode()
-    else:
-        source = quote(os.path.relpath(film.resolve(), out_dir.resolve()).replace(os.sep, "/"))
-    if kind.startswith("image"):
-        shown = f"<img src='{escape(source)}' alt='Film of the run'>"
-    else:
-        shown = f"<video controls autoplay muted loop playsinline src='{escape(source)}'></video>"
-    return f"<section><h2>Film</h2><figure>{shown}</figure></section>"
+    missing = [name for name in ("mujoco", "av") if find_spec(name) is None]
+    if missing:
+        raise InputError(f"films need {' and '.join(missing)}: pip install 'snakewalk[sim,view]'")
+    from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
+
+    header = record.header
+    time_s, qpos = body_qpos(record)
+    if len(time_s) < 2:
+        raise InputError("the log holds no two poses: there is nothing to film")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    plan = header.plan
+    return render_film(
+        header.robot,
+        header.world,
+        _ground(header),
+        time_s,
+        qpos,
+        path,
+        fps=FINE_FPS if fine else FPS,
+        speed_up=speed_up(float(time_s[-1] - time_s[0])),
+        size=FINE_SIZE if fine else SIZE,
+        waypoints_m=[(float(x), float(y)) for x, y in plan.waypoints_m],
+        waypoint_radius_m=plan.waypoint_radius_m,
+        path_m=plan.path_m[:, :2],
+        title=header.run.name,
+        fine=fine,
+        on_frame=on_frame,
+    )
+
+
+def body_qpos(record: RunRecord) -> tuple[Floats, Floats]:
+    """Times (n,) and MuJoCo's coordinates (n, 7 + J) wherever head and joints are known.
+
+    Coordinates that the log holds as such come first; else the head pose, then the joints, measured
+    in the same cycle.
+    """
+    if len(record.qpos.time_s) > 1:
+        return record.qpos.time_s, record.qpos.qpos
+    pose = record.pose
+    rows = min(len(pose.time_s), len(record.cycle.time_s))
+    head, turn = pose.head_m[:rows], pose.rotation[:rows].reshape(-1, 9)
+    joints = record.cycle.measured_rad[:rows]
+    known = np.isfinite(np.hstack([head, turn, joints])).all(axis=1)
+    if not known.any():
+        return np.zeros(0), np.zeros((0, 7 + joints.shape[1]))
+    quaternion = Rotation.from_matrix(turn[known].reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    return pose.time_s[:rows][known], np.hstack([head[known], quaternion, joints[known]])
+
+
+def speed_up(duration_s: float) -> float:
+    """How many times faster than its run a film is: whole, and 1 for a short run."""
+    return float(max(1, np.ceil(duration_s / _LONGEST_S)))
+
+
+def _ground(header: Header) -> HeightField | None:
+    """The world's own height field where its source is at hand, else the log's coarser copy."""
+    if header.ground is None:
+        return None
+    try:
+        return build_ground(header.world)
+    except InputError:
+        return header.ground

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.capture.fish.postures import Postures
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.fish.postures import Postures
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,16 +9,15 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.capture.fish.climb import climb
-from controller.capture.fish.first_frame import rough_midline, starts
-from controller.capture.fish.matching import EDGE_WEIGHT, Seen, Target
-from controller.capture.fish.model import STATIONS, FishModel
-from controller.capture.fish.top_view import Match, TopView, search, window_of
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.fish.first_frame import rough_midline, starts
+from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, Seen, Target
+from snakewalk.controller.capture.fish.model import STATIONS, FishModel
+from snakewalk.controller.capture.fish.pattern_search import climb
+from snakewalk.controller.capture.fish.top_view import Match, TopView, search, window_of
 
-Floats = NDArray[np.float64]
 SHORTEST_PX = 20.0
 
 

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.morphology import skeletonize
 
-from controller.capture.fish.model import FishModel
-from controller.capture.fish.postures import midline_angles
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.capture.fish.model import FishModel
+from snakewalk.controller.capture.fish.postures import midline_angles
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 _AROUND = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)]
 
 

@@ -12,11 +12,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.capture.fish.postures import Postures
-from controller.capture.fish.segments import Kind, Segment
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.fish.postures import Postures
+from snakewalk.controller.capture.fish.segments import Kind, Segment
 
-Floats = NDArray[np.float64]
 CLASSES = 3
 
 

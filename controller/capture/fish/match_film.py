@@ -4,17 +4,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.capture.fish.calibrate import calibrate
-from controller.capture.fish.follow import follow
-from controller.capture.fish.matching import EDGE_WEIGHT, Seen
-from controller.capture.fish.model import FishModel
-from controller.capture.fish.postures import Postures
-from controller.capture.fish.side_view import SideCamera, SideView, align
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.fish.calibrate import calibrate
+from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, Seen
+from snakewalk.controller.capture.fish.model import FishModel
+from snakewalk.controller.capture.fish.postures import Postures
+from snakewalk.controller.capture.fish.side_view import SideCamera, SideView, align
+from snakewalk.controller.capture.fish.tracking import follow
 
-Floats = NDArray[np.float64]
 Film = Callable[[], Iterator[Seen]]
 """Opens a film from its start."""
 SAMPLE = 9

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.capture.fish.raster import Grey, Window, draw_area, draw_edge, draw_pieces
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.fish.raster import Grey, Window, draw_area, draw_edge, draw_pieces
 
-Floats = NDArray[np.float64]
 EDGE_WEIGHT = 0.3
 """W of Eq. 3."""
 

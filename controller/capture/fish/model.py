@@ -9,11 +9,10 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.errors import InputError
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 
-Floats = NDArray[np.float64]
 STATIONS = 41
 """Places along the body at which its sections are given, both ends included."""
 _CARP = ((0.0, 0.01), (0.03, 0.035), (0.1, 0.06), (0.22, 0.085), (0.33, 0.09), (0.5, 0.075),

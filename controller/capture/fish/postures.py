@@ -8,12 +8,11 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.capture.fish.model import turn_shares
-from controller.capture.resample import SEGMENTS, equal_arc_length, tangent_angles
-from controller.capture.track import Track
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.fish.model import turn_shares
+from snakewalk.controller.capture.resample import SEGMENTS, equal_arc_length, tangent_angles
+from snakewalk.controller.capture.track import Track
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.capture.fish.model import FishModel
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.fish.model import FishModel
 
-Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 _SHIFT = 4  # cv2 takes coordinates in sixteenths of a pixel
 

@@ -10,7 +10,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+
 _NUDGE_PX, _NUDGE_RAD = 0.5, 0.02
 
 

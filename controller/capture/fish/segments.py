@@ -10,13 +10,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.capture.fish.postures import Postures
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.fish.postures import Postures
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Kind = Literal["glide", "forward", "left", "right"]
 WITHIN_RAD = float(np.radians(4.0))
 """[TH] 4.1.1: how near every spine angle must be to the basic posture's."""

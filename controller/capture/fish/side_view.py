@@ -3,16 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.capture.fish.climb import climb
-from controller.capture.fish.follow import LOST
-from controller.capture.fish.matching import EDGE_WEIGHT, Seen, Target
-from controller.capture.fish.model import FishModel
-from controller.capture.fish.raster import Window, side_outline
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, Seen, Target
+from snakewalk.controller.capture.fish.model import FishModel
+from snakewalk.controller.capture.fish.pattern_search import climb
+from snakewalk.controller.capture.fish.raster import Window, side_outline
+from snakewalk.controller.capture.fish.tracking import LOST
 
-Floats = NDArray[np.float64]
 _LIMIT_RAD = 1.2
 
 

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.capture.fish.model import fish_model
-from controller.capture.fish.postures import Postures
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.fish.model import fish_model
+from snakewalk.controller.capture.fish.postures import Postures
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,14 +3,13 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from config.errors import InputError
-from controller.capture.fish.joining import Repertoire, placed
-from controller.capture.fish.postures import Postures
-from controller.motion.junction import join
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.fish.joining import Repertoire, placed
+from snakewalk.controller.capture.fish.junction import join
+from snakewalk.controller.capture.fish.postures import Postures
 
-Floats = NDArray[np.float64]
 BLEND_S = 0.25
 _BEAM = 40
 _DEPTH = 5

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.capture.fish.matching import EDGE_WEIGHT, Seen, Target
-from controller.capture.fish.model import FishModel
-from controller.capture.fish.raster import Window
-from controller.capture.fish.refine import refine
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, Seen, Target
+from snakewalk.controller.capture.fish.model import FishModel
+from snakewalk.controller.capture.fish.raster import Window
+from snakewalk.controller.capture.fish.refine import refine
 
-Floats = NDArray[np.float64]
 LEVELS = ((70.0, 5, 6), (140.0, 3, 6), (260.0, 3, 6))
 """Coarse to fine: body length on the canvas (px), width of edges (px), rounds at most."""
 STIFFNESS = 0.15

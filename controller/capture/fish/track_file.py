@@ -4,15 +4,13 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.capture.fish.joining import Repertoire
-from controller.capture.fish.postures import Postures, tangents
-from controller.capture.fish.synthesis import BLEND_S, Sequence
-from controller.motion.junction import join
-from controller.motion.retarget import Retarget
-
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.fish.joining import Repertoire
+from snakewalk.controller.capture.fish.junction import join
+from snakewalk.controller.capture.fish.postures import Postures, tangents
+from snakewalk.controller.capture.fish.synthesis import BLEND_S, Sequence
+from snakewalk.controller.kinematics.retarget import Retarget
 
 
 def joint_pieces(pieces: Repertoire, sequence: Sequence, retarget: Retarget) -> list[Floats]:
@@ -34,7 +32,7 @@ def joint_motion(
 def save_motion(
     path: Path | BinaryIO, postures: Postures, joints_rad: Floats, robot: str, sequence: Sequence
 ) -> None:
-    """Write a motion; ``controller.capture.load.load_track`` reads it as any recording."""
+    """Write a motion; ``controller.capture.readers.load.load_track`` reads it as any recording."""
     np.savez_compressed(
         path,
         points=postures.points(),

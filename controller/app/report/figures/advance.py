@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from controller.app.report.figures.style import (
+from snakewalk.controller.app.report.figures.style import (
     AMBER,
     BLUE,
     GREY,
@@ -12,8 +12,8 @@ from controller.app.report.figures.style import (
     mark_waypoints,
     trace,
 )
-from controller.app.report.way import path_error_m, waypoint_times_s
-from drivers.telemetry.record import RunRecord
+from snakewalk.controller.metrics.path import path_error_m, waypoint_times_s
+from snakewalk.controller.runlog.record import RunRecord
 
 
 def advance_figure(record: RunRecord) -> Figure | None:

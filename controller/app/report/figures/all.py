@@ -5,16 +5,16 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
-from controller.app.report.figures.advance import advance_figure
-from controller.app.report.figures.effort import effort_figure
-from controller.app.report.figures.joints import joints_figure
-from controller.app.report.figures.safety import safety_figure
-from controller.app.report.figures.style import data_uri, style
-from controller.app.report.figures.timing import timing_figure
-from controller.app.report.figures.walk import walk_figure
-from controller.app.report.figures.way import way_figure
-from controller.app.report.html import Section
-from drivers.telemetry.record import RunRecord
+from snakewalk.controller.app.report.figures.advance import advance_figure
+from snakewalk.controller.app.report.figures.effort import effort_figure
+from snakewalk.controller.app.report.figures.joints import joints_figure
+from snakewalk.controller.app.report.figures.path import way_figure
+from snakewalk.controller.app.report.figures.safety import safety_figure
+from snakewalk.controller.app.report.figures.style import data_uri, style
+from snakewalk.controller.app.report.figures.timing import timing_figure
+from snakewalk.controller.app.report.figures.walk import walk_figure
+from snakewalk.controller.app.report.page import Section
+from snakewalk.controller.runlog.record import RunRecord
 
 _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] = (
     (

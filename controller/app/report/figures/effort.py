@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from controller.app.report.figures.style import (
+from snakewalk.controller.app.report.figures.style import (
     AMBER,
     BLUE,
     GREY,
@@ -14,7 +14,7 @@ from controller.app.report.figures.style import (
     legend_above,
     trace,
 )
-from drivers.telemetry.record import RunRecord
+from snakewalk.controller.runlog.record import RunRecord
 
 
 def effort_figure(record: RunRecord) -> Figure | None:

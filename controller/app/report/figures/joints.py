@@ -2,12 +2,11 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from controller.app.report.figures.style import ANGLES, canvas
-from drivers.telemetry.record import RunRecord
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.app.report.figures.style import ANGLES, canvas
+from snakewalk.controller.runlog.record import RunRecord
 
-Floats = NDArray[np.float64]
 _COLUMNS = 1400
 
 

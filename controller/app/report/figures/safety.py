@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from controller.app.report.figures.style import (
+from snakewalk.controller.app.report.figures.style import (
     AMBER,
     BLUE,
     GREEN,
@@ -15,7 +15,7 @@ from controller.app.report.figures.style import (
     canvas,
     legend_above,
 )
-from drivers.telemetry.record import RunRecord
+from snakewalk.controller.runlog.record import RunRecord
 
 _EVENT_COLOURS = {"info": BLUE, "warning": AMBER, "error": RED}
 

@@ -11,9 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from snakewalk.config.arrays import Floats
 
 INK: Final = "#22303c"
 GREY: Final = "#8796a5"
@@ -24,15 +23,12 @@ GREEN: Final = "#009e73"
 AMBER: Final = "#e69f00"
 RED: Final = "#d55e00"
 PURPLE: Final = "#a4508b"
-
 GROUND: Final = LinearSegmentedColormap.from_list(
     "ground", ["#7fa08c", "#b9c7a0", "#e6dcb8", "#cdb292", "#a68a78"]
 )
 ANGLES: Final = "RdBu_r"
-
 WIDTH_IN: Final = 11.0
 _POINTS: Final = 900  # across a figure: more cannot be seen
-
 _RC: Final[dict[Any, Any]] = {
     "font.family": "DejaVu Sans",
     "font.size": 10.0,

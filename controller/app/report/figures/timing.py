@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from controller.app.report.figures.style import (
+from snakewalk.controller.app.report.figures.style import (
     AMBER,
     BLUE,
     GREY,
@@ -12,8 +12,8 @@ from controller.app.report.figures.style import (
     legend_above,
     trace,
 )
-from controller.app.report.timing import skipped_cycles
-from drivers.telemetry.record import RunRecord
+from snakewalk.controller.metrics.timing import skipped_cycles
+from snakewalk.controller.runlog.record import RunRecord
 
 
 def timing_figure(record: RunRecord) -> Figure | None:

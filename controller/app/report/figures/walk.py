@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from controller.app.report.figures.style import (
+from snakewalk.controller.app.report.figures.style import (
     AMBER,
     BLUE,
     GREEN,
@@ -13,7 +13,7 @@ from controller.app.report.figures.style import (
     canvas,
     legend_above,
 )
-from drivers.telemetry.record import RunRecord
+from snakewalk.controller.runlog.record import RunRecord
 
 
 def walk_figure(record: RunRecord) -> Figure | None:

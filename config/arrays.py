@@ -1,0 +1,14 @@
+"""Names of the array types, once for all rooms."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+AnyInts = NDArray[np.integer]
+Bools = NDArray[np.bool_]
+Bytes = NDArray[np.uint8]
+Complexes = NDArray[np.complex128]
+Floats = NDArray[np.float64]
+Image = NDArray[np.uint8]
+Indices = NDArray[np.intp]
+Ints = NDArray[np.int64]
+SignedInts = NDArray[np.signedinteger]

@@ -1,0 +1,123 @@
+"""``snakewalk analyse``: how the animal of a recording moved."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import track as progress
+from rich.table import Table
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
+from snakewalk.controller.app.cli.options import Json, console
+from snakewalk.controller.app.cli.picture_file import check_picture
+
+
+def analyse(
+    recordings: Annotated[
+        list[str],
+        typer.Argument(help="shipped names, or files of tracked bodies", metavar="TRACK"),
+    ],
+    rate: Annotated[
+        float | None, typer.Option(help="frames a second of the files, instead of what they say")
+    ] = None,
+    min_score: Annotated[
+        float | None,
+        typer.Option(help="keypoints scoring less are missing; default 0, of DeepLabCut 0.6"),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(help="draw tracks and maps: a file (.png, .svg, .pdf), or a folder for PNGs"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="overwrite pictures")] = False,
+    as_json: Json = False,
+) -> None:
+    """Analyse the animal's motion: pulse speed, sliding, wave, frequency, amplitudes, energy."""
+    from snakewalk.controller.capture.analysis import analyse as measure  # noqa: PLC0415  heavy
+    from snakewalk.controller.capture.readers.generated import EMBEDDED  # noqa: PLC0415
+    from snakewalk.controller.capture.readers.load import load_track  # noqa: PLC0415
+
+    files = _pictures(recordings, picture, force)
+    found = []
+    for name, file in progress(
+        list(zip(recordings, files, strict=True)),
+        "recordings",
+        console=Console(stderr=True),
+        transient=True,
+    ):
+        shipped = name in EMBEDDED
+        one = measure(load_track(name, None if shipped else rate, None if shipped else min_score))
+        if file is not None:
+            from snakewalk.controller.app.report.plots.analysis import draw_analysis  # noqa: PLC0415
+
+            draw_analysis(one, file)
+        found.append(one.facts() | {"picture": None if file is None else str(file)})
+    if as_json:
+        print(json.dumps(found))
+        return
+    for facts in found:
+        _show(facts)
+
+
+def _pictures(recordings: list[str], picture: Path | None, force: bool) -> list[Path | None]:
+    """Where each recording's picture goes; refused before anything is measured."""
+    if picture is None:
+        return [None] * len(recordings)
+    if picture.suffix and not picture.is_dir():
+        check_picture(picture)
+        if len(recordings) > 1:
+            raise InputError(f"{picture}: one file for {len(recordings)} recordings; give a folder")
+        files = [picture]
+    else:
+        files = [picture / f"{Path(name).stem}.png" for name in recordings]
+    if len(set(files)) < len(files):
+        raise InputError(f"{picture}: two recordings have the same name; draw them one by one")
+    refuse_to_overwrite(files, force)
+    return list(files)
+
+
+def _show(facts: dict[str, Any]) -> None:
+    """One recording as a table of two columns with the units in words."""
+    assumed = " (assumed; say --rate)" if facts["rate_assumed"] else ""
+    length = "no scale" if facts["length_m"] is None else f"{1e3 * facts['length_m']:.4g} mm long"
+    low, high = facts["pulse_quartiles_body_lengths_s"]
+    way = "towards the tail" if facts["wave_towards_tail"] else "towards the head"
+    travel, sliding = facts["travel"], facts["sliding_weight"]
+    rows = {
+        "frames": f"{facts['frames']}, {facts['frames_left_out']} left out, "
+        f"{facts['rate_hz']:g} Hz{assumed}, {length}",
+        "frequency": f"{facts['frequency_hz']} Hz",
+        "wave": f"{facts['waves_on_body']} on the body: {facts['wavelength_body_lengths']} body "
+        f"lengths, {facts['wave_number_rad_per_body_length']} rad a body length, {way}; it is "
+        f"{facts['wave_share']:.0%} of the bending",
+        "pulse speed": f"{facts['pulse_body_lengths_s']} body lengths/s (half of it {low} to "
+        f"{high}), {facts['pulse_points_per_frame']} points a frame; known at "
+        f"{facts['pulse_measured_share']:.0%} of body and time",
+        "frequency x wavelength": f"{facts['wave_speed_body_lengths_s']} body lengths/s",
+        "travel": "places are not recorded"
+        if travel is None
+        else f"{travel} of the pulse speed; sliding weight w_d {sliding}",
+        "angle amplitude": _along(facts["angle_amplitude_rad"], "rad"),
+        "sideways amplitude": _along(facts["lateral_amplitude_body_lengths"], "body lengths"),
+        "bend K": f"{facts['bend_k_rad']} rad",
+        "in 7 coefficients": f"{facts['energy_kept']:.2%} of the shapes' energy, "
+        f"{facts['energy_kept_least']:.2%} of the worst",
+        "states lie within": ", ".join(f"{a}-{b}" for a, b in facts["state_amplitudes_rad"])
+        + " rad: amplitudes of coefficients 1-7, between which random states are drawn",
+    }
+    if facts["picture"]:
+        rows["picture"] = facts["picture"]
+    if facts["time_towards_head"] > 0.1:
+        rows["note"] = (
+            f"the wave runs towards the head {facts['time_towards_head']:.0%} of the time"
+        )
+    table = Table(title=facts["recording"], title_justify="left", box=None, show_header=False)
+    for key, text in rows.items():
+        table.add_row(key, text)
+    console.print(table)
+
+
+def _along(values: list[float], unit: str) -> str:
+    return f"{', '.join(map(str, values))} {unit} (head, 1/4, 1/2, 3/4, tail)"

@@ -1,0 +1,237 @@
+"""``snakewalk bus serve`` and ``bus sniff``: simulated servos for any client; bytes in words."""
+
+import json
+import signal
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.options import Json
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+    from snakewalk.sim.line.sim_line import SimLine
+    from snakewalk.sim.line.wire import Wire
+    from snakewalk.sim.serve.chain_spec import ChainSpec
+    from snakewalk.sim.serve.live_table import Traffic
+    from snakewalk.sim.serve.pty import PtyServer
+
+LOOK_S = 0.25
+"""How often the live table is drawn."""
+STEP_S = 0.02
+WIDTH = 120
+"""Characters of a packet that the live view shows."""
+
+
+def serve(
+    servos: Annotated[
+        str | None,
+        typer.Option(help="IDS[:MODEL],... on a bench: 1-16, or 1-2:XL430-W250,3-6:XL330-M288"),
+    ] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="shipped robot or a TOML file, in MuJoCo on flat ground")
+    ] = None,
+    baud: Annotated[int | None, typer.Option(help="of the servos, bit/s")] = None,
+    pace: Annotated[float, typer.Option(help="simulated seconds a second")] = 1.0,
+    faults: Annotated[Path | None, typer.Option(help="TOML file of what goes wrong")] = None,
+    latency: Annotated[float, typer.Option(help="of the USB adapter, ms")] = 0.0,
+    link: Annotated[Path | None, typer.Option(help="symbolic link that leads to the port")] = None,
+    record: Annotated[Path | None, typer.Option(help="write the exchange here, JSON lines")] = None,
+    for_s: Annotated[float | None, typer.Option("--for", help="seconds; default: until ^C")] = None,
+    as_json: Json = False,
+) -> None:
+    """Serve simulated servos at a serial device, in real time, with a live table."""
+    from snakewalk.drivers.clock import WallClock  # noqa: PLC0415  --help stays quick
+    from snakewalk.sim.serve.pty import PtyServer  # noqa: PLC0415
+    from snakewalk.sim.sniff.trace import TraceWriter  # noqa: PLC0415
+
+    if servos is not None and robot is not None:
+        raise InputError("give --servos or --robot, not both")
+    if latency < 0.0:
+        raise InputError(f"--latency {latency:g}: must not be negative")
+    what, line, traffic = _simulated(servos, robot, baud, faults)
+    line.usb_latency_s = latency * 1e-3
+    line.taps.append(traffic)
+    clock = WallClock()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # the link goes, the record is whole
+    with PtyServer(line, clock, pace=pace, link=link) as server:
+        out = record.open("w", encoding="utf-8") if record is not None else None
+        if out is not None:
+            line.taps.append(TraceWriter(out))
+        _announce(server, what, line, as_json)
+        try:
+            _run(server, traffic, lambda: for_s is not None and clock.now_s() >= for_s, as_json)
+        except KeyboardInterrupt:
+            print(file=sys.stderr)
+        finally:
+            if out is not None:
+                out.close()
+    if as_json:
+        done = {"questions": traffic.questions, "answers": traffic.answers, "bytes": traffic.bytes}
+        rest = {"missed_s": server.missed_s, "servos": traffic.registers()}
+        print(json.dumps(done | rest), flush=True)
+
+
+def sniff(
+    source: Annotated[
+        Path, typer.Argument(help="a recording (JSON lines, hex text, raw), or a serial device")
+    ],
+    baud: Annotated[int, typer.Option(help="of the device, bit/s")] = 1_000_000,
+    model: Annotated[
+        str, typer.Option(help="of servos that no ping has told about; AX-12A: Protocol 1.0")
+    ] = "XM430-W350",
+    through: Annotated[
+        bool, typer.Option("--through", help="stand between a client and the device")
+    ] = False,
+    for_s: Annotated[float | None, typer.Option("--for", help="seconds; default: until ^C")] = None,
+    as_json: Json = False,
+) -> None:
+    """Decode a live or recorded exchange packet by packet."""
+    from snakewalk.controller.app.service.sniff import listen, stand_between  # noqa: PLC0415  --help stays quick
+    from snakewalk.sim.ax12.decode import Decoder1  # noqa: PLC0415
+    from snakewalk.sim.ax12.table import MODEL as AX12  # noqa: PLC0415
+    from snakewalk.sim.sniff.decode import Decoder  # noqa: PLC0415
+    from snakewalk.sim.sniff.trace import read_trace  # noqa: PLC0415
+
+    if not source.exists():
+        raise InputError(f"{source}: no such file or device")
+    decoder = Decoder1() if model.upper() == AX12 else Decoder(model)
+    live = source.is_char_device()
+    if through and not live:
+        raise InputError(f"{source}: --through needs a serial device")
+    if not live:
+        pieces = read_trace(source)
+    elif through:
+        pieces = stand_between(str(source), baud, for_s)
+    else:
+        pieces = listen(str(source), baud, for_s)
+    try:
+        for time_s, data in pieces:
+            for line in decoder.feed(time_s, data):
+                print(json.dumps(line.as_dict()) if as_json else line.text(), flush=live)
+    except KeyboardInterrupt:
+        print(file=sys.stderr)
+
+
+def _simulated(
+    servos: str | None, robot: str | None, baud: int | None, faults: Path | None
+) -> tuple["ChainSpec", "Wire", "Traffic"]:
+    """What is served, its line, and who looks at it."""
+    from snakewalk.config.faults import FaultPlan  # noqa: PLC0415
+    from snakewalk.config.loader import load  # noqa: PLC0415
+    from snakewalk.sim.ax12.decode import Decoder1  # noqa: PLC0415
+    from snakewalk.sim.ax12.line import Ax12Line  # noqa: PLC0415
+    from snakewalk.sim.faults.fault_player import FaultPlayer  # noqa: PLC0415
+    from snakewalk.sim.serve.bench_line import bench_line  # noqa: PLC0415
+    from snakewalk.sim.serve.chain_spec import ChainSpec, parse_chain  # noqa: PLC0415
+    from snakewalk.sim.serve.live_table import Traffic, look_at, look_at_ax12  # noqa: PLC0415
+    from snakewalk.sim.sniff.decode import Decoder  # noqa: PLC0415
+
+    spec = parse_chain(servos or "1-4")
+    if robot is None:
+        line = bench_line(spec, baud or 1_000_000)
+    else:
+        line = _robot_line(robot, baud)
+        spec = ChainSpec(line.bank.ids, (line.bank.model,) * len(line.bank))
+    if faults is not None:
+        FaultPlayer(line, load(faults, FaultPlan), str(faults))
+    if isinstance(line, Ax12Line):
+        return spec, line, Traffic(lambda: look_at_ax12(line.servos), Decoder1())
+    models = dict(zip(spec.ids, spec.models, strict=True))
+    return spec, line, Traffic(lambda: look_at(line), Decoder(spec.kinds[0], models))
+
+
+def _robot_line(name: str, baud: int | None) -> "SimLine":
+    from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415
+    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
+    from snakewalk.sim.physics.plant import MujocoPlant  # noqa: PLC0415
+    from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
+
+    robot = load_robot(name)
+    rate = baud or robot.servo.baud
+    bank = ServoBank(robot.servo_ids, robot.servo.model, rate)
+    return SimLine(bank, MujocoPlant(robot, load_world("flat")), baud=rate)
+
+
+def _announce(server: "PtyServer", what: "ChainSpec", line: "Wire", as_json: bool) -> None:
+    ids = ", ".join(map(str, what.ids))
+    if as_json:
+        print(
+            json.dumps(
+                {
+                    "port": server.path,
+                    "model": what.model,
+                    "ids": list(what.ids),
+                    "baud": line.getBaudRate(),
+                }
+            ),
+            flush=True,
+        )
+    else:
+        print(f"port {server.path}", flush=True)
+        print(f"{what.model}: {ids} at {line.getBaudRate()} baud; ^C ends", flush=True)
+
+
+def _run(server: "PtyServer", traffic: "Traffic", stopped: "Stop", as_json: bool) -> None:
+    """Serve; draw the table on a terminal, nothing elsewhere."""
+    from rich.console import Console  # noqa: PLC0415
+    from rich.live import Live  # noqa: PLC0415
+
+    console = Console(stderr=True)
+    if as_json or not console.is_terminal:
+        server.serve(stopped)
+        return
+    seen = _Seen(server.path, [], "")
+
+    def view() -> "Group":
+        return _view(seen)
+
+    # Drawing takes longer than a servo may take to answer: it has a thread of its own, which sees
+    # only what the serving one has copied for it.
+    with Live(console=console, get_renderable=view, refresh_per_second=1.0 / LOOK_S):
+        look = 0.0
+        while not stopped():
+            server.step(STEP_S)
+            look += STEP_S
+            if look >= LOOK_S:
+                look = 0.0
+                counts = (
+                    f"{server.path or 'port gone'}   {traffic.questions} questions, "
+                    f"{traffic.answers} answers, {traffic.bytes} bytes"
+                )
+                if server.missed_s >= LOOK_S:
+                    counts += f"; {server.missed_s:.1f} s left out, this machine is too slow"
+                recent = "\n".join(line.text()[:WIDTH] for line in traffic.recent)
+                seen = _Seen(counts, traffic.registers(), recent)
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What the live view shows."""
+
+    counts: str
+    rows: list[dict[str, object]]
+    recent: str
+
+
+def _view(seen: _Seen) -> "Group":
+    from rich.console import Group  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    table = Table(*(seen.rows[0] if seen.rows else ()), box=None, header_style="bold")
+    for row in seen.rows:
+        style = "red" if row["error"] or not row["power"] else "" if row["torque"] else "dim"
+        table.add_row(*(str(value) for value in row.values()), style=style)
+    return Group(Text(seen.counts, style="bold"), table, Text(seen.recent, style="dim"))
+
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    Stop = Callable[[], bool]

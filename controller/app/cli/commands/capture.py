@@ -1,0 +1,70 @@
+"""``snakewalk capture``: from a film of an animal to a track that the robot can walk."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.controller.app.cli.options import Json, show
+
+
+def capture(
+    recording: Annotated[
+        Path, typer.Argument(help="a video, or a folder of images", metavar="VIDEO|FOLDER")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="the track")] = Path("track.npz"),
+    background: Annotated[
+        Path | None, typer.Option(help="image without the animal; default: estimated from frames")
+    ] = None,
+    length_m: Annotated[
+        float | None, typer.Option(help="how long the animal is: the scale")
+    ] = None,
+    marker: Annotated[
+        str | None,
+        typer.Option(
+            help="or: the SIDE, m, of a printed ArUco or AprilTag marker in view; or "
+            "X0,Y0,X1,Y1,METRES, two places in the image and how far apart they are"
+        ),
+    ] = None,
+    rate: Annotated[
+        float | None, typer.Option(help="frames a second, instead of what the file says")
+    ] = None,
+    head: Annotated[
+        str | None, typer.Option(help="X,Y in pixels near the head in the first usable frame")
+    ] = None,
+    cropped: Annotated[
+        bool,
+        typer.Option(
+            "--cropped", help="the images were cropped to the animal, or the camera moves"
+        ),
+    ] = False,
+    overlay: Annotated[
+        Path | None, typer.Option(help="write the film with the skeleton on it (.mp4, .avi)")
+    ] = None,
+    sheet: Annotated[
+        Path | None, typer.Option(help="write a contact sheet of frames (.png, .jpg)")
+    ] = None,
+    steps: Annotated[
+        Path | None, typer.Option(help="draw the first usable frame step by step (.png, .jpg)")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace files that exist")] = False,
+    as_json: Json = False,
+) -> None:
+    """Find the animal in every frame: silhouette, medial axis, 100 equal chords, head and tail."""
+    from snakewalk.controller.app.recordings.capturing import Wanted, capture_file  # noqa: PLC0415  heavy
+
+    wanted = Wanted(
+        recording=recording,
+        output=output,
+        background=background,
+        length_m=length_m,
+        marker=marker,
+        rate_hz=rate,
+        head=head,
+        cropped=cropped,
+        overlay=overlay,
+        sheet=sheet,
+        steps=steps,
+        force=force,
+    )
+    show(capture_file(wanted), as_json)

@@ -1,0 +1,62 @@
+"""``snakewalk doctor``: is this bus fit for a run, and what is to be done if not."""
+
+import json
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, Port, Robot, console
+
+_COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
+
+
+def doctor(
+    port: Port = None,
+    robot: Robot = None,
+    run: Annotated[str, typer.Option(help="run whose rate and limits count")] = DEFAULT_RUN,
+    as_json: Json = False,
+) -> None:
+    """Examine adapter, bus and servos; every fault with its remedy. Changes nothing."""
+    from snakewalk.config.loader import load_robot, load_run  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.app.service.adapter import permission  # noqa: PLC0415
+    from snakewalk.controller.app.service.doctor import examine  # noqa: PLC0415
+    from snakewalk.controller.app.service.finding import worst  # noqa: PLC0415
+    from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
+    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+
+    job = load_run(run)
+    described = load_robot(robot if robot is not None else job.robot)
+    device = pick_port(port)
+    findings = [permission(device)]
+    if findings[0].grade != "fail":
+        with (
+            SerialPort(device, described.servo.baud) as line,
+            Console(stderr=True).status("") as status,
+        ):
+            findings += examine(
+                line,
+                described,
+                job.safety,
+                job.cycle_hz,
+                latency_s=line.latency_s,
+                latency_timer_ms=line.latency_timer_ms,
+                tell=lambda step: status.update(f"{device}: {step}"),
+            )
+    grade = worst(findings)
+    if as_json:
+        shown = [finding.as_dict() for finding in findings]
+        print(
+            json.dumps({"port": device, "robot": described.name, "worst": grade, "findings": shown})
+        )
+    else:
+        table = Table(box=None, show_header=False)
+        for finding in findings:
+            mark = f"[{_COLOURS[finding.grade]}]{finding.grade}[/]"
+            table.add_row(mark, finding.check, finding.found)
+            if finding.remedy:
+                table.add_row("", "", f"[bold]-> {finding.remedy}[/]")
+        console.print(table)
+    if grade == "fail":
+        raise SystemExit(1)

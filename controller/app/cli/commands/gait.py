@@ -1,0 +1,124 @@
+"""``snakewalk gait``: which gaits there are, and what they look like."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.table import Table
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.options import Json, Robot, console, show
+from snakewalk.controller.app.cli.picture_file import check_picture
+
+if TYPE_CHECKING:
+    from snakewalk.controller.gaits.gait import Gait
+
+Name = Annotated[str, typer.Argument(help="gait, shipped set of parameters, or a SET.toml")]
+Param = Annotated[
+    list[str] | None, typer.Option("--param", "-p", help="NAME=VALUE; may be given again")
+]
+
+
+def list_gaits(as_json: Json = False) -> None:
+    """List the gaits, what joints they need, and the shipped sets of their parameters."""
+    from snakewalk.config.loader import load_gait, shipped  # noqa: PLC0415
+    from snakewalk.controller.gaits.registry import GAITS  # noqa: PLC0415  heavy; --help stays quick
+
+    sets = [load_gait(name) for name in shipped("gaits")]
+    if as_json:
+        rows = [
+            {"name": g.name, "title": g.title, "needs": _needs(g), "source": g.source}
+            for g in GAITS.values()
+        ]
+        print(json.dumps({"gaits": rows, "sets": [s.model_dump() for s in sets]}))
+        return
+    table = Table(box=None, pad_edge=False)
+    for title in ("gait", "needs", ""):
+        table.add_column(title, no_wrap=title != "")
+    for gait in GAITS.values():
+        table.add_row(gait.name, ", ".join(_needs(gait)), gait.title)
+    console.print(table)
+    if sets:
+        table = Table(box=None, pad_edge=False)
+        for title in ("set", "gait", "robot"):
+            table.add_column(title)
+        for each in sets:
+            table.add_row(each.name, each.gait, each.robot)
+        console.print()
+        console.print(table)
+
+
+def show_gait(
+    name: Name,
+    robot: Robot = None,
+    param: Param = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="draw the body over a cycle here (.png, .svg, .pdf)")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Show a gait's parameters with ranges and units, its source, and how fast joints must be."""
+    from snakewalk.controller.app.report.plots.gait import draw_gait  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.app.runs.prepare_gait import prepare_gait  # noqa: PLC0415
+    from snakewalk.controller.gaits.gait import ranges  # noqa: PLC0415
+    from snakewalk.controller.motion.gait_cycle import Cycle  # noqa: PLC0415
+
+    check_picture(picture)
+    prepared = prepare_gait(name, robot=robot, parameters=parameters(param))
+    gait, body = prepared.gait, prepared.robot
+    cycle = Cycle(gait, body)
+    spans = ranges(gait.model)
+    found: dict[str, object] = {
+        "gait": gait.name,
+        "title": gait.title,
+        "source": gait.source,
+        "needs": _needs(type(gait)),
+        "robot": body.name,
+        "frequency_hz": round(cycle.frequency_hz, 3),
+        "joint_speed_rad_s": round(float(cycle.pace().speed_rad_s.max()), 3),
+    }
+    if picture is not None:
+        draw_gait(gait, body, picture)
+        found["picture"] = str(picture)
+    values = gait.params.model_dump()
+    if as_json:
+        rows = {
+            key: {
+                "value": values[key], "default": span.default, "low": span.low, "high": span.high,
+                "description": span.said,
+            }
+            for key, span in spans.items()
+        }  # fmt: skip
+        print(json.dumps(found | {"parameters": rows}))
+        return
+    found["needs"] = ", ".join(_needs(type(gait)))
+    show(found, as_json=False)
+    table = Table(box=None, pad_edge=False)
+    for title in ("parameter", "value", "least", "most", ""):
+        table.add_column(title, justify="left" if title in {"parameter", ""} else "right")
+    for key, span in spans.items():
+        value = values[key]
+        shown = str(value) if isinstance(value, bool | int) else f"{value:.4g}"
+        least, most = ("", "") if span.kind is bool else (f"{span.low:.4g}", f"{span.high:.4g}")
+        table.add_row(key, shown, least, most, span.said)
+    console.print()
+    console.print(table)
+
+
+def parameters(given: list[str] | None) -> dict[str, Any]:
+    """Read NAME=VALUE pairs; the gait's model says what a value must be."""
+    values: dict[str, Any] = {}
+    for text in given or []:
+        name, equals, value = text.partition("=")
+        if not equals or not name or not value:
+            raise InputError(f"--param {text}: expected NAME=VALUE")
+        try:
+            values[name] = json.loads(value)
+        except json.JSONDecodeError:
+            values[name] = value
+    return values
+
+
+def _needs(gait: "type[Gait]") -> list[str]:
+    return [name for name in ("yaw", "pitch", "wheels") if getattr(gait.needs, name)]

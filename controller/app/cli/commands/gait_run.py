@@ -1,0 +1,161 @@
+"""``snakewalk gait run``: a gait on servos or in the simulator."""
+
+import math
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.commands.gait import Name, Param, parameters
+from snakewalk.controller.app.cli.options import (
+    Film,
+    Json,
+    Robot,
+    RunFolder,
+    RunPort,
+    World,
+    leave,
+    show,
+)
+
+if TYPE_CHECKING:
+    from snakewalk.controller.app.runs.prepared_gait import Live
+
+
+def run_gait(
+    name: Name,
+    robot: Robot = None,
+    world: World = None,
+    param: Param = None,
+    then: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME@SECONDS [,PARAM=VALUE...]: change gait; may be given again"),
+    ] = None,
+    by: Annotated[str, typer.Option(help="how gaits change: blend, or cpg: oscillators")] = "blend",
+    seconds: Annotated[float, typer.Option(help="then it comes to rest")] = 20.0,
+    look_heading_rad: Annotated[
+        float | None, typer.Option(help="world heading that the head keeps")
+    ] = None,
+    look_at: Annotated[
+        str | None, typer.Option(help="X,Y in metres: point that the head looks at")
+    ] = None,
+    live: Annotated[bool, typer.Option("--live", help="change it by keys while it runs")] = False,
+    gamepad: Annotated[
+        Path | None, typer.Option(help="the same from a gamepad, e.g. /dev/input/js0")
+    ] = None,
+    port: RunPort = None,
+    film: Film = True,
+    out: RunFolder = None,
+    seed: Annotated[int, typer.Option(min=0, help="of every random choice")] = 0,
+    as_json: Json = False,
+) -> None:
+    """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
+    from snakewalk.controller.app.cli.progress import GaitProgress  # noqa: PLC0415
+    from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.app.runs.prepare_gait import prepare_gait  # noqa: PLC0415
+    from snakewalk.controller.app.runs.real_time import RealTime  # noqa: PLC0415
+    from snakewalk.controller.metrics.displacement import gait_way  # noqa: PLC0415
+    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
+
+    if by not in {"blend", "cpg"}:
+        raise InputError(f"--by {by}: expected blend or cpg")
+    with ExitStack() as stack:
+        prepared = prepare_gait(
+            name,
+            robot=robot,
+            world=world,
+            parameters=parameters(param),
+            seconds=seconds,
+            seed=seed,
+            look_heading_rad=look_heading_rad,
+            look_at_m=_point(look_at),
+            live=_live(stack, live, gamepad),
+            then=[_change(text) for text in then or []],
+            by="cpg" if by == "cpg" else "blend",
+        )
+        run = prepared.run
+        folder = out if out is not None else Path("runs") / f"gait-{run.name}-{prepared.robot.name}"
+        progress = stack.enter_context(GaitProgress(run.name, seconds))
+        paced = (RealTime(),) if prepared.live is not None and port is None else ()
+        finished = execute(prepared, folder, port, (progress, *paced), say=progress.note)
+    left = leave(finished.log, folder, film=film)
+    found: dict[str, object] = {
+        "gait": prepared.config.name,
+        "robot": prepared.robot.name,
+        "world": prepared.world.name,
+        "duration_s": round(finished.outcome.duration_s, 2),
+        "tripped": finished.outcome.tripped,
+        "slowed_to": round(finished.outcome.least_rate, 3),
+    }
+    if prepared.config.then:
+        found["then"] = [f"{change.name}@{change.at_s:g}" for change in prepared.config.then]
+    if prepared.live is None and not prepared.config.then and by == "blend":
+        way = gait_way(read_log(finished.log))
+        found |= {
+            "frequency_hz": round(way.frequency_hz, 3),
+            "cycles": way.cycles,
+            "forward_body_lengths_cycle": _digits(way.forward_bl),
+            "left_body_lengths_cycle": _digits(way.left_bl),
+            "up_body_lengths_cycle": _digits(way.up_bl),
+            "turn_rad_cycle": _digits(way.turn_rad),
+            "speed_m_s": _digits(way.speed_m_s),
+        }
+    found |= {
+        "peak_current_a": finished.summary["peak_current_a"],
+        "peak_temperature_c": finished.summary["peak_temperature_c"],
+        "log": str(finished.log),
+        "summary": str(folder / "summary.json"),
+        **left.facts(),
+    }
+    show(found, as_json)
+    if finished.outcome.tripped is not None:
+        raise SystemExit(1)
+
+
+def _live(stack: ExitStack, live: bool, gamepad: Path | None) -> "Live | None":
+    """Open what an operator holds; None without one."""
+    if not live and gamepad is None:
+        return None
+    from snakewalk.controller.app.cli.gamepad import Gamepad  # noqa: PLC0415
+    from snakewalk.controller.app.cli.keyboard import Keyboard  # noqa: PLC0415
+    from snakewalk.controller.motion.operator import KEYS, Operator  # noqa: PLC0415
+
+    hands: list[Keyboard | Gamepad] = []
+    if live:
+        hands.append(stack.enter_context(Keyboard()))
+    if gamepad is not None:
+        hands.append(stack.enter_context(Gamepad(gamepad)))
+    print("  ".join(f"{key}: {what}" for key, what in KEYS.items()), file=sys.stderr)
+    return lambda motion, robot, say: Operator(
+        motion, robot, lambda: [key for hand in hands for key in hand.pressed()], say
+    )
+
+
+def _change(text: str) -> tuple[float, str, dict[str, Any]]:
+    """Read NAME@SECONDS[,PARAM=VALUE...]."""
+    what, *values = text.split(",")
+    name, at, seconds = what.rpartition("@")
+    try:
+        at_s = float(seconds)
+    except ValueError:
+        at = ""
+    if not at or not name:
+        raise InputError(f"--then {text}: expected NAME@SECONDS[,PARAM=VALUE...]")
+    return at_s, name, parameters(values)
+
+
+def _point(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--look-at {text}: expected X,Y in metres") from None
+    return x, y
+
+
+def _digits(value: float) -> float | None:
+    return None if math.isnan(value) else round(value, 4)

@@ -1,0 +1,99 @@
+"""``snakewalk plan``: a run on paper."""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.options import (
+    DEFAULT_RUN,
+    Force,
+    Json,
+    Motion,
+    Robot,
+    RunName,
+    Seed,
+    TrackFile,
+    World,
+    show,
+)
+
+
+def plan(
+    run: RunName = DEFAULT_RUN,
+    robot: Robot = None,
+    world: World = None,
+    track: TrackFile = None,
+    seed: Seed = None,
+    motion: Motion = None,
+    with_: Annotated[
+        str | None, typer.Option("--with", help="repertoire: search over recorded actions")
+    ] = None,
+    repertoire: Annotated[
+        Path | None, typer.Option(help="file of actions; default: repertoire-ROBOT-WORLD.npz")
+    ] = None,
+    beam: Annotated[int, typer.Option(min=1, max=100_000, help="sequences kept a round")] = 400,
+    physics: Annotated[
+        int, typer.Option(min=0, help="candidates to run on the physics, for the ratio")
+    ] = 0,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="write the sequence, as JSON")
+    ] = None,
+    carry: Annotated[bool, typer.Option("--run", help="run it in the simulator")] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Judge a run on paper: library, path and joint limits, with no servo and no simulator."""
+    if with_ not in {None, "repertoire"}:
+        raise InputError(f"--with {with_}: no such planner; there is: repertoire")
+    if with_ is not None:
+        from snakewalk.controller.app.cli.commands.plan_repertoire import plan_with_repertoire  # noqa: PLC0415
+
+        if motion is not None or track is not None or seed is not None:
+            raise InputError("--with repertoire: takes no --motion, --track or --seed")
+        plan_with_repertoire(
+            run, repertoire=repertoire, robot=robot, world=world, beam=beam, physics=physics,
+            out=out, carry=carry, force=force, as_json=as_json,
+        )  # fmt: skip
+        return
+    if repertoire is not None or out is not None or carry or physics:
+        raise InputError("--repertoire, --out, --run and --physics belong to --with repertoire")
+    from snakewalk.controller.app.runs.prepare import prepare  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.terrain.summary import path_relief  # noqa: PLC0415
+
+    prepared = prepare(run, seed=seed, motion=motion, robot=robot, world=world, track=track)
+    ahead = prepared.forecast()
+    found: dict[str, object] = {
+        "run": prepared.run.name,
+        "robot": prepared.robot.name,
+        "world": prepared.world.name,
+        "motion": prepared.run.motion,
+        "seed": prepared.run.seed,
+        "waypoints": len(prepared.run.waypoints_m),
+        "waypoints_reached": ahead.reached,
+        "passed_by": ahead.missed,
+        "path_m": round(prepared.path.length_m, 3),
+        "duration_s": round(ahead.duration_s, 2),
+        "joint_reach_rad": round(float(abs(ahead.joint_rad).max()), 3),
+        "joint_speed_rad_s": round(float(ahead.joint_speed_rad_s.max()), 3),
+        "joint_acceleration_rad_s2": round(float(ahead.joint_acceleration_rad_s2.max()), 2),
+        "joint_torque_n_m": round(float(ahead.joint_torque_n_m.max()), 3),
+        "predicted_gain": round(prepared.gain, 3),
+    }
+    if ahead.slide is not None:
+        found["steeper_than_held"] = (
+            f"{math.degrees(ahead.slide.slope_rad):.1f} deg of "
+            f"{math.degrees(ahead.slide.held_rad):.1f}, for {ahead.slide.lasted_s:.2f} s"
+        )
+    if prepared.run.motion != "serpenoid":
+        found["states"] = prepared.library.counts
+    if prepared.ground is not None:
+        relief = path_relief(prepared.planner, prepared.path)
+        found["slope_median_deg"] = round(math.degrees(relief.median_slope_rad), 1)
+        found["slope_max_deg"] = round(math.degrees(relief.max_slope_rad), 1)
+        found["world_slope_median_deg"] = round(math.degrees(relief.world_median_slope_rad), 1)
+        found["climb_m"] = round(relief.climb_m, 3)
+        found["safe_nodes"] = f"{relief.safe_node_share:.0%}"
+    show(found, as_json)

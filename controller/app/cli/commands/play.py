@@ -1,0 +1,66 @@
+"""``snakewalk play``: a recording in time on the robot."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.options import (
+    Film,
+    Json,
+    Robot,
+    RunFolder,
+    RunPort,
+    World,
+    leave,
+    show,
+)
+
+
+def play(
+    track: Annotated[str, typer.Argument(help="shipped recording, or a file")],
+    robot: Robot = None,
+    world: World = None,
+    speed: Annotated[
+        str, typer.Option(help="times the animal's own; auto: as fast as the joints can, at most 1")
+    ] = "auto",
+    port: RunPort = None,
+    film: Film = True,
+    out: RunFolder = None,
+    as_json: Json = False,
+) -> None:
+    """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
+    from snakewalk.controller.app.cli.progress import GaitProgress  # noqa: PLC0415
+    from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.app.runs.prepare_playback import prepare_playback  # noqa: PLC0415
+
+    prepared = prepare_playback(track, robot=robot, world=world, speed=_speed(speed))
+    folder = out if out is not None else Path("runs") / f"play-{prepared.run.name}"
+    with GaitProgress(prepared.run.name, prepared.duration_s) as progress:
+        finished = execute(prepared, folder, port, (progress,), say=progress.note)
+    left = leave(finished.log, folder, film=film)
+    found: dict[str, object] = {
+        "recording": track,
+        "robot": prepared.robot.name,
+        "world": prepared.world.name,
+        "speed": round(prepared.speed, 4),
+        "duration_s": round(finished.outcome.duration_s, 2),
+        "tripped": finished.outcome.tripped,
+        "peak_current_a": finished.summary["peak_current_a"],
+        "log": str(finished.log),
+        "summary": str(folder / "summary.json"),
+        **left.facts(),
+    }
+    show(found, as_json)
+    if finished.outcome.tripped is not None:
+        raise SystemExit(1)
+
+
+def _speed(text: str) -> float | None:
+    if text == "auto":
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"--speed {text}: expected auto or a factor") from None

@@ -1,0 +1,172 @@
+"""``snakewalk repertoire``: record actions from the physics, look at them, run a plan of them."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
+from snakewalk.controller.app.cli.options import (
+    Film,
+    Force,
+    Json,
+    RunFolder,
+    RunPort,
+    console,
+    leave,
+    show,
+)
+from snakewalk.controller.app.cli.picture_file import check_picture
+
+if TYPE_CHECKING:
+    from snakewalk.controller.app.runs.repertoire_job import RepertoireJob
+    from snakewalk.controller.repertoire.repertoire import Repertoire
+
+Picture = Annotated[Path | None, typer.Option(help="draw the actions' ways here")]
+
+
+def record(
+    robot: Annotated[str, typer.Option(help="shipped robot, or a TOML file")] = "yaw16",
+    world: Annotated[str, typer.Option(help="shipped flat world, or a TOML file")] = "flat",
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="default: repertoire-ROBOT-WORLD.npz")
+    ] = None,
+    picture: Picture = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Run forward, left and right actions on the physics and keep a settled cycle of each."""
+    from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.app.report.plots.repertoire import draw_actions  # noqa: PLC0415
+    from snakewalk.controller.app.studies.repertoire_planning import default_file, flat  # noqa: PLC0415
+    from snakewalk.controller.app.studies.repertoire_recording import ACTIONS, record  # noqa: PLC0415
+
+    body, ground = load_robot(robot), load_world(world)
+    flat(ground)
+    file = out or default_file(robot, world)
+    refuse_to_overwrite([file, picture], force)
+    check_picture(picture)
+    with bar() as progress:
+        task = progress.add_task("record", total=float(len(ACTIONS)))
+        begun: list[str] = []
+
+        def told(name: str, share: float) -> None:
+            if name not in begun:
+                begun.append(name)
+            progress.update(task, completed=len(begun) - 1 + share, description=name)
+
+        repertoire = record(body, ground, told=told)
+        progress.update(task, completed=float(len(ACTIONS)), description="recorded")
+    repertoire.save(file)
+    if picture is not None:
+        draw_actions(repertoire, picture)
+    _show_actions(file, repertoire, as_json)
+
+
+def show_file(
+    file: Annotated[Path, typer.Argument(help="a repertoire")],
+    picture: Picture = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Show the actions of a repertoire: way, turn and closure error of a cycle."""
+    from snakewalk.controller.app.report.plots.repertoire import draw_actions  # noqa: PLC0415
+    from snakewalk.controller.repertoire.repertoire import load_repertoire  # noqa: PLC0415
+
+    repertoire = load_repertoire(file)
+    refuse_to_overwrite([picture], force)
+    check_picture(picture)
+    if picture is not None:
+        draw_actions(repertoire, picture)
+    _show_actions(file, repertoire, as_json)
+
+
+def run_plan(
+    plan: Annotated[Path, typer.Argument(help="made by: snakewalk plan --with repertoire -o")],
+    port: RunPort = None,
+    open_loop: Annotated[
+        bool, typer.Option("--open-loop", help="as planned, without looking where the body is")
+    ] = False,
+    film: Film = True,
+    picture: Annotated[Path | None, typer.Option(help="draw predicted and measured way")] = None,
+    out: RunFolder = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Run a plan on servos or in the simulator, and compare predicted with measured poses."""
+    from snakewalk.controller.app.studies.repertoire_planning import load_plan  # noqa: PLC0415  heavy
+
+    refuse_to_overwrite([picture], force)
+    job = load_plan(plan, replan=not open_loop)
+    found, complete = carry_out(job, port, out, film, picture)
+    show({"plan": str(plan), **found}, as_json)
+    if not complete and not open_loop:
+        raise SystemExit(1)
+
+
+def carry_out(
+    job: "RepertoireJob", port: str | None, out: Path | None, film: bool, picture: Path | None
+) -> tuple[dict[str, object], bool]:
+    """Execute a job with a bar; what it did, and whether it reached every waypoint."""
+    from snakewalk.controller.app.cli.progress import GaitProgress  # noqa: PLC0415
+    from snakewalk.controller.app.report.plots.repertoire import draw_way  # noqa: PLC0415
+    from snakewalk.controller.app.studies.repertoire_run import default_folder, run_route  # noqa: PLC0415
+    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
+
+    check_picture(picture)
+    folder = default_folder(job) if out is None else out
+    with GaitProgress(job.run.name, job.route.duration_s) as progress:
+        ran = run_route(job, folder, port, (progress,))
+    log = ran.finished.log
+    left = leave(log, folder, film=film)
+    if picture is not None:
+        draw_way(job, read_log(log), picture)
+    return ran.facts() | {"log": str(log)} | left.facts(), ran.complete
+
+
+def bar() -> Progress:
+    """Return a bar on standard error."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+    )
+
+
+def _show_actions(file: Path, repertoire: "Repertoire", as_json: bool) -> None:
+    rows = [
+        {
+            "name": segment.name,
+            "kind": segment.kind,
+            "frames": segment.frames,
+            "cycle_s": round(segment.duration_s, 3),
+            "speed_m_s": round(segment.speed_m_s, 4),
+            "turn_rad_cycle": round(segment.turn_rad_s * segment.duration_s, 4),
+            "closure_mm": round(1e3 * segment.closure_m, 3),
+            "closure_mrad": round(1e3 * segment.closure_rad, 3),
+        }
+        for segment in repertoire.segments
+    ]
+    if as_json:
+        about = {"file": str(file), "robot": repertoire.robot, "world": repertoire.world}
+        print(json.dumps(about | {"actions": rows}))
+        return
+    heads = {
+        "cycle_s": "cycle\ns",
+        "speed_m_s": "speed\nm/s",
+        "turn_rad_cycle": "turn, rad\na cycle",
+    }
+    heads |= {"closure_mm": "closure\nmm", "closure_mrad": "closure\nmrad"}
+    table = Table(box=None, pad_edge=False)
+    for key in rows[0]:
+        name = key == "name"
+        table.add_column(heads.get(key, key), justify="left" if name else "right", no_wrap=name)
+    for row in rows:
+        table.add_row(*(str(value) for value in row.values()))
+    console.print(f"{file}: {repertoire.robot} on {repertoire.world}")
+    console.print(table)

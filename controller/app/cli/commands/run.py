@@ -1,0 +1,81 @@
+"""``snakewalk run``: the main job, on servos or in the simulator."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.controller.app.cli.options import (
+    DEFAULT_RUN,
+    Film,
+    Json,
+    Motion,
+    Robot,
+    RunFolder,
+    RunName,
+    RunPort,
+    Seed,
+    TrackFile,
+    World,
+    leave,
+    show,
+)
+
+
+def run(
+    run: RunName = DEFAULT_RUN,
+    port: RunPort = None,
+    robot: Robot = None,
+    world: World = None,
+    track: TrackFile = None,
+    seed: Seed = None,
+    motion: Motion = None,
+    pose: Annotated[
+        str | None, typer.Option(help="what measures the head: simulator, camera or joints")
+    ] = None,
+    out: RunFolder = None,
+    film: Film = True,
+    as_json: Json = False,
+) -> None:
+    """Run a job on servos or in the simulator; leaves a log, a report and a film."""
+    from snakewalk.controller.app.cli.progress import PathProgress  # noqa: PLC0415
+    from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.app.runs.prepare import prepare  # noqa: PLC0415
+
+    prepared = prepare(
+        run, seed=seed, motion=motion, robot=robot, world=world, track=track, pose=pose
+    )
+    changed = [Path(each).stem for each in (robot, world, track) if each is not None]
+    parts = [prepared.run.name, *changed, prepared.run.motion, f"seed{prepared.run.seed}"]
+    if prepared.run.pose is not None:
+        parts.append(f"pose-{prepared.run.pose}")
+    name = "-".join(parts)
+    folder = out if out is not None else Path("runs") / name
+    with PathProgress(prepared.path.length_m, len(prepared.run.waypoints_m)) as progress:
+        asks = _confirm if sys.stdin.isatty() else None
+        finished = execute(prepared, folder, port, (progress,), asks, progress.note)
+    outcome = finished.outcome
+    left = leave(finished.log, folder, film=film)
+    show(
+        {
+            "run": name,
+            "waypoints": len(prepared.run.waypoints_m),
+            "waypoints_reached": outcome.reached,
+            "duration_s": round(outcome.duration_s, 2),
+            "tripped": outcome.tripped,
+            "advance_alarms": outcome.alarms,
+            **finished.pose,
+            "log": str(finished.log),
+            "summary": str(folder / "summary.json"),
+            **left.facts(),
+        },
+        as_json,
+    )
+    if not outcome.complete(len(prepared.run.waypoints_m)):
+        raise SystemExit(1)
+
+
+def _confirm(found: str) -> bool:
+    """Ask whether an interrupted chain may go on; the servos hold meanwhile."""
+    return typer.confirm(f"{found}; go on?", err=True)

@@ -1,0 +1,46 @@
+"""``snakewalk scan``: who is on the bus."""
+
+import json
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from snakewalk.controller.app.cli.options import Json, Port, console
+
+
+def scan(
+    port: Port = None,
+    baud: Annotated[
+        list[int] | None, typer.Option(help="only this rate, may be given again; default: all")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the servos on a bus, at every baud rate; changes nothing."""
+    from snakewalk.controller.app.service import scan as scanning  # noqa: PLC0415  --help stays quick
+    from snakewalk.drivers.errors import ControlTableError  # noqa: PLC0415
+    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.protocol.registers import BAUDS  # noqa: PLC0415
+
+    unknown = [rate for rate in baud or [] if rate not in BAUDS]
+    if unknown:
+        shown = ", ".join(map(str, BAUDS))
+        raise ControlTableError([f"--baud {rate}: servos have {shown}" for rate in unknown])
+    device = scanning.pick_port(port)
+    with (
+        SerialPort(device, baud[0] if baud else 1_000_000) as line,
+        Console(stderr=True).status("") as status,
+    ):
+        heard = scanning.scan(line, baud or (), lambda step: status.update(f"{device}: {step}"))
+    if as_json:
+        print(json.dumps({"port": device, "servos": [servo.as_dict() for servo in heard]}))
+    elif heard:
+        table = Table("ID", "model", "firmware", "baud", box=None)
+        for servo in heard:
+            table.add_row(str(servo.servo_id), servo.model, str(servo.firmware), str(servo.baud))
+        console.print(table)
+    else:
+        console.print(f"{device}: nobody answers at any baud rate: power? cable? adapter's switch?")
+    if not heard:
+        raise SystemExit(1)

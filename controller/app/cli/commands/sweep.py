@@ -1,0 +1,90 @@
+"""``snakewalk sweep``: gaits on the physics over many parameters."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import progress
+from rich.console import Console
+from rich.table import Table
+
+from snakewalk.controller.app.cli.options import Json, console
+from snakewalk.controller.app.cli.picture_file import check_picture
+
+_HEADS = {
+    "points": "n",
+    "default_bl_cycle": "BL a\ncycle",
+    "most_bl_cycle": "most",
+    "default_pace": "pace",
+    "most_pace": "most",
+    "pace": "",
+    "default_cost": "cost",
+    "least_cost": "least",
+    "peak_torque_n_m": "N m",
+    "default_slip": "slip",
+}
+"""Columns of the printed table, units under the names; the JSON has them all."""
+
+
+def sweep(
+    gaits: Annotated[list[str] | None, typer.Argument(help="default: all", metavar="GAIT")] = None,
+    robot: Annotated[
+        list[str] | None,
+        typer.Option(help="may be given again; default: yaw16 and alternating16"),
+    ] = None,
+    points: Annotated[int, typer.Option(min=1, max=100_000, help="of each gait and robot")] = 30,
+    seconds: Annotated[float, typer.Option(min=4.0, max=3600.0, help="of each run")] = 12.0,
+    seed: Annotated[int, typer.Option(min=0, help="of the choice of points")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    dask: Annotated[
+        str | None, typer.Option(help="address of a Dask scheduler, e.g. tcp://host:8786")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="table; what it holds is not run again")
+    ] = Path("sweep.csv"),
+    picture: Annotated[
+        Path | None, typer.Option(help="draw the table here (.png, .svg, .pdf)")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Measure gaits over their parameters: speed, cost of transport, torque, heat, slip."""
+    from snakewalk.controller.app.report.plots.sweep import draw_sweep  # noqa: PLC0415
+    from snakewalk.controller.app.studies.pool import each  # noqa: PLC0415
+    from snakewalk.controller.app.studies.sweep_digest import digest  # noqa: PLC0415
+    from snakewalk.controller.app.studies.sweep_measure import measure  # noqa: PLC0415
+    from snakewalk.controller.app.studies.sweep_plan import plan_sweep  # noqa: PLC0415
+    from snakewalk.controller.app.studies.sweep_table import Table as Sweep  # noqa: PLC0415
+    from snakewalk.controller.app.studies.sweep_table import read_table  # noqa: PLC0415
+
+    check_picture(picture)
+    planned = plan_sweep(gaits, robot, points, seed=seed, seconds=seconds)
+    for line in () if as_json else planned.left_out:
+        console.print(f"left out: {line}", style="dim")
+    table = Sweep(out)
+    missing = table.missing(planned.points)
+    with table:
+        for point, row in progress.track(
+            each(measure, missing, workers=workers, dask=dask),
+            total=len(planned.points),
+            completed=len(planned.points) - len(missing),
+            description=str(out),
+            console=Console(stderr=True),
+        ):
+            table.add(point, row)
+    rows = digest(read_table(out))
+    if picture is not None:
+        draw_sweep(read_table(out), picture)
+    if as_json:
+        found = {"table": str(out), "run": len(missing), "held": len(planned.points)}
+        print(json.dumps(found | {"left_out": planned.left_out, "gaits": rows}))
+        return
+    console.print(str(out))
+    grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    grid.add_column("gait, robot")
+    for key, head in _HEADS.items():
+        grid.add_column(head, justify="left" if key == "pace" else "right", no_wrap=True)
+    for one in rows:
+        named = f"{one['gait']} {one['robot']}"
+        grid.add_row(named, *["" if one[key] is None else str(one[key]) for key in _HEADS])
+    console.print(grid)

@@ -1,0 +1,81 @@
+"""``snakewalk track``: what recordings are, and what of them a robot can do."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import track as progress
+from rich.table import Table
+
+from snakewalk.controller.app.cli.options import Json, console
+
+
+def track(
+    recordings: Annotated[
+        list[str] | None,
+        typer.Argument(help="shipped names or files; default: the shipped ones", metavar="NAME"),
+    ] = None,
+    robot: Annotated[str, typer.Option(help="shipped robot, or a TOML file")] = "yaw16",
+    world: Annotated[str, typer.Option(help="shipped world, or a TOML file")] = "flat",
+    rate: Annotated[
+        float | None, typer.Option(help="frames a second of the files, instead of what they say")
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="draw midlines and angles here (.png, .svg, .pdf)")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Examine recordings: wave, bends, states this robot can use, slowing for its servos."""
+    from snakewalk.controller.app.recordings.recording import examine  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.capture.readers.generated import EMBEDDED  # noqa: PLC0415
+
+    names = recordings or list(EMBEDDED)
+    found = [
+        examine(name, robot, world, None if name in EMBEDDED else rate)
+        for name in progress(names, "recordings", console=Console(stderr=True), transient=True)
+    ]
+    if picture is not None:
+        from snakewalk.controller.app.report.plots.recording import draw  # noqa: PLC0415
+
+        draw([(one.track, Path(one.facts["recording"]).name) for one in found], picture)
+    if as_json:
+        print(json.dumps([one.facts for one in found]))
+        return
+    for one in found:
+        _show(one.facts)
+
+
+def _show(facts: dict[str, Any]) -> None:
+    """One recording as a table of two columns with the units in words."""
+    length = "no scale" if facts["length_mm"] is None else f"{facts['length_mm']:g} mm long"
+    assumed = " (assumed; say --rate)" if facts["rate_assumed"] else ""
+    refused = ", ".join(f"{n} for {why}" for why, n in facts["states_refused"].items() if n)
+    stall = facts["times_no_load_speed"]
+    rows = {
+        "source": "; ".join(dict.fromkeys((str(facts["source"]), str(facts["licence"])))),
+        "frames": f"{facts['frames']}, {facts['frames_left_out']} left out, "
+        f"{facts['rate_hz']:g} Hz{assumed}, {length}",
+        "wave": f"{facts['waves_on_body']} on the body, {facts['wave_hz']} Hz, "
+        f"{facts['wave_share']:.0%} of the bending; towards the head "
+        f"{facts['time_towards_head']:.0%} of the time",
+        "bend K": f"{facts['bend_k_rad']} rad, at most {facts['bend_k_most_rad']}",
+        "in 7 coefficients": f"{facts['energy_kept']:.2%} of the energy",
+        "states": f"{facts['states_kept']} of {facts['frames']} usable by {facts['robot']}"
+        + (f"; refused {refused}" if refused else ""),
+        "joint speed": f"{facts['joint_speed_rad_s']} rad/s at the animal's pace; a plan may ask "
+        f"{facts['joint_speed_limit_rad_s']:g}"
+        + ("" if stall is None else f"; {stall} of the servo's no-load speed"),
+        "slowed": f"{facts['slowed_by']} times throughout (speed {facts['slowed_by_for_speed']}, "
+        f"acceleration {facts['slowed_by_for_acceleration']}); "
+        f"{facts['longer_if_slowed_where_needed']} times longer if only where needed",
+    }
+    if facts["head_and_tail_swapped"]:
+        rows["warning"] = f"head and tail change places {facts['head_and_tail_swapped']} times"
+    elif facts["time_towards_head"] > 0.5:
+        rows["warning"] = "the wave runs towards the head: an animal going backwards, or tail first"
+    table = Table(title=facts["recording"], title_justify="left", box=None, show_header=False)
+    for key, text in rows.items():
+        table.add_row(key, text)
+    console.print(table)

@@ -1,0 +1,76 @@
+"""``snakewalk tune``: better parameters of a gait, found on the physics."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich import progress
+from rich.console import Console
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
+from snakewalk.controller.app.cli.options import Json, Robot, show
+
+
+def tune(
+    gait: Annotated[str, typer.Argument(help="one of: snakewalk gait list")],
+    aim: Annotated[
+        Literal["speed", "efficiency"], typer.Option("--for", help="what to make better")
+    ] = "speed",
+    robot: Robot = None,
+    budget: Annotated[int, typer.Option(min=16, help="runs of the search")] = 120,
+    seeds: Annotated[int, typer.Option(min=1, help="other grounds to compare on")] = 5,
+    seconds: Annotated[float, typer.Option(min=4.0, help="of each run")] = 10.0,
+    seed: Annotated[int, typer.Option(min=0, help="of the search")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="set of parameters for gait run (.toml)")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="overwrite")] = False,
+    as_json: Json = False,
+) -> None:
+    """Search a gait's parameters for speed or efficiency, and compare with the defaults."""
+    from snakewalk.controller.app.studies import tune as search  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.gaits.registry import make_gait  # noqa: PLC0415
+
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: a set of parameters ends in .toml")
+    refuse_to_overwrite([out], force)
+    body = robot or ("alternating16" if make_gait(gait).needs.pitch else "yaw16")
+    bar = progress.Progress(console=Console(stderr=True))
+    with bar:
+        task = bar.add_task(f"{gait} for {aim}", total=budget)
+        found = search.tune(
+            gait,
+            body,
+            aim,
+            budget=budget,
+            seeds=seeds,
+            seconds=seconds,
+            seed=seed,
+            workers=workers,
+            told=lambda done: bar.update(task, completed=done),
+        )
+        bar.update(task, completed=budget)
+    facts: dict[str, object] = {
+        "gait": gait,
+        "robot": body,
+        "for": aim,
+        "runs": found.tried,
+        "default": [round(value, 4) for value in found.default],
+        "tuned": [round(value, 4) for value in found.best],
+        "better_by": f"{found.margin:.0%}",
+        "better_on": f"{found.wins} of {seeds} grounds",
+        "parameters": found.parameters,
+    }
+    if out is not None:
+        lines = [
+            f"# tuned for {aim}: {found.margin:+.0%} on {seeds} grounds",
+            f'name = "{out.stem}"',
+        ]
+        lines += [f'gait = "{gait}"', f'robot = "{body}"', "", "[parameters]"]
+        lines += [f"{key} = {json.dumps(value)}" for key, value in found.parameters.items()]
+        out.write_text("\n".join(lines) + "\n")
+        facts["set"] = str(out)
+    show(facts, as_json)

@@ -1,1 +1,0 @@
-"""Keys of an operator: from the terminal or a gamepad, as names that ``Operator`` knows."""

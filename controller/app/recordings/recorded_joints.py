@@ -1,0 +1,58 @@
+"""Joint angles over time of a recording, for one robot."""
+
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.capture.readers.load import load_track
+from snakewalk.controller.capture.slowing import CUT_CYCLES
+from snakewalk.controller.capture.wave import measure_wave
+from snakewalk.controller.kinematics.retarget import Retarget
+
+
+def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
+    """Read times (T,) and joint angles (T, J): of the file itself, or of its midlines.
+
+    Midlines shake from frame to frame; their joints are smoothed, well above the wave's frequency.
+
+    Raises:
+        InputError: no such recording, or made for another robot.
+
+    """
+    made = _made_joints(track, robot)
+    if made is not None:
+        return made
+    recording = load_track(track)
+    if recording.frames < 2:
+        raise InputError(f"{track}: one frame is no motion")
+    joints = Retarget(robot).joints_rad(recording.angles_rad)
+    known_s = recording.time_s - recording.time_s[0]
+    time_s = np.arange(0.0, known_s[-1] + 0.5 / recording.rate_hz, 1.0 / recording.rate_hz)
+    even = np.stack([np.interp(time_s, known_s, column) for column in joints.T], axis=1)
+    wave_hz = measure_wave(recording).frequency_hz
+    if wave_hz > 0.0:
+        width = recording.rate_hz / (2.0 * np.pi * CUT_CYCLES * wave_hz)
+        even = gaussian_filter1d(even, width, axis=0, mode="nearest")
+    return time_s, even
+
+
+def _made_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | None:
+    """Joint angles that a synthesis wrote beside its midlines; None where there are none."""
+    if Path(track).suffix != ".npz" or not Path(track).is_file():
+        return None
+    try:
+        with np.load(track, allow_pickle=False) as data:
+            if "joints_rad" not in data or "rate_hz" not in data or "robot" not in data:
+                return None
+            joints = np.asarray(data["joints_rad"], dtype=float)
+            rate_hz, name = float(data["rate_hz"]), str(data["robot"])
+    except (BadZipFile, ValueError, OSError):
+        return None  # load_track says what is wrong with it
+    if name != robot.name or joints.ndim != 2 or len(joints) < 2:
+        return None
+    return np.arange(len(joints)) / rate_hz, joints

@@ -1,0 +1,95 @@
+"""What a recording is, and what of it a robot can do: the facts of ``snakewalk track``."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import StatesConfig
+from snakewalk.controller.capture.readers.load import load_track
+from snakewalk.controller.capture.slowing import joint_demand, slowing
+from snakewalk.controller.capture.track import Track
+from snakewalk.controller.capture.wave import measure_wave
+from snakewalk.controller.kinematics.retarget import Retarget
+from snakewalk.controller.shape.states import energy_kept, to_angles, to_states
+from snakewalk.controller.walk.shape_filters import refusals
+from snakewalk.sim.servo.motor import MOTORS
+
+
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """A recording and its facts, ready to be shown or written as JSON."""
+
+    track: Track
+    facts: dict[str, Any]
+
+
+def examine(
+    name_or_path: str,
+    robot_name: str = "yaw16",
+    world_name: str = "flat",
+    rate_hz: float | None = None,
+) -> Examined:
+    """Load a recording and measure it for a robot on a ground.
+
+    Raises:
+        InputError: recording, robot or world cannot be used.
+
+    """
+    robot, friction = load_robot(robot_name), load_world(world_name).friction
+    track, states = load_track(name_or_path, rate_hz), StatesConfig()
+    wave = measure_wave(track)
+    shapes = to_angles(to_states(track.angles_rad, states.coefficients))
+    refused: dict[str, int] = {}
+    kept = shapes
+    for reason, refuse in refusals(robot, friction, states).items():
+        bad = refuse(kept)
+        refused[reason], kept = int(bad.sum()), kept[~bad]
+    length_mm = None if track.length_m is None else round(1e3 * track.length_m, 1)
+    facts: dict[str, Any] = {
+        "recording": name_or_path,
+        "source": track.source,
+        "licence": track.licence,
+        "frames": track.frames,
+        "frames_left_out": track.dropped,
+        "head_and_tail_swapped": track.flips,
+        "rate_hz": round(track.rate_hz, 3),
+        "rate_assumed": track.rate_assumed,
+        "length_mm": length_mm,
+        "waves_on_body": round(wave.waves, 2),
+        "wave_hz": round(wave.frequency_hz, 2),
+        "wave_share": round(wave.share, 2),
+        "time_towards_head": round(wave.headward, 2),
+        "bend_k_rad": round(float(np.median(track.bend_rad)), 2),
+        "bend_k_most_rad": round(float(track.bend_rad.max()), 2),
+        "energy_kept": round(float(energy_kept(track.angles_rad, states.coefficients).mean()), 4),
+        "robot": robot.name,
+        "states_kept": len(kept),
+        "states_refused": refused,
+    }
+    return Examined(track, facts | _pace(track, shapes, wave.frequency_hz, robot))
+
+
+def _pace(
+    track: Track, shapes: np.ndarray[Any, Any], wave_hz: float, robot: RobotConfig
+) -> dict[str, Any]:
+    """Joint speed at the animal's pace, and how much slower this robot must be."""
+    joints = Retarget(robot).joints_rad(shapes)
+    demand = joint_demand(joints, track.time_s, track.rate_hz, wave_hz)
+    slow = slowing(demand, robot.joint_speed_limit_rad_s, robot.joint_acceleration_limit_rad_s2)
+    fastest = float(demand.speed_rad_s.max())
+    motor = MOTORS.get(robot.servo.model)
+    return {
+        "joint_speed_rad_s": round(fastest, 2),
+        "joint_speed_95_rad_s": round(float(np.percentile(demand.speed_rad_s, 95.0)), 2),
+        "joint_speed_unsmoothed_rad_s": round(demand.raw_speed_rad_s, 2),
+        "joint_acceleration_rad_s2": round(float(demand.acceleration_rad_s2.max(initial=0.0)), 1),
+        "joint_speed_limit_rad_s": robot.joint_speed_limit_rad_s,
+        "times_no_load_speed": None if motor is None else round(fastest / motor.no_load_rad_s, 2),
+        "slowed_by": round(slow.throughout, 2),
+        "slowed_by_for_speed": round(slow.by_speed, 2),
+        "slowed_by_for_acceleration": round(slow.by_acceleration, 2),
+        "longer_if_slowed_where_needed": round(slow.where_needed, 2),
+    }

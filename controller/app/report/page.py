@@ -1,0 +1,213 @@
+"""The page: headline numbers first, then film, figures, events and what ran; one file, no scripts.
+
+Everything that comes from the log is escaped.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any, Final
+
+from snakewalk.controller.metrics.summary import Summary
+from snakewalk.controller.runlog.record import Event
+
+_EVENTS_SHOWN = 300
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """One figure on the page."""
+
+    title: str
+    caption: str
+    image: str
+    """Data URI."""
+
+
+def page(
+    numbers: Summary,
+    sections: Sequence[Section],
+    *,
+    film: str,
+    events: Sequence[Event],
+    config: Mapping[str, Any],
+) -> str:
+    """Whole page; ``film`` is HTML made by ``film.film_html``, or empty."""
+    title = f"{numbers['run']} on {numbers['backend']}"
+    note = f'<p class="note">{escape(numbers["log_note"])}</p>' if numbers["log_note"] else ""
+    body = [
+        f"<header><p class='kind'>snakewalk run</p><h1>{escape(str(numbers['run']))}</h1>",
+        f"<p class='{_mood(numbers)} outcome'>{escape(str(numbers['outcome']))}</p>{note}",
+        f"<p class='verdict'>{escape(_verdict(numbers))}</p>",
+        f"<p class='facts'>{_facts(numbers)}</p></header>",
+        f"<section class='tiles'>{''.join(_tiles(numbers))}</section>",
+        film,
+        *(_figure(s) for s in sections),
+        _events(events),
+        _details("All numbers", numbers),
+        _details("Configuration", config),
+    ]
+    return (
+        "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'>"
+        "<meta name='viewport' content='width=device-width, initial-scale=1'>"
+        f"<title>{escape(title)}</title><style>{CSS}</style></head>\n<body><main>"
+        + "\n".join(part for part in body if part)
+        + "</main></body></html>\n"
+    )
+
+
+def _mood(n: Summary) -> str:
+    if n["trip"] is not None:
+        return "bad"
+    return "good" if n["waypoints_reached"] == n["waypoints"] else "fair"
+
+
+def _verdict(n: Summary) -> str:
+    """One sentence: how far it came, how fast, how well it kept to its path, whether on time."""
+    where = "on the simulator" if n["backend"] == "sim" else f"on {n['backend']}"
+    late = n["missed_deadlines"]
+    missed = f"{_count(late, 'deadline') if late else 'no deadline'} missed."
+    if n["waypoints"] == 0:
+        return (
+            f"{n['robot']} moved by {n['motion']} {where}: its centre of mass went "
+            f"{_fmt(n['travelled_m'], 1)} m in {_fmt(n['duration_s'], 1)} s, {missed}"
+        )
+    return (
+        f"{n['robot']} reached {n['waypoints_reached']} of {_count(n['waypoints'], 'waypoint')} "
+        f"{where}: {_fmt(n['travelled_m'], 1)} m in {_fmt(n['duration_s'], 1)} s, "
+        f"{_centimetres(n['path_error_mean_m'])} from its path on average, {missed}"
+    )
+
+
+def _centimetres(length_m: float | None) -> str:
+    return "–" if length_m is None else f"{100.0 * length_m:.1f} cm"
+
+
+def _facts(n: Summary) -> str:
+    backend = "simulation" if n["backend"] == "sim" else n["backend"]
+    facts = (
+        ("robot", n["robot"]), ("ground", n["world"]), ("motion", n["motion"]),
+        ("bus", backend), ("seed", n["seed"]), ("configuration", n["config_hash"]),
+        ("snakewalk", n["software"]),
+    )  # fmt: skip
+    return " ".join(f"<span><b>{k}</b> {escape(str(v))}</span>" for k, v in facts)
+
+
+def _tiles(n: Summary) -> list[str]:
+    wire = f"{_pct(n['wire_use_mean'])} of the wire" if n["wire_use_mean"] is not None else ""
+    torque = "" if n["peak_torque_n_m"] is None else f"{_fmt(n['peak_torque_n_m'], 2)} N m"
+    vetoes = _count(n["vetoes"], "veto", "vetoes")
+    missed = f"{n['missed_deadlines']} of {n['cycles']}"
+    took = f"in {_fmt(n['duration_s'], 1)} s"
+    tiles = [
+        _tile("Waypoints", f"{n['waypoints_reached']} of {n['waypoints']}",
+              f"in {_fmt(n['duration_s'], 1)} s"),
+        _tile("Path error", f"{_fmt(n['path_error_mean_m'], 3)} m",
+              f"at most {_fmt(n['path_error_max_m'], 3)} m"),
+        _tile("Speed", f"{_fmt(n['speed_m_s'], 3)} m/s",
+              f"predicted {_fmt(n['predicted_speed_m_s'], 3)}"),
+        _tile("Gain η", _fmt(n["eta"], 2), "speed over pulse speed"),
+        _tile("Travelled", f"{_fmt(n['travelled_m'], 2)} m",
+              f"path of {_fmt(n['path_length_m'], 2)} m"),
+        _tile("Tracking", f"{_fmt(n['tracking_rms_rad'], 3)} rad",
+              f"RMS; lag {_fmt(n['lag_s'], 3)} s"),
+        _tile("Peak current", f"{_fmt(n['peak_current_a'], 2)} A", torque),
+        _tile("Hottest servo", f"{_fmt(n['peak_temperature_c'], 0)} °C",
+              f"supply down to {_fmt(n['lowest_voltage_v'], 1)} V"),
+        _tile("Missed deadlines", missed, wire),
+        _tile("Safety", _count(n["clamps"], "clamp"), f"{vetoes}, {_count(n['alarms'], 'alarm')}"),
+    ]  # fmt: skip
+    if n["waypoints"] == 0:  # a gait has no path, and its shape need not go along the body
+        return [_tile("Travelled", f"{_fmt(n['travelled_m'], 2)} m", took), *tiles[5:]]
+    return tiles
+
+
+def _tile(name: str, value: str, below: str) -> str:
+    return (
+        f"<div><span>{escape(name)}</span><strong>{escape(value)}</strong>"
+        f"<small>{escape(below)}</small></div>"
+    )
+
+
+def _figure(section: Section) -> str:
+    return (
+        f"<section><h2>{escape(section.title)}</h2><figure>"
+        f"<img src='{section.image}' alt='{escape(section.title)}'>"
+        f"<figcaption>{escape(section.caption)}</figcaption></figure></section>"
+    )
+
+
+def _events(events: Sequence[Event]) -> str:
+    if not events:
+        return ""
+    rows = "".join(
+        f"<tr class='{escape(e.level)}'><td>{e.time_s:.2f} s</td><td>{escape(e.kind)}</td>"
+        f"<td>{escape(e.text)}</td></tr>"
+        for e in events[:_EVENTS_SHOWN]
+    )
+    rest = len(events) - _EVENTS_SHOWN
+    more = f"<p class='facts'>and {rest} more in the log</p>" if rest > 0 else ""
+    return f"<section><h2>What happened</h2><table>{rows}</table>{more}</section>"
+
+
+def _details(title: str, values: Mapping[str, Any]) -> str:
+    text = escape(json.dumps(values, indent=2, ensure_ascii=False))
+    return f"<details><summary>{escape(title)}</summary><pre>{text}</pre></details>"
+
+
+def _fmt(value: float | None, decimals: int) -> str:
+    return "–" if value is None else f"{value:.{decimals}f}"
+
+
+def _count(number: int, one: str, more: str = "") -> str:
+    return f"{number} {one if number == 1 else more or one + 's'}"
+
+
+def _pct(value: float) -> str:
+    return f"{100.0 * value:.0f} %"
+
+
+CSS: Final = """
+:root { --ink: #22303c; --grey: #5d6c7a; --line: #e1e7ec; --blue: #0072b2; }
+* { box-sizing: border-box; }
+body { margin: 0; background: #f5f7f9; color: var(--ink);
+  font: 15px/1.5 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
+main { max-width: 1160px; margin: 0 auto; padding: 28px 20px 60px; }
+h1 { font-size: 30px; line-height: 1.2; margin: 0 0 8px; }
+h2 { font-size: 18px; margin: 0 0 10px; }
+.kind { margin: 0; color: var(--grey); font-size: 13px; letter-spacing: .04em; }
+.outcome { display: inline-block; margin: 0 0 10px; padding: 3px 12px; border-radius: 14px;
+  font-weight: 600; }
+.outcome.good { background: #d8f1e7; color: #00593f; }
+.outcome.fair { background: #fcefcf; color: #6e4c00; }
+.outcome.bad { background: #fbe0d2; color: #8c3a00; }
+.verdict { margin: 0 0 10px; font-size: 16px; }
+.note { margin: 0 0 10px; color: #8c3a00; }
+.facts { margin: 0; color: var(--grey); font-size: 13px; }
+.facts span { margin-right: 16px; white-space: nowrap; }
+.facts b { font-weight: 600; color: var(--ink); }
+.tiles { display: grid; gap: 10px; margin: 20px 0; padding: 0; background: none; border: 0;
+  grid-template-columns: repeat(auto-fit, minmax(190px, 1fr)); }
+.tiles div, section, details { background: #fff; border: 1px solid var(--line);
+  border-radius: 8px; }
+.tiles div { padding: 10px 14px; }
+.tiles span { display: block; color: var(--grey); font-size: 13px; }
+.tiles strong { display: block; font-size: 23px; line-height: 1.3; }
+.tiles small { color: var(--grey); font-size: 13px; }
+section { margin: 0 0 16px; padding: 16px 20px; }
+figure { margin: 0; }
+figure img, figure video { display: block; width: 100%; height: auto; }
+figcaption { margin-top: 8px; color: var(--grey); font-size: 13px; }
+table { border-collapse: collapse; width: 100%; font-size: 14px; }
+td { padding: 4px 14px 4px 0; border-top: 1px solid var(--line); vertical-align: top; }
+td:first-child { white-space: nowrap; font-variant-numeric: tabular-nums; }
+tr:first-child td { border-top: 0; }
+td:last-child { width: 100%; }
+tr.warning td:nth-child(2) { color: #9a6a00; font-weight: 600; }
+tr.error td:nth-child(2) { color: #b34700; font-weight: 600; }
+details { margin: 0 0 10px; padding: 10px 20px; }
+summary { cursor: pointer; font-weight: 600; }
+pre { overflow-x: auto; font-size: 12.5px; }
+@media print { body { background: #fff; } section { break-inside: avoid; } }
+"""

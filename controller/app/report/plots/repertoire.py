@@ -1,0 +1,72 @@
+"""Pictures: the ways of the actions, and a plan beside what the body did."""
+
+from pathlib import Path
+
+import numpy as np
+
+from snakewalk.controller.app.runs.repertoire_job import RepertoireJob
+from snakewalk.controller.kinematics.frame import Frame
+from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.replay import replay
+from snakewalk.controller.runlog.record import RunRecord
+
+SHADES = ("0.6", "#2c6fbb", "#c0392b")
+
+
+def draw_actions(repertoire: Repertoire, path: Path) -> None:
+    """Draw two cycles of each action: way of the centre, body at the beginning and the end."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  an extra
+
+    figure = Figure(figsize=(9.0, 0.95 * len(repertoire.segments)), layout="constrained")
+    axes = figure.subplots(-(-len(repertoire.segments) // 2), 2, squeeze=False).ravel()
+    for axis in axes[len(repertoire.segments) :]:
+        axis.set_axis_off()
+    for axis, segment in zip(axes, repertoire.segments, strict=False):
+        begin = Frame.flat(0.0, 0.0, 0.0)
+        one = replay(segment, begin)
+        two = replay(segment, one.end)
+        way = np.concatenate([one.origin_m, two.origin_m])
+        first = begin.world_m(segment.link_m[-1])
+        for shape, shade in zip((first, one.link_m[-1], two.link_m[-1]), SHADES, strict=True):
+            axis.plot(shape[:, 0], shape[:, 1], color=shade, lw=2.5, solid_capstyle="round")
+            axis.plot(*shape[0, :2], "o", color=shade, ms=5)
+        axis.plot(way[:, 0], way[:, 1], color="0.2", lw=0.9, ls=":")
+        turn = segment.turn_rad_s * segment.duration_s
+        axis.set_title(
+            f"{segment.name}: {segment.speed_m_s:.2f} m/s, {turn:+.2f} rad a cycle of "
+            f"{segment.duration_s:.2f} s",
+            fontsize=8,
+        )
+        axis.set_aspect("equal")
+        axis.tick_params(labelsize=7)
+        axis.grid(alpha=0.25)
+    figure.savefig(path, dpi=90)
+
+
+def draw_way(job: RepertoireJob, record: RunRecord, path: Path) -> None:
+    """Draw the route as planned, and where the centre of the body went."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  an extra
+
+    figure = Figure(figsize=(8.0, 3.4), layout="constrained")
+    axis = figure.subplots()
+    pose = job.route.pose
+    planned = []
+    for at, action in zip(pose, job.route.actions, strict=False):
+        planned.append(replay(job.repertoire.segments[action], Frame.flat(*at)).origin_m)
+    way = np.concatenate(planned)
+    axis.plot(way[:, 0], way[:, 1], color=SHADES[1], lw=1.2, label="predicted, all actions")
+    axis.plot(pose[:, 0], pose[:, 1], "o", color=SHADES[1], ms=4, label="ends of cycles")
+    found = record.pose.centre_m
+    label = "simulated, planned again each cycle" if job.replan else "simulated, without looking"
+    axis.plot(found[:, 0], found[:, 1], color=SHADES[2], lw=1.2, label=label)
+    angle = np.linspace(0.0, 2.0 * np.pi, 60)
+    radius = job.run.waypoint_radius_m
+    for k, (x, y) in enumerate(job.run.waypoints_m, start=1):
+        axis.plot(x + radius * np.cos(angle), y + radius * np.sin(angle), color="0.5", lw=0.8)
+        axis.annotate(str(k), (x, y), ha="center", va="center", fontsize=8, color="0.4")
+    axis.set_aspect("equal")
+    axis.set_xlabel("x, m")
+    axis.set_ylabel("y, m")
+    axis.grid(alpha=0.25)
+    figure.legend(fontsize=8, loc="outside lower center", ncols=3)
+    figure.savefig(path, dpi=90)

@@ -1,0 +1,91 @@
+"""What answers on the bus: simulated servos in the same process, or metal on a serial port.
+
+Everything above the byte port is the same object for both.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.runlog.record import Laid
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.clock import Clock
+from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.drivers.types import BodyPose
+
+
+@dataclass(frozen=True, slots=True)
+class Backend:
+    """A chain of servos, its clock, and what else can be known about it."""
+
+    name: str
+    chain: ServoChain
+    clock: Clock
+    pose: Callable[[], BodyPose] | None
+    """Measures the head link; None where nothing does."""
+    qpos: Callable[[], Floats] | None
+    """The simulator's coordinates, for the film."""
+    wire_busy_s: Callable[[], float]
+    """Time that bytes have spent on the wire so far; NaN where nobody counts."""
+
+
+def simulated(
+    run: RunConfig,
+    robot: RobotConfig,
+    world: WorldConfig,
+    ground: HeightField | None,
+    laid: Laid,
+    *,
+    compiled: bool | None = None,
+) -> Backend:
+    """Servos on a simulated line that turn a MuJoCo body with its head at the start.
+
+    Args:
+        run: start and physics step.
+        robot: the body and its servos.
+        world: friction and ground.
+        ground: the world's height field, where it has one.
+        laid: heading of the head link, and joint angles to begin with.
+        compiled: None takes numba where it is installed.
+
+    """
+    # The simulation is an extra: a robot's small computer has none.
+    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
+    from snakewalk.sim.physics.plant import MujocoPlant  # noqa: PLC0415
+    from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
+    from snakewalk.sim.servo.protection import Surroundings  # noqa: PLC0415
+
+    plant = MujocoPlant(robot, world, ground, run.physics_step_s, compiled=compiled)
+    plant.reset(run.start_m, laid.heading_rad, laid.joint_rad)
+    servo = robot.servo
+    line = SimLine(
+        ServoBank(robot.servo_ids, servo.model, servo.baud),
+        plant,
+        baud=servo.baud,
+        surroundings=Surroundings(supply_v=servo.supply_v),
+    )
+    chain = ServoChain(DynamixelBus(line, servo.model), robot, watchdog_s=run.safety.watchdog_s)
+    return Backend(
+        "sim", chain, line.clock, plant.head_pose, lambda: plant.qpos, lambda: line.busy_s
+    )
+
+
+def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
+    """Real servos on ``port``; nothing measures the pose.
+
+    Raises:
+        PortError: the port is not there, is taken, or may not be opened.
+
+    """
+    serial = SerialPort(port, robot.servo.baud)
+    chain = ServoChain(
+        DynamixelBus(serial, robot.servo.model, latency_s=serial.latency_s),
+        robot,
+        watchdog_s=run.safety.watchdog_s,
+    )
+    return Backend(port, chain, serial.clock, None, None, lambda: float("nan"))

@@ -1,0 +1,129 @@
+"""What measures the head in a run: the simulator, an overhead camera, or the joints alone."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.app.runs.backend import Backend
+from snakewalk.controller.app.runs.device_camera import DeviceCamera
+from snakewalk.controller.app.runs.job import Job
+from snakewalk.controller.app.runs.rendered_camera import RenderedCamera
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.localization.camera_pose import CameraPose
+from snakewalk.controller.localization.dead_reckoning import DeadReckoning
+from snakewalk.controller.runtime.drive import PoseSource
+from snakewalk.drivers.types import BodyPose, JointState
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """A believed pose held against the simulator's."""
+
+    head_m: Floats
+    """(T,) distance of the head link's centres."""
+    heading_rad: Floats
+    """(T,) difference of its headings, absolute."""
+    waypoints_reached: int
+    """By the body's true centre, in order."""
+
+    @property
+    def numbers(self) -> dict[str, object]:
+        """For the log and the result."""
+        if not self.head_m.size:
+            return {}
+        return {
+            "head_error_rms_m": round(_rms(self.head_m), 4),
+            "head_error_max_m": round(float(self.head_m.max()), 4),
+            "heading_error_rms_rad": round(_rms(self.heading_rad), 4),
+            "heading_error_max_rad": round(float(self.heading_rad.max()), 4),
+            "waypoints_truly_reached": self.waypoints_reached,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What a run asks for its pose."""
+
+    ask: PoseSource
+    found: dict[str, object]
+    """For the result, filled when the source is left: frames, and errors where truth is known."""
+
+
+@dataclass
+class Watched:
+    """A pose source, and beside it what the simulator knows: for the record, never for the run."""
+
+    prepared: Job
+    believed: PoseSource
+    true: Callable[[], BodyPose]
+    _head_m: list[float] = field(default_factory=list)
+    _heading_rad: list[float] = field(default_factory=list)
+    _reached: int = 0
+
+    def __call__(self, state: JointState) -> BodyPose:
+        """Return the pose believed."""
+        pose, true = self.believed(state), self.true()
+        self._head_m.append(float(np.hypot(*(pose.head_in_world_m - true.head_in_world_m)[:2])))
+        turn = pose.heading_rad - true.heading_rad
+        self._heading_rad.append(float(abs(np.arctan2(np.sin(turn), np.cos(turn)))))
+        run = self.prepared.run
+        if self._reached < len(run.waypoints_m):
+            centre = body_in_world(self.prepared.robot, true, state.position_rad).centre_m[:2]
+            away = np.hypot(*(centre - run.waypoints_m[self._reached]))
+            self._reached += int(away <= run.waypoint_radius_m)
+        return pose
+
+    @property
+    def truth(self) -> Truth:
+        """How good the poses were."""
+        return Truth(np.array(self._head_m), np.array(self._heading_rad), self._reached)
+
+
+@contextmanager
+def pose_source(
+    prepared: Job, backend: Backend, note: Callable[[str, str], None]
+) -> Iterator[Source]:
+    """Make the source that the run asks for; ``note`` is told (kind, text) at its end.
+
+    Raises:
+        InputError: the camera is not there, does not show the robot, or cannot work here.
+
+    """
+    run, robot = prepared.run, prepared.robot
+    true = backend.pose
+    if true is not None and run.pose in (None, "simulator"):
+        measured = true
+        yield Source(lambda state: measured(), {})
+        return
+    reckoning = DeadReckoning(
+        robot, prepared.world.friction, run.start_m, prepared.start_heading_rad
+    )
+    found: dict[str, object] = {}
+    with ExitStack() as stack:
+        believed: PoseSource = reckoning
+        if run.pose == "camera":
+            camera = stack.enter_context(closing(_camera(prepared, backend)))
+            believed = seen = CameraPose(
+                robot, camera, reckoning, lambda text: note("camera", text)
+            )
+            stack.callback(lambda: found.update(frames=seen.frames, frames_used=seen.used))
+        if true is not None:
+            believed = watched = Watched(prepared, believed, true)
+            stack.callback(lambda: found.update(watched.truth.numbers))
+        yield Source(believed, found)
+    if found:
+        note("pose", ", ".join(f"{key} {value}" for key, value in found.items()))
+
+
+def _camera(prepared: Job, backend: Backend) -> RenderedCamera | DeviceCamera:
+    run, robot, clock = prepared.run, prepared.robot, backend.clock
+    if backend.qpos is None:
+        return DeviceCamera(run, robot, clock)
+    return RenderedCamera(run, robot, prepared.world, backend.qpos, clock)
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values * values)))

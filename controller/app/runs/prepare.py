@@ -1,0 +1,228 @@
+"""From a run's configuration to a pilot: recording, library, path, forecast, margins."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.ground import build_ground
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.loader import checked, load_robot, load_run, load_world
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig, WalkConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.capture.readers.load import load_track, track_beside
+from snakewalk.controller.kinematics.links import mean_heading_rad
+from snakewalk.controller.kinematics.retarget import Retarget
+from snakewalk.controller.mechanics.pitch_fit import Lift
+from snakewalk.controller.mechanics.traction import quasi_static_gain
+from snakewalk.controller.runlog.record import Laid, PlanSummary
+from snakewalk.controller.runtime.forecast import Forecast, forecast
+from snakewalk.controller.runtime.guide import Guide
+from snakewalk.controller.runtime.margins import margin_faults
+from snakewalk.controller.shape.library import Refuse, StateLibrary, build_library
+from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.terrain.planner import TerrainPlanner
+from snakewalk.controller.walk.fallback import Fallback
+from snakewalk.controller.walk.joint_track import JointTrack
+from snakewalk.controller.walk.pilot import Pilot, TrackSource
+from snakewalk.controller.walk.serpenoid import Serpentine
+from snakewalk.controller.walk.shape_filters import refusals
+from snakewalk.controller.walk.time_law import Pulse
+from snakewalk.controller.walk.walker import Walker
+from snakewalk.drivers.bus.budget import wire_budget
+
+POINTS = 100
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Everything that is known before a servo moves."""
+
+    run: RunConfig
+    robot: RobotConfig
+    world: WorldConfig
+
+    @cached_property
+    def ground(self) -> HeightField | None:
+        """The world's height field; None on a flat floor."""
+        return build_ground(self.world)
+
+    @cached_property
+    def retarget(self) -> Retarget:
+        """Skeleton to joints."""
+        return Retarget(self.robot, POINTS)
+
+    @cached_property
+    def refusals(self) -> dict[str, Refuse]:
+        """What a shape must pass: turn, joints in range, no self-contact, traction."""
+        return refusals(self.robot, self.world.friction, self.run.states, POINTS)
+
+    @cached_property
+    def library(self) -> StateLibrary:
+        """Shapes that this robot can make, that do not touch themselves, and that push."""
+        states = self.run.states
+        return build_library(
+            load_track(self.run.track).angles_rad,
+            self.refusals,
+            coefficients=states.coefficients,
+            random_count=states.random_count,
+            curvature=self.run.behaviour.curvature,
+            rng=np.random.default_rng(self.run.seed),
+        )
+
+    @cached_property
+    def planner(self) -> TerrainPlanner:
+        """Lays paths over safe ground."""
+        return TerrainPlanner(self.ground, self.world.planner)
+
+    @cached_property
+    def path(self) -> SplinePath:
+        """Through the start and the waypoints."""
+        return self.planner.plan(np.vstack([self.run.start_m, self.run.waypoints_m]))
+
+    @cached_property
+    def lift(self) -> Lift:
+        """Lays the chain on the ground; on a level floor it lifts nothing."""
+        return Lift(self.robot, self.ground)
+
+    @cached_property
+    def gain(self) -> float:
+        """Predicted speed over pulse speed, 0.93 eta_q: mean over the shapes used."""
+        if self.run.motion == "serpenoid":
+            shape = self._source().track.body_rad(float(POINTS))
+            return 0.93 * float(quasi_static_gain(shape, self.world.friction)[0])
+        some = self.library.shapes_rad[:: max(1, len(self.library.shapes_rad) // 50)]
+        return 0.93 * float(quasi_static_gain(some, self.world.friction).mean())
+
+    @property
+    def start_heading_rad(self) -> float:
+        """Mean heading of the body at the start."""
+        given = self.run.start_heading_rad
+        return self.path.heading_rad(0.05) if given is None else given
+
+    def laid(self) -> Laid:
+        """How a simulated robot is laid down.
+
+        Straight on a flat floor. On a slope a straight body, round below, rolls like a log, so
+        there it is laid in its first shape.
+        """
+        if self.ground is None:
+            return Laid(self.start_heading_rad, np.zeros(self.robot.joint_count))
+        joints = self.pilot(level=True).first_goal_rad()
+        return Laid(self.start_heading_rad - mean_heading_rad(self.robot, joints), joints)
+
+    def pilot(self, *, level: bool = False) -> Pilot:
+        """Make a fresh pilot; the same configuration and seed give the same one.
+
+        ``level`` leaves the pitch joints at 0, whatever the ground.
+        """
+        run, robot = self.run, self.robot
+        wanted = run.behaviour.pulse_body_lengths_s * (1.0 - run.behaviour.sliding) * POINTS
+        source = self._source()
+        return Pilot(
+            source,
+            Pulse(
+                JointTrack(source.track, self.retarget.joints_rad, robot.limit_rad),
+                wanted,
+                speed_limit_rad_s=robot.joint_speed_limit_rad_s,
+                acceleration_limit_rad_s2=robot.joint_acceleration_limit_rad_s2,
+            ),
+            plan=self.planner,
+            lift=None if level or self.ground is None else self.lift,
+            fall_back=source.fall_back if isinstance(source, Fallback) else lambda lost: None,
+            start_m=np.array(run.start_m),
+            waypoints_m=run.waypoints_m,
+            length_m=robot.length_m,
+            carrot_m=run.walk.carrot_m,
+            waypoint_radius_m=run.waypoint_radius_m,
+            feedback=run.motion != "walk-blind",
+            aim_at_waypoint=run.motion == "walk-printed",
+        )
+
+    def forecast(self) -> Forecast:
+        """Run the plan on paper, and refuse it if a joint would be driven beyond its limits.
+
+        Raises:
+            InputError: one line per joint and limit.
+
+        """
+        plan = forecast(
+            self.pilot(level=True),
+            self.robot,
+            self.world.friction,
+            start_m=np.array(self.run.start_m),
+            heading_rad=self.start_heading_rad,
+            ground=self.ground,
+            limit_s=self.run.time_limit_s,
+        )
+        faults = margin_faults(plan, self.robot)
+        if faults:
+            raise InputError(faults)
+        return plan
+
+    def judged(self) -> PlanSummary:
+        """Forecast the run; what the log says of the plan.
+
+        Raises:
+            InputError: as ``forecast``.
+
+        """
+        ahead = self.forecast()
+        return PlanSummary(
+            path_m=self.path.position(np.linspace(0.0, self.path.length_m, 200)),
+            waypoints_m=np.array(self.run.waypoints_m),
+            waypoint_radius_m=self.run.waypoint_radius_m,
+            predicted_speed_m_s=self.gain * ahead.pulse_m / ahead.duration_s,
+            states=None if self.run.motion == "serpenoid" else self.library.counts,
+        )
+
+    def guide(self, say: Callable[[str, str], None]) -> Guide:
+        """Return a fresh pilot; it says nothing beside what the drive logs."""
+        return self.pilot()
+
+    def _source(self) -> TrackSource:
+        if self.run.motion == "serpenoid":
+            return Serpentine(POINTS)
+        walk = self.run.walk
+        if self.run.motion == "walk-printed":
+            walk = WalkConfig(
+                decision_fraction=1.0,
+                ramp_limit_rad=0.0,
+                heading_tolerance_rad=walk.heading_tolerance_rad,
+                nearest_count=walk.nearest_count,
+            )
+        order = np.random.default_rng(self.run.seed).permutation(len(self.library.shapes_rad))
+        walker = Walker(self.library.shapes_rad[order], walk, self._usable)
+        return Fallback(walker) if self.run.motion == "walk" and walk.fallback else walker
+
+    def _usable(self, body_rad: Floats) -> bool:
+        """Whether a body between two shapes can be made, does not touch itself, and pushes."""
+        return not any(refuse(body_rad[None])[0] for refuse in self.refusals.values())
+
+
+def prepare(run: str, **changes: object) -> Prepared:
+    """Load a run with its robot and world; ``changes`` replace fields of the run where not None.
+
+    Raises:
+        ConfigError: every fault of a file at once.
+        InputError: what the configuration asks cannot be made, or does not fit the wire.
+
+    """
+    loaded = load_run(run)
+    beside = Path(run).parent if run.endswith(".toml") else None
+    wanted = {key: value for key, value in changes.items() if value is not None}
+    wanted.setdefault("track", track_beside(loaded.track, beside))
+    loaded = checked(RunConfig, loaded.model_dump() | wanted, "command line")
+    if loaded.motion == "gait":
+        raise InputError(f"run {loaded.name}: a gait is run by: snakewalk gait run NAME")
+    if loaded.motion == "repertoire":
+        raise InputError(f"run {loaded.name}: planned by: snakewalk plan --with repertoire")
+    robot = load_robot(loaded.robot, beside)
+    budget = wire_budget(robot.joint_count, robot.servo.baud, fast=True, slow_read_bytes=7)
+    budget.check(loaded.cycle_hz)
+    return Prepared(loaded, robot, load_world(loaded.world, beside))

@@ -1,0 +1,132 @@
+"""The overhead camera of a run: the simulator's rendered top view, or a device at the bench."""
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.camera import CameraConfig
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import FlatGround, WorldConfig
+from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadEye, Sighting
+from snakewalk.drivers.clock import Clock
+
+
+def pose_faults(run: RunConfig, robot: RobotConfig, world: WorldConfig, *, metal: bool) -> None:
+    """Refuse a pose source that cannot work here.
+
+    Raises:
+        InputError: one line per fault.
+
+    """
+    faults = []
+    if run.pose == "simulator" and metal:
+        faults.append("pose: servos on a port have no simulator; take camera or joints")
+    if run.pose == "camera":
+        if not isinstance(world.ground, FlatGround) or world.obstacle is not None:
+            faults.append(
+                f"pose: the overhead camera needs a bare level floor; world {world.name} has none"
+            )
+        if run.motion == "gait" and robot.pitch_joints:
+            faults.append(
+                f"pose: the overhead camera takes the body to lie flat; a gait of {robot.name} "
+                "lifts or rolls it"
+            )
+        if run.camera.height_m <= 4.0 * robot.body_radius_m:
+            faults.append("camera: height_m: the lens must be well above the robot")
+        if metal:
+            faults += _missing(run.camera)
+    if faults:
+        raise InputError(faults)
+
+
+def _missing(camera: CameraConfig) -> list[str]:
+    return [
+        f"camera: {key}: needed with servos on a port: {why}"
+        for key, why in (
+            ("device", "number, device or address of the camera"),
+            ("background", "an image of the empty floor"),
+            ("centre_m", "the floor's place under the lens"),
+        )
+        if getattr(camera, key) is None
+    ]
+
+
+def centre_of(run: RunConfig) -> tuple[float, float]:
+    """Floor under the lens: as given, or the middle of start and waypoints."""
+    if run.camera.centre_m is not None:
+        return run.camera.centre_m
+    places = np.array([run.start_m, *run.waypoints_m])
+    x, y = 0.5 * (places.min(axis=0) + places.max(axis=0))
+    return float(x), float(y)
+
+
+def seen_whole(sighting: Sighting, camera: str) -> Sighting:
+    """Return the sighting.
+
+    Raises:
+        InputError: it does not show the whole body.
+
+    """
+    if sighting.verdict is not Verdict.GOOD:
+        raise InputError(f"{camera}: the robot is not seen whole at its start: {sighting.verdict}")
+    return sighting
+
+
+class RenderedCamera:
+    """The simulated robot from above; each frame arrives one period after it was taken.
+
+    A frame is taken at the first read of the joints at or after its time, and dated with that read.
+
+    Raises:
+        OffscreenError: nothing here draws without a screen.
+
+    """
+
+    def __init__(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        world: WorldConfig,
+        qpos: Callable[[], Floats],
+        clock: Clock,
+    ) -> None:
+        from snakewalk.sim.rendering.top_view import TopView  # noqa: PLC0415  the simulator is an extra
+
+        centre_m = centre_of(run)
+        self._view = TopView(robot, world, run.camera, centre_m, run.seed)
+        model = CameraModel.straight_down(run.camera, centre_m)
+        self.eye = OverheadEye(
+            model, self._view.empty_floor(), robot.body_radius_m, run.camera.shade
+        )
+        self._qpos, self._clock = qpos, clock
+        self._period_s = 1.0 / run.camera.rate_hz
+        self._next_s = clock.now_s()
+        self._coming: deque[Sighting] = deque()
+        seen_whole(self.first(), "the simulated camera")
+
+    def first(self) -> Sighting:
+        """Look now."""
+        return self._look(self._clock.now_s())
+
+    def seen(self, now_s: float) -> list[Sighting]:
+        """Take a frame if one is due; return those that have arrived."""
+        if now_s >= self._next_s - 1e-9:
+            self._coming.append(self._look(now_s))
+            missed = int((now_s - self._next_s) / self._period_s + 1e-9)
+            self._next_s += (missed + 1) * self._period_s
+        found = []
+        while self._coming and self._coming[0].time_s + self._period_s <= now_s + 1e-9:
+            found.append(self._coming.popleft())
+        return found
+
+    def close(self) -> None:
+        """Free the frame buffer."""
+        self._view.close()
+
+    def _look(self, now_s: float) -> Sighting:
+        return self.eye.see(self._view.picture(self._qpos()), now_s)

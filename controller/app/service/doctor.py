@@ -1,0 +1,104 @@
+"""Reads a bus and puts the checks in order; writes nothing to a servo."""
+
+from collections.abc import Callable, Sequence
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import SafetyConfig
+from snakewalk.controller.app.service import adapter
+from snakewalk.controller.app.service import servo_checks as servos
+from snakewalk.controller.app.service.finding import Finding
+from snakewalk.controller.app.service.scan import has_baud, scan
+from snakewalk.drivers.bus.budget import wire_budget
+from snakewalk.drivers.bus.control_cycle import GroupCycle
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.start_up import FAST_READ_FIRMWARE, ServoReport, inspect
+from snakewalk.drivers.errors import BusError
+from snakewalk.drivers.port.byte_port import BytePort
+
+STATE_BYTES, SLOW_BYTES = 10, 7
+"""Blocks that a chain reads: in each cycle, and now and then."""
+_TEST_READS = 200
+
+
+def examine(
+    port: BytePort,
+    robot: RobotConfig,
+    safety: SafetyConfig,
+    rate_hz: float,
+    *,
+    latency_s: float,
+    latency_timer_ms: int | None,
+    tell: Callable[[str], None] = lambda step: None,
+) -> list[Finding]:
+    """Findings about the bus, worst causes first.
+
+    Raises:
+        PortError: the port vanished.
+
+    """
+    bus = DynamixelBus(port, robot.servo.model, latency_s=latency_s)
+    findings = [adapter.latency_timer(latency_timer_ms, port.name)]
+    tell("who answers")
+    wanted, baud = robot.servo_ids, port.getBaudRate()
+    found = bus.find(wanted)
+    missing = [i for i in wanted if i not in found]
+    elsewhere = _at_other_bauds(port, missing, tell) if missing and has_baud(port.name) else {}
+    findings += servos.presence(wanted, list(found), elsewhere, baud, port.name)
+    tell("who else is there")
+    findings += [f for f in [servos.strangers(wanted, list(bus.scan()))] if f is not None]
+    if not found:
+        return findings
+    tell("duplicate IDs")
+    findings.append(servos.duplicates([bus.probe(i) for i in found]))
+    tell("registers")
+    reports = _reports(bus, robot, findings)
+    if reports:
+        findings += [
+            servos.firmware(reports),
+            servos.return_delay(reports),
+            servos.alarms(reports),
+            servos.torque(reports),
+            servos.supply(reports, safety.voltage_min_v, safety.voltage_max_v),
+            servos.heat(reports, safety.temperature_limit_c),
+        ]
+        tell("group reads")
+        fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
+        findings.append(line_quality(bus.cycle([s.servo_id for s in reports], fast=fast)))
+    fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
+    budget = wire_budget(
+        robot.joint_count, baud, fast=fast, read_bytes=STATE_BYTES, slow_read_bytes=SLOW_BYTES
+    )
+    findings.append(adapter.wire(budget, rate_hz))
+    return findings
+
+
+def line_quality(cycle: GroupCycle) -> Finding:
+    """Damaged or missing answers in many group reads, as a run does them."""
+    lost = sum(not cycle.read().valid.all() for _ in range(_TEST_READS))
+    found = f"{lost} of {_TEST_READS} group reads incomplete"
+    remedy = "cables, plugs, termination, a common ground; a lower baud rate"
+    if lost > 0.05 * _TEST_READS:
+        return Finding("line", "fail", found, remedy)
+    if lost:
+        return Finding("line", "warn", found, remedy)
+    return Finding("line", "ok", found)
+
+
+def _reports(
+    bus: DynamixelBus, robot: RobotConfig, findings: list[Finding]
+) -> Sequence[ServoReport]:
+    try:
+        inspection = inspect(bus, robot)
+    except BusError as error:
+        findings.append(Finding("registers", "fail", str(error), "run it again; then the cables"))
+        return ()
+    wrong = [fault for fault in inspection.faults if ": is a " in fault]
+    findings.append(servos.models(inspection.servos, wrong, bus.table.model))
+    return inspection.servos
+
+
+def _at_other_bauds(
+    port: BytePort, missing: Sequence[int], tell: Callable[[str], None]
+) -> dict[int, int]:
+    heard = scan(port, tell=tell)
+    return {s.servo_id: s.baud for s in heard if s.servo_id in missing}

@@ -1,0 +1,179 @@
+"""Settings of one servo that outlive its power: planned, shown, and only then written.
+
+They live in the EEPROM, which is locked while torque is on; each is read back.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.errors import BusError
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.control_table import model_of
+from snakewalk.drivers.protocol.packet import MAX_ID
+from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V, ServoUnits, baud_code, bauds_of
+
+_LIMITS = {
+    "min_position_rad": "Min Position Limit",
+    "max_position_rad": "Max Position Limit",
+    "current_limit_a": "Current Limit",
+    "temperature_limit_c": "Temperature Limit",
+    "voltage_min_v": "Min Voltage Limit",
+    "voltage_max_v": "Max Voltage Limit",
+    "return_delay_us": "Return Delay Time",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What shall be different; None stays."""
+
+    new_id: int | None = None
+    new_baud: int | None = None
+    min_position_rad: float | None = None
+    max_position_rad: float | None = None
+    current_limit_a: float | None = None
+    temperature_limit_c: float | None = None
+    voltage_min_v: float | None = None
+    voltage_max_v: float | None = None
+    return_delay_us: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One register."""
+
+    register: str
+    before: int
+    after: int
+    meaning: str
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON."""
+        return asdict(self)
+
+
+def open_servo(port: BytePort, servo_id: int, latency_s: float) -> DynamixelBus:
+    """Bus with the control table of the servo that answers to ``servo_id``.
+
+    Raises:
+        InputError: the ID is out of range.
+        NoAnswerError: nobody answers.
+        ControlTableError: the servo's model is not known.
+
+    """
+    if not 0 <= servo_id <= MAX_ID:
+        raise InputError(f"--id {servo_id}: a bus has IDs 0 to {MAX_ID}")
+    found = DynamixelBus(port, latency_s=latency_s).ping(servo_id)
+    return DynamixelBus(port, model_of(found.model_number), latency_s=latency_s)
+
+
+def plan(bus: DynamixelBus, servo_id: int, wish: Wish) -> tuple[Change, ...]:
+    """Registers that would change, in the order of writing; reads only.
+
+    Raises:
+        InputError: a wish that the servo or the bus cannot have, all of them at once.
+        BusError: the servo does not answer.
+
+    """
+    faults: list[str] = []
+    values = _raw(bus, wish, faults)
+    if wish.new_id is not None and wish.new_id != servo_id and 0 <= wish.new_id <= MAX_ID:
+        taken = bus.find([wish.new_id])
+        if taken:
+            faults.append(f"--new-id {wish.new_id}: there is a servo with this ID already")
+    if faults:
+        raise InputError(faults)
+    now = {name: bus.read(servo_id, name) for name in values}
+    changes = [
+        Change(name, now[name], value, meaning)
+        for name, (value, meaning) in values.items()
+        if now[name] != value
+    ]
+    low = values.get("Min Position Limit", (bus.read(servo_id, "Min Position Limit"), ""))[0]
+    high = values.get("Max Position Limit", (bus.read(servo_id, "Max Position Limit"), ""))[0]
+    if low >= high:
+        raise InputError(f"position limits {low} to {high} (raw): the lower is not below the upper")
+    if changes and bus.read(servo_id, "Torque Enable"):
+        changes.insert(0, Change("Torque Enable", 1, 0, "off: the EEPROM is locked while it is on"))
+    return tuple(changes)
+
+
+def apply(bus: DynamixelBus, servo_id: int, changes: tuple[Change, ...]) -> None:
+    """Write and read back; ID and baud rate last, since after them the servo is elsewhere.
+
+    Raises:
+        BusError: a value was refused, or does not read back.
+
+    """
+    for change in changes:
+        if change.register in ("ID", "Baud Rate"):
+            bus.write(servo_id, change.register, change.after)
+            if change.register == "ID":
+                servo_id = change.after
+            else:
+                bus.port.setBaudRate(bauds_of(bus.table.model)[change.after])
+            if bus.read(servo_id, change.register) != change.after:
+                raise BusError(f"servo {servo_id}: {change.register}: does not read back")
+        else:
+            bus.write_verified(servo_id, change.register, change.after)
+
+
+def _raw(bus: DynamixelBus, wish: Wish, faults: list[str]) -> dict[str, tuple[int, str]]:
+    """Register to value and what it means; limits first, then ID, then baud rate."""
+    values: dict[str, tuple[int, str]] = {}
+    for field, register in _LIMITS.items():
+        wanted = getattr(wish, field)
+        if wanted is None:
+            continue
+        option = "--" + field.rsplit("_", 1)[0].replace("_", "-")
+        try:
+            values[register] = (_limit(bus, register, float(wanted)), _said(field, wanted))
+            bus.table[register].encode(values[register][0])
+        except (InputError, ValueError, OverflowError) as error:
+            faults.append(f"{option} {wanted:g}: {error}")
+    if wish.new_id is not None:
+        values["ID"] = (wish.new_id, f"answers to {wish.new_id}")
+        if not 0 <= wish.new_id <= MAX_ID:
+            faults.append(f"--new-id {wish.new_id}: a bus has IDs 0 to {MAX_ID}")
+    if wish.new_baud is not None:
+        try:
+            code = baud_code(bus.table.model, wish.new_baud)
+            values["Baud Rate"] = (code, f"{wish.new_baud} bit/s")
+        except InputError as error:
+            faults.append(f"--new-baud {error}")
+    return values
+
+
+def _limit(bus: DynamixelBus, register: str, value: float) -> int:
+    if register.endswith("Position Limit"):
+        units = bus.table
+        raw = round(value / units.rad_per_position) + units.zero_position
+        turn = round(2.0 * np.pi / units.rad_per_position)
+        if not 0 <= raw < turn:
+            raise InputError("beyond half a turn from straight")
+        return raw
+    if value < 0.0:
+        raise InputError("is negative")
+    if register == "Current Limit":
+        return ServoUnits.of(bus.table).current_raw(value)
+    if register.endswith("Voltage Limit"):
+        return round(value / VOLTAGE_UNIT_V)
+    return round(value / 2.0) if register == "Return Delay Time" else round(value)
+
+
+def _said(field: str, value: float) -> str:
+    unit = {"rad": "rad", "a": "A", "c": "C", "v": "V", "us": "us"}[field.rsplit("_", 1)[1]]
+    return f"{value:g} {unit}"
+
+
+def as_dict(servo_id: int, changes: tuple[Change, ...], written: bool) -> Mapping[str, object]:
+    """What the command prints."""
+    return {
+        "servo": servo_id,
+        "changes": [change.as_dict() for change in changes],
+        "written": written,
+    }

@@ -1,0 +1,132 @@
+"""A simulated robot driven frame by frame by a motion source: servos, bus, safety, MuJoCo."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.ground import build_ground
+from snakewalk.config.loader import checked
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.app.runs.backend import simulated
+from snakewalk.controller.kinematics.frame import Frame, body_frame
+from snakewalk.controller.kinematics.links import BodyView, body_in_world, mean_heading_rad
+from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.runlog.record import Laid
+from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.vet import SafetyLimits
+from snakewalk.drivers.types import JointCommand
+
+FRAME_S = 1.0 / 60.0
+STEPS = 8
+"""Physics steps in a frame."""
+
+
+class PhysicsBody:
+    """Laid down in the shape ``joint_rad`` (J,) with its head at ``start_m``; a context manager."""
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        world: WorldConfig,
+        joint_rad: Floats,
+        start_m: tuple[float, float] = (0.0, 0.0),
+        heading_rad: float = 0.0,
+    ) -> None:
+        run = checked(
+            RunConfig,
+            {
+                "name": "repertoire",
+                "robot": robot.name,
+                "world": world.name,
+                "waypoints_m": [start_m],
+                "start_m": start_m,
+                "cycle_hz": 1.0 / FRAME_S,
+                "physics_step_s": FRAME_S / STEPS,
+            },
+            "repertoire",
+        )
+        self.robot = robot
+        laid = Laid(heading_rad - mean_heading_rad(robot, joint_rad), joint_rad)
+        self._backend = simulated(run, robot, world, build_ground(world), laid)
+        limits = SafetyLimits.from_config(robot, run.safety)
+        self._link = SafeLink(self._backend.chain, limits, self._backend.clock)
+        self._open = ExitStack()
+        self._due_s = 0.0
+
+    def __enter__(self) -> Self:
+        """Torque on."""
+        self._open.enter_context(self._link)
+        self._link.enable()
+        self._due_s = self._backend.clock.now_s()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Torque off."""
+        self._open.__exit__(kind, error, trace)
+
+    def frame(self, goal_rad: Floats) -> None:
+        """One frame: wait for it, read the joints, send goals (J,).
+
+        Raises:
+            SafetyTrippedError: the safety has latched.
+
+        """
+        self._due_s += FRAME_S
+        self._backend.clock.sleep_until_s(self._due_s)
+        self._link.read()
+        self._link.write(JointCommand(self._due_s, goal_rad))
+
+    @property
+    def joint_rad(self) -> Floats:
+        """(J,) shaft angles."""
+        qpos = self._backend.qpos
+        assert qpos is not None, "a simulated robot has coordinates"
+        return qpos()[7:]
+
+    def view(self) -> BodyView:
+        """Where the links are."""
+        pose = self._backend.pose
+        assert pose is not None, "a simulated robot has a pose"
+        return body_in_world(self.robot, pose(), self.joint_rad)
+
+    def body_frame(self) -> Frame:
+        """The body's frame."""
+        return body_frame(self.view().link_m)
+
+    def link_rotation(self) -> Floats:
+        """(L, 3, 3) axes of the links in the world."""
+        pose = self._backend.pose
+        assert pose is not None, "a simulated robot has a pose"
+        return link_rotations(self.robot.joint_axes, pose().rotation, self.joint_rad)
+
+    def play(self, source: MotionSource, told: Callable[[int], None] = lambda _: None) -> None:
+        """Send what ``source`` yields until it is done; ``told`` counts the frames."""
+        count = 0
+        while not source.done:
+            self.frame(source.step(FRAME_S, self.view()))
+            count += 1
+            told(count)
+
+
+def link_rotations(joint_axes: str, head: Floats, joint_rad: Floats) -> Floats:
+    """(L, 3, 3) of a chain whose head has axes ``head`` (3, 3); joints (J,) as everywhere."""
+    found = [np.asarray(head, dtype=float)]
+    for axis, angle in zip(joint_axes, joint_rad, strict=True):
+        c, s = np.cos(angle), np.sin(angle)
+        if axis == "y":  # what is behind turns by the negative angle about up
+            turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        else:  # and by the positive one about left
+            turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+        found.append(found[-1] @ turn)
+    return np.array(found)

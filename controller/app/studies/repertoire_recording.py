@@ -1,0 +1,102 @@
+"""Synthetic motion capture ([YT] 3): the physics runs an action until it has settled."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.app.studies.repertoire_physics import FRAME_S, PhysicsBody
+from snakewalk.controller.gaits.registry import make_gait
+from snakewalk.controller.gaits.wave import TURN
+from snakewalk.controller.motion.gait_cycle import Cycle
+from snakewalk.controller.motion.gait_motion import GaitMotion
+from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.segment import Kind, Segment, cut
+
+SETTLING = 3
+"""Whole cycles before the one that is kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """A lateral undulation with its own numbers."""
+
+    name: str
+    kind: Kind
+    frequency_hz: float
+    """At most; the joints' limits and whole frames may make it slower."""
+    turn_rad: float = 0.0
+
+
+ACTIONS = (
+    Action("forward-slow", "forward", 0.3),
+    Action("forward-medium", "forward", 0.5),
+    Action("forward-fast", "forward", 0.8),
+    Action("left-gentle", "left", 0.8, 0.6),
+    Action("left-sharp", "left", 0.8, 1.5),
+    Action("right-gentle", "right", 0.8, -0.6),
+    Action("right-sharp", "right", 0.8, -1.5),
+)
+"""[YT] 3.3: three speeds, and gradual and sharp turns to either side."""
+
+
+def record(
+    robot: RobotConfig,
+    world: WorldConfig,
+    actions: tuple[Action, ...] = ACTIONS,
+    told: Callable[[str, float], None] = lambda name, share: None,
+) -> Repertoire:
+    """Record every action; ``told`` gets the name and how far it is, 0 to 1.
+
+    Raises:
+        InputError: joints are missing, or do not bend so far.
+        SafetyTrippedError: the simulated servos were asked too much.
+
+    """
+    segments = tuple(record_action(robot, world, action, told) for action in actions)
+    return Repertoire(robot.name, robot.joint_axes, world.name, robot.length_m, segments)
+
+
+def record_action(
+    robot: RobotConfig,
+    world: WorldConfig,
+    action: Action,
+    told: Callable[[str, float], None] = lambda name, share: None,
+) -> Segment:
+    """Run one action from rest, and keep the cycle after ``SETTLING`` others."""
+    wanted: dict[str, Any] = {"turn_rad": action.turn_rad, "frequency_hz": action.frequency_hz}
+    asked = Cycle(make_gait("lateral-undulation", wanted), robot)
+    count = int(np.ceil(1.0 / (asked.frequency_hz * FRAME_S) - 1e-9))
+    wanted["frequency_hz"] = 1.0 / (count * FRAME_S)
+    motion = GaitMotion(make_gait("lateral-undulation", wanted), robot)
+    frames, links, rotations, goals, joints = [], [], [], [], []
+    with PhysicsBody(robot, world, motion.goal_rad()) as body:
+        while motion.cycles < SETTLING:
+            body.frame(motion.step(FRAME_S, body.view()))
+            told(action.name, motion.cycles / (SETTLING + 1))
+        # from phase 0 on, so that all actions begin alike
+        while min(motion.phase_rad, TURN - motion.phase_rad) > 0.51 * TURN / count:
+            body.frame(motion.step(FRAME_S, body.view()))
+        for k in range(count + 1):
+            view = body.view()
+            frames.append(body.body_frame())
+            links.append(view.link_m)
+            rotations.append(body.link_rotation())
+            joints.append(body.joint_rad)
+            if k < count:
+                goals.append(motion.goal_rad())
+                body.frame(motion.step(FRAME_S, view))
+                told(action.name, (SETTLING + k / count) / (SETTLING + 1))
+    return cut(
+        action.name,
+        action.kind,
+        FRAME_S,
+        frames,
+        np.array(links),
+        np.array(rotations),
+        np.array(goals),
+        np.array(joints),
+    )

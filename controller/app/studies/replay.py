@@ -1,0 +1,144 @@
+"""A log run again: the commands that were sent, at their times, to simulated servos.
+
+Nothing decides anew: no pilot, no safety. What differs from the log is the servos, the body and the
+ground; for a log of the simulator nothing may.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.ground import build_ground
+from snakewalk.controller.app.runs.backend import Backend, simulated
+from snakewalk.controller.app.runs.job import job_of
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.metrics.comparison import Comparison, compare
+from snakewalk.controller.runlog.record import Laid, RunRecord
+from snakewalk.controller.runlog.writer import RunLog, VerdictKind
+from snakewalk.drivers.types import BodyPose, JointCommand
+
+
+def replay(
+    record: RunRecord, log: Path, on_cycle: Callable[[int, int], None] | None = None
+) -> Path:
+    """Run a record's commands on the simulator and write what the servos then answer to ``log``.
+
+    The rows keep the record's times, commands and verdicts; angles, currents, temperatures and pose
+    are the simulator's. A record of metal begins with the joints as first measured.
+
+    Args:
+        record: a run, on metal or simulated; may be cut short.
+        log: to be written.
+        on_cycle: told (cycles done, of).
+
+    Raises:
+        InputError: the simulator is not installed, or the record holds no cycle.
+
+    """
+    if find_spec("mujoco") is None:
+        raise InputError("a replay needs the simulator: pip install 'snakewalk[sim]'")
+    cycle, header = record.cycle, record.header
+    if len(cycle.time_s) == 0:
+        raise InputError("the log holds no cycle: there is nothing to replay")
+    backend = _backend(record)
+    chain, clock, robot = backend.chain, backend.clock, header.robot
+    head_pose = cast(Callable[[], BodyPose], backend.pose)  # a simulated body always has one
+    period_s = 1.0 / header.run.cycle_hz
+    numbers = np.rint((cycle.deadline_s - cycle.deadline_s[0]) / period_s)
+    total = len(cycle.time_s)
+    with RunLog(log) as out:
+        out.config(
+            header.run,
+            robot,
+            header.world,
+            backend="sim",
+            plan=header.plan,
+            ground=header.ground,
+            torque_constant_n_m_a=header.torque_constant_n_m_a,
+            laid=header.laid,
+        )
+        chain.enable()
+        wire_s, start_s = backend.wire_busy_s(), clock.now_s()
+        for k in range(total):
+            due_s = start_s + numbers[k] * period_s
+            clock.sleep_until_s(due_s)
+            late_s = clock.now_s() - due_s
+            state = chain.read()
+            pose = head_pose()
+            if cycle.verdict[k] != "veto":
+                chain.write(JointCommand(clock.now_s(), cycle.sent_rad[k]))
+            before_s, wire_s = wire_s, backend.wire_busy_s()
+            out.cycle(
+                cycle.time_s[k],
+                cycle.asked_rad[k],
+                cycle.sent_rad[k],
+                state,
+                deadline_s=cycle.deadline_s[k],
+                lateness_s=late_s,
+                wire_busy_s=wire_s - before_s,
+                verdict=cast(VerdictKind, cycle.verdict[k]),
+                reason=cycle.reason[k],
+                joints=cycle.joints[k],
+            )
+            view = body_in_world(robot, pose, state.position_rad)
+            out.pose(
+                cycle.time_s[k],
+                pose.head_in_world_m,
+                pose.rotation,
+                links_m=view.link_m,
+                centre_m=view.centre_m,
+            )
+            if on_cycle is not None:
+                on_cycle(k + 1, total)
+            if cycle.verdict[k] == "veto":
+                break
+        chain.disable()
+    return log
+
+
+def differences(
+    original: RunRecord, again: RunRecord, tolerance_rad: float, tolerance_m: float
+) -> Comparison:
+    """Compare a run with its replay; joints and, where it was measured, the head decide.
+
+    Velocities and currents are told but not held against the replay, and neither is the head of a
+    run whose pose was reckoned from the joints or seen by a camera. Angles that the original failed
+    to read are left out.
+    """
+    valid = original.cycle.valid
+    header = original.header
+    measured = header.backend == "sim" and header.run.pose in (None, "simulator")
+    told = dict.fromkeys(("velocity_rad_s", "current_a"), float("inf"))
+    limits = told | {
+        "measured_rad": tolerance_rad,
+        "head_m": tolerance_m if measured else float("inf"),
+    }
+    return compare(_known(original, valid), _known(again, valid), tolerances=limits)
+
+
+def _known(record: RunRecord, valid: NDArray[np.bool_]) -> RunRecord:
+    cycle, rows = record.cycle, len(record.cycle.time_s)
+    seen = replace(
+        cycle,
+        measured_rad=np.where(valid[:rows], cycle.measured_rad, np.nan),
+        velocity_rad_s=np.where(valid[:rows], cycle.velocity_rad_s, np.nan),
+        current_a=np.where(valid[:rows], cycle.current_a, np.nan),
+    )
+    return replace(record, cycle=seen)
+
+
+def _backend(record: RunRecord) -> Backend:
+    header = record.header
+    laid = header.laid
+    if laid is None:
+        prepared = job_of(header.run, header.robot, header.world)
+        first = record.cycle.measured_rad[0]
+        known = first if np.isfinite(first).all() else np.zeros(header.robot.joint_count)
+        laid = Laid(prepared.start_heading_rad, known)
+    return simulated(header.run, header.robot, header.world, build_ground(header.world), laid)

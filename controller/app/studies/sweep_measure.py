@@ -1,0 +1,102 @@
+"""One point of a sweep on the physics: through bus, safety layer and simulated servos."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.runs.execute import execute
+from snakewalk.controller.app.runs.prepare_gait import prepare_gait
+from snakewalk.controller.app.runs.prepared_gait import PreparedGait
+from snakewalk.controller.app.studies.sweep_points import Point
+from snakewalk.controller.metrics.displacement import SKIPPED_S, gait_way
+from snakewalk.controller.metrics.effort import Winding, effort
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.sim.servo.motor import MOTORS
+
+Row = dict[str, object]
+MEASURED = (
+    "ended", "cycles", "ran_hz", "forward_bl_cycle", "left_bl_cycle", "turn_rad_cycle",
+    "speed_m_s", "climb_m_s", "power_w", "cost_of_transport", "slip", "peak_current_a",
+    "peak_torque_n_m", "peak_temperature_c", "tracking_max_rad", "least_rate",
+)  # fmt: skip
+"""What a point is measured for; ``ran_hz``: cycles a second that the joints could follow."""
+FRICTION_SPREAD = 0.15
+SUPPLY_SPREAD = 0.05
+
+
+def measure(point: Point, vary: int | None = None) -> Row:
+    """Run a point and return what ``MEASURED`` names.
+
+    ``vary`` draws other friction (up to 15 % off) and another supply (5 %), by its seed.
+    """
+    try:
+        prepared = prepare_gait(
+            point.gait,
+            robot=point.robot,
+            world=point.world,
+            parameters=dict(point.parameters),
+            seconds=point.seconds,
+            seed=point.seed,
+        )
+        if vary is not None:
+            prepared = _varied(prepared, np.random.default_rng(vary))
+        with TemporaryDirectory() as folder:
+            finished = execute(prepared, Path(folder))
+            record = read_log(finished.log)
+    except InputError as error:
+        return {"ended": f"refused: {error.faults[0]}"}
+    start_s = next((e.time_s for e in record.events if e.kind == "start"), 0.0)
+    ramp_s = max(0.0, record.end_s - start_s - point.seconds - 1.0)
+    motor = MOTORS.get(record.header.robot.servo.model)
+    winding = Winding(motor.resistance_ohm, motor.back_emf_v_s) if motor else None
+    way, cost = gait_way(record), effort(record, start_s + ramp_s + SKIPPED_S, winding)
+    numbers = finished.summary
+    found = {
+        "ended": finished.outcome.tripped or "ran to its end",
+        "cycles": way.cycles,
+        "ran_hz": way.frequency_hz,
+        "forward_bl_cycle": way.forward_bl,
+        "left_bl_cycle": way.left_bl,
+        "turn_rad_cycle": way.turn_rad,
+        "speed_m_s": way.speed_m_s,
+        "climb_m_s": cost.climb_m_s,
+        "power_w": cost.power_w,
+        "cost_of_transport": cost.cost_of_transport,
+        "slip": cost.slip,
+        "peak_current_a": numbers["peak_current_a"],
+        "peak_torque_n_m": numbers["peak_torque_n_m"],
+        "peak_temperature_c": numbers["peak_temperature_c"],
+        "tracking_max_rad": numbers["tracking_max_rad"],
+        "least_rate": finished.outcome.least_rate,
+    }
+    return {key: _digits(value) for key, value in found.items()}
+
+
+def _varied(prepared: PreparedGait, rng: np.random.Generator) -> PreparedGait:
+    world, robot = prepared.world, prepared.robot
+    slick, volts = rng.uniform(-1.0, 1.0, 2)
+    factor = 1.0 + FRICTION_SPREAD * slick
+    friction = world.friction.model_copy(
+        update={
+            "along": world.friction.along * factor,
+            "across": world.friction.across * factor,
+        }
+    )
+    supply = robot.servo.supply_v * (1.0 + SUPPLY_SPREAD * volts)
+    servo = robot.servo.model_copy(update={"supply_v": supply})
+    return replace(
+        prepared,
+        world=world.model_copy(update={"friction": friction}),
+        robot=robot.model_copy(update={"servo": servo}),
+    )
+
+
+def _digits(value: object) -> object:
+    """Five digits, and None for what is not known: a table is read by people too."""
+    if not isinstance(value, float):
+        return value
+    return float(f"{value:.5g}") if math.isfinite(value) else None

@@ -1,0 +1,99 @@
+"""Which parameters to try: a Sobol sequence over a gait's ranges, as far as the robot allows."""
+
+from dataclasses import dataclass, field
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+from scipy.stats import qmc
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Gait, Range, ranges
+
+SLOWEST_HZ = 0.2
+_TRIES = 64
+"""Draws for each point wanted before it is given up: a robot may refuse most of a range."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One gait with its parameters on one robot; number 0 has the defaults."""
+
+    gait: str
+    robot: str
+    world: str
+    number: int
+    seed: int
+    seconds: float
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """What tells it from other points of a table, as text."""
+        place = (self.gait, self.robot, self.world)
+        return (*place, str(self.number), str(self.seed), f"{self.seconds:g}")
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """The parameters of a gait that can be varied, as a unit cube."""
+
+    gait: type[Gait]
+    spans: dict[str, Range]
+
+    @classmethod
+    def of(cls, gait: type[Gait]) -> "Space":
+        """All numbers of the gait; mirroring is no new gait."""
+        spans = {k: span for k, span in ranges(gait.model).items() if span.kind is not bool}
+        return cls(gait, spans)
+
+    def values(self, unit: Floats) -> dict[str, Any]:
+        """Parameters of a point (d,) of the unit cube."""
+        found: dict[str, Any] = {}
+        for (name, span), u in zip(self.spans.items(), unit, strict=True):
+            low = max(span.low, SLOWEST_HZ) if name == "frequency_hz" else span.low
+            value = low + float(np.clip(u, 0.0, 1.0)) * (span.high - low)
+            found[name] = round(value) if span.kind is int else float(f"{value:.4g}")
+        return found
+
+    def unit(self, values: dict[str, Any]) -> Floats:
+        """Return the point (d,) of the unit cube where parameters have these values."""
+        found = []
+        for name, span in self.spans.items():
+            low = max(span.low, SLOWEST_HZ) if name == "frequency_hz" else span.low
+            found.append((float(values[name]) - low) / (span.high - low))
+        return np.asarray(np.clip(np.array(found), 0.0, 1.0))
+
+
+def points_of(
+    gait: type[Gait], robot: RobotConfig, count: int, *, seed: int, seconds: float
+) -> tuple[list[Point], int]:
+    """Return up to ``count`` points that the robot's joints allow, and how many they did not.
+
+    Raises:
+        InputError: the robot lacks joints that the gait needs.
+
+    """
+    gait().check(robot)
+    space = Space.of(gait)
+    place = (gait.name, robot.name, gait.world)
+    found = [Point(*place, 0, seed, seconds)]
+    refused = 0
+    sobol = qmc.Sobol(
+        len(space.spans), rng=np.random.default_rng([seed, crc32(gait.name.encode())])
+    )
+    draws = sobol.random_base2(int(np.ceil(np.log2(count * _TRIES))))
+    for unit in draws:
+        if len(found) >= count:
+            break
+        values = space.values(unit)
+        try:
+            gait.of(values).check(robot)
+        except InputError:
+            refused += 1
+            continue
+        number = len(found)
+        found.append(Point(*place, number, seed, seconds, values))
+    return found, refused

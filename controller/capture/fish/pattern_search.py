@@ -1,0 +1,66 @@
+"""Coordinate search: each parameter in turn, then a leap along what helped, then smaller steps.
+
+[TH] 3.3.3 changes position and head angle on a grid of 3 px and 3 degrees, then of 1, then the
+spine angles in turn. This is that, with the leap of Hooke and Jeeves.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+
+
+def climb(
+    value: Callable[[Floats], float],
+    start: Floats,
+    steps: Floats,
+    *,
+    halvings: int,
+    evaluations: int = 600,
+) -> tuple[Floats, float]:
+    """Largest ``value`` near ``start``.
+
+    Args:
+        value: to be made large; -inf where it has no meaning.
+        start: (P,) where to begin.
+        steps: (P,) first steps; 0 keeps a parameter as it is.
+        halvings: how often the steps are halved when none of them helps.
+        evaluations: after so many no new round begins.
+
+    Returns:
+        The best parameters and their value, never less than at ``start``.
+
+    """
+    used = 0
+
+    def score(at: Floats) -> float:
+        nonlocal used
+        used += 1
+        return value(at)
+
+    def explore(at: Floats, best: float, size: Floats) -> tuple[Floats, float]:
+        at = at.copy()
+        for k in np.flatnonzero(size):
+            here = at[k]
+            for sign in (1.0, -1.0):
+                at[k] = here + sign * size[k]
+                found = score(at)
+                if found > best:
+                    best = found
+                    break
+                at[k] = here
+        return at, best
+
+    here, best, size = np.array(start, dtype=float), score(start), np.array(steps, dtype=float)
+    for _ in range(halvings + 1):
+        while used < evaluations:
+            there, found = explore(here, best, size)
+            if found <= best:
+                break
+            while found > best and used < evaluations:
+                leap = there + (there - here)
+                here, best = there, found
+                there, found = explore(leap, score(leap), size)
+        size *= 0.5
+    return here, best

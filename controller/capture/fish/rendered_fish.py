@@ -1,0 +1,122 @@
+"""Rendered views of a fish whose midline is known: marks, shadow, uneven light, blur and noise.
+
+Drawn by distance to the midline, not by ``raster``, so that matching is not tested on its own
+drawing.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, shift
+from scipy.spatial import cKDTree
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.fish.raster import Grey
+
+_FINE = 240  # places along the body at which it is drawn
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a scene is lit and filmed; grey values 0 to 255."""
+
+    ground: float = 175.0
+    fish: float = 70.0
+    light: float = 25.0
+    """How much brighter one corner is than the middle."""
+    marks: float = 10.0
+    """Standard deviation of the pattern of the ground and of the back."""
+    shadow: float = 18.0
+    blur_px: float = 0.8
+    noise: float = 4.0
+
+
+class Scene:
+    """One fixed camera: a ground and what moves over it."""
+
+    def __init__(self, rows: int, columns: int, seed: int = 0, look: Look | None = None) -> None:
+        """Lay the ground.
+
+        Args:
+            rows: height of the frame, px.
+            columns: its width, px.
+            seed: of pattern and noise.
+            look: light and camera.
+
+        """
+        self.look = look or Look()
+        self._rng = np.random.default_rng(seed)
+        y, x = np.mgrid[0:rows, 0:columns]
+        light = self.look.light * (x / columns + y / rows - 1.0)
+        pattern = gaussian_filter(self._rng.normal(size=(rows, columns)), 2.0)
+        self._ground = self.look.ground + light + self.look.marks * pattern / pattern.std()
+        self._back = gaussian_filter(self._rng.normal(size=(64, _FINE)), 3.0)
+        self._back *= self.look.marks / self._back.std()
+
+    def background(self) -> Grey:
+        """(H, W) the empty scene, filmed once."""
+        return self._film(self._ground)
+
+    def top(self, midline_px: Floats, half_width_px: Floats) -> Grey:
+        """(H, W) the fish from above: midline (P, 2), x right and y up; half widths (S,)."""
+        points, width = _fine(midline_px, half_width_px)
+        image = self._ground.copy()
+        rows, columns = _box(image.shape, points, width.max() + 3.0)
+        y, x = np.mgrid[rows, columns]
+        here = np.column_stack([x.ravel(), -y.ravel()]).astype(float)
+        far, near = cKDTree(points).query(here)
+        covered = np.clip(width[near] - far + 0.5, 0.0, 1.0).reshape(x.shape)
+        across = np.clip(far / np.maximum(width[near], 1e-9) * 31.0, 0, 63).astype(int)
+        grey = self.look.fish + self._back[across, near].reshape(x.shape)
+        return self._put(image, rows, columns, covered, grey)
+
+    def side(self, midline_px: Floats, half_wide_px: Floats, half_high_px: Floats) -> Grey:
+        """(H, W) the fish from the side: spine (P, 2) in x and height; half axes (P,) of sections.
+
+        Each section appears as an ellipse, ``half_wide_px`` along x.
+        """
+        points, wide = _fine(midline_px, half_wide_px)
+        apart = np.hypot(*np.diff(points[::2], axis=0).T).max()
+        wide = np.maximum(wide, max(0.7, 1.5 * float(apart)))  # no gaps between sections
+        high = _fine(midline_px, half_high_px)[1]
+        image = self._ground.copy()
+        rows, columns = _box(image.shape, points, max(high.max(), wide.max()) + 3.0)
+        y, x = np.mgrid[rows, columns]
+        inside = np.full(x.shape, -np.inf)
+        for (cx, cz), a, b in zip(points[::2], wide[::2], high[::2], strict=True):
+            reach = np.sqrt(((x - cx) / a) ** 2 + ((-y - cz) / b) ** 2)
+            slope = np.sqrt((x - cx) ** 2 / a**4 + (-y - cz) ** 2 / b**4)
+            inside = np.maximum(inside, reach * (1.0 - reach) / np.maximum(slope, 1e-9))
+        covered = np.clip(inside + 0.5, 0.0, 1.0)
+        return self._put(image, rows, columns, covered, np.full(x.shape, self.look.fish))
+
+    def _put(
+        self, image: Floats, rows: slice, columns: slice, covered: Floats, grey: Floats
+    ) -> Grey:
+        whole = np.zeros_like(image)
+        whole[rows, columns] = covered
+        if self.look.shadow:
+            soft = shift(gaussian_filter(whole, 6.0), (7.0, 5.0), order=1)
+            image = image - self.look.shadow * soft
+        image[rows, columns] += covered * (grey - image[rows, columns])
+        return self._film(image)
+
+    def _film(self, image: Floats) -> Grey:
+        seen = gaussian_filter(image, self.look.blur_px) if self.look.blur_px else image
+        seen = seen + self._rng.normal(size=image.shape) * self.look.noise
+        return np.clip(np.rint(seen), 0, 255).astype(np.uint8)
+
+
+def _fine(points: Floats, size: Floats) -> tuple[Floats, Floats]:
+    at = np.linspace(0.0, 1.0, _FINE)
+    known = np.linspace(0.0, 1.0, len(points))
+    fine = np.column_stack([np.interp(at, known, points[:, k]) for k in range(2)])
+    return fine, np.interp(at, np.linspace(0.0, 1.0, len(size)), size)
+
+
+def _box(shape: tuple[int, ...], points: Floats, margin: float) -> tuple[slice, slice]:
+    low = np.floor(points.min(axis=0) - margin).astype(int)
+    high = np.ceil(points.max(axis=0) + margin).astype(int)
+    rows = slice(max(-int(high[1]), 0), max(min(-int(low[1]) + 1, shape[0]), 1))
+    columns = slice(max(int(low[0]), 0), max(min(int(high[0]) + 1, shape[1]), 1))
+    return rows, columns

@@ -1,0 +1,109 @@
+"""Films on disk to what matching looks at: grey pictures and the fish's silhouettes."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Image
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.fish.matching import Seen
+from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.image.background import look_of, median_background
+from snakewalk.controller.capture.image.silhouette import Look, contrast, silhouette_of
+from snakewalk.controller.capture.image.video import Footage, open_footage, read_image
+
+_FOR_BACKGROUND = 31
+_THIN = 0.5  # of the silhouette's threshold: what hangs together with it belongs to it
+_SURE = 12.0  # grey values above the ground at least
+
+
+@dataclass(frozen=True, slots=True)
+class FishFilm:
+    """One camera's film, its empty scene, and how the fish stands out from it."""
+
+    footage: Footage
+    background: Image
+    look: Look
+
+    def frames(self) -> Iterator[Seen]:
+        """Every frame, from the start each time.
+
+        Raises:
+            InputError: a frame of another size than the background, or that cannot be read.
+
+        """
+        for image in self.footage.read():
+            if image.shape[:2] != self.background.shape[:2]:
+                raise InputError(
+                    f"{self.footage.path}: a frame of {image.shape[1]} x {image.shape[0]} pixels "
+                    f"over a background of {self.background.shape[1]} x {self.background.shape[0]}"
+                )
+            yield seen(image, self.background, self.look)
+
+
+def open_film(path: Path, background: Path | None = None, rate_hz: float | None = None) -> FishFilm:
+    """Open a video or a folder of images.
+
+    Args:
+        path: of the film.
+        background: picture of the empty scene; the median of the film's frames without it.
+        rate_hz: frames a second, instead of what the file says.
+
+    Raises:
+        InputError: nothing that can be read.
+
+    """
+    footage = open_footage(path, rate_hz)
+    some = [grey(image) for image in footage.some(_FOR_BACKGROUND)]
+    if len({image.shape for image in some}) > 1:
+        raise InputError(f"{path}: its frames differ in size")
+    empty = grey(read_image(background)) if background is not None else median_background(some)
+    if empty.shape != some[0].shape:
+        raise InputError(
+            f"{background}: {empty.shape[1]} x {empty.shape[0]} pixels; the film has "
+            f"{some[0].shape[1]} x {some[0].shape[0]}"
+        )
+    return FishFilm(footage, empty, look_of(some[len(some) // 2], empty))
+
+
+def seen(image: Image, background: Image, look: Look = Look.BOTH) -> Seen:
+    """Cut the fish out of one frame; the mask is empty where nothing stands out.
+
+    A tail fin seen on edge is thinner than the blur of the picture and has not half the body's
+    contrast: what hangs together with the body at less belongs to it.
+
+    Args:
+        image: (H, W) or (H, W, 3), 8 bit.
+        background: (H, W) the same without the fish.
+        look: whether the fish is darker or lighter than its ground.
+
+    """
+    plain = grey(image)
+    found = silhouette_of(plain, background, look)
+    mask = np.zeros(plain.shape, dtype=bool)
+    if found.area_px > 0.0:
+        left, top = (int(at) for at in found.origin_px)
+        rows, columns = found.level.shape
+        edge = max(4, max(rows, columns) // 4)
+        part = (
+            slice(max(0, top - edge), top + rows + edge),
+            slice(max(0, left - edge), left + columns + edge),
+        )
+        apart = cv2.GaussianBlur(contrast(plain[part], background[part], look), (3, 3), 0.0)
+        low = max(_THIN * found.threshold, float(np.median(apart)) + _SURE)
+        _, label = cv2.connectedComponents((apart > low).astype(np.uint8), connectivity=8)
+        core = np.zeros(label.shape, dtype=bool)
+        core[top - part[0].start :, left - part[1].start :][:rows, :columns] = found.mask
+        kept = np.unique(label[core])
+        mask[part] = np.isin(label, kept[kept > 0])
+    return Seen(plain, mask, "" if found.verdict is Verdict.GOOD else str(found.verdict))
+
+
+def grey(image: Image) -> Image:
+    """(H, W) brightness of a grey or colour image."""
+    if image.ndim == 2:
+        return image
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)

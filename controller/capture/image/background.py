@@ -1,0 +1,79 @@
+"""The ground without the animal: the median of frames, or a smooth surface fitted to one frame."""
+
+from collections.abc import Iterator, Sequence
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Image
+from snakewalk.controller.capture.image.silhouette import Look
+
+_GRID_PX = 64  # longest side of the picture to which the surface is fitted
+_ROUNDS = 4
+_STRONGEST_PX = 20.0  # pixels that say what the animal looks like
+_LATE = 0.85  # a dark animal may stay on a place for so long a part of the time
+
+
+def median_background(frames: Sequence[Image]) -> Image:
+    """(H, W[, 3]) median over frames of one size; right where the animal is gone half the time."""
+    return _part_of(np.stack(frames), 0.5)
+
+
+def spread_backgrounds(frames: Sequence[Image]) -> Iterator[tuple[Image, Look | None, str]]:
+    """The median over frames, and for slow animals the light and the dark end of what was seen.
+
+    Yields:
+        background (H, W[, 3]), the look that it supposes (None: any), and its name.
+
+    """
+    stack = np.stack(frames)
+    yield _part_of(stack, 0.5), None, "the median of frames"
+    yield _part_of(stack, _LATE), Look.DARK, "the lighter frames at each place"
+    yield _part_of(stack, 1.0 - _LATE), Look.LIGHT, "the darker frames at each place"
+
+
+def _part_of(stack: Image, part: float) -> Image:
+    place = round(part * (len(stack) - 1))
+    return np.ascontiguousarray(np.partition(stack, place, axis=0)[place])
+
+
+def smooth_background(image: Image) -> Image:
+    """A background from the frame itself: a second-order surface through all but the animal.
+
+    For an animal that hardly moves, and for images cropped to it: the ground must be plain, but
+    its light may be uneven.
+    """
+    if image.ndim == 3:
+        return np.dstack([smooth_background(image[..., k]) for k in range(image.shape[2])])
+    rows, columns = image.shape
+    shrink = max(1.0, max(rows, columns) / _GRID_PX)
+    size = (max(4, round(columns / shrink)), max(4, round(rows / shrink)))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    grey = np.asarray(small, dtype=float).ravel()
+    y, x = np.meshgrid(*(np.linspace(-1.0, 1.0, side) for side in small.shape), indexing="ij")
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 6)
+    rest = grey - np.median(grey)
+    for _ in range(_ROUNDS):
+        spread = 1.4826 * float(np.median(np.abs(rest - np.median(rest)))) + 1.0
+        kept = np.abs(rest - np.median(rest)) < 2.5 * spread
+        some = terms[kept]
+        fit = np.linalg.solve(some.T @ some + 1e-6 * np.eye(6), some.T @ grey[kept])
+        rest = grey - terms @ fit
+    surface = np.clip((terms @ fit).reshape(small.shape), 0.0, 255.0).astype(np.float32)
+    whole = cv2.resize(surface, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(np.rint(whole), dtype=np.uint8)
+
+
+def look_of(image: Image, background: Image) -> Look:
+    """Whether what stands out most is darker or lighter than the ground, or both."""
+    apart = image.astype(np.int16) - background
+    if apart.ndim == 3:
+        strongest = np.argmax(np.abs(apart), axis=2)[..., None]
+        apart = np.take_along_axis(apart, strongest, axis=2)[..., 0]
+    smooth = np.asarray(cv2.GaussianBlur(apart, (5, 5), 0.0), dtype=float) - np.median(apart)
+    part = min(0.5, _STRONGEST_PX / smooth.size)
+    edge = 0.5 * float(np.percentile(np.abs(smooth), 100.0 - 100.0 * part))
+    dark, light = np.count_nonzero(smooth < -edge), np.count_nonzero(smooth > edge)
+    if max(dark, light) < 4 * min(dark, light):
+        return Look.BOTH
+    return Look.DARK if dark > light else Look.LIGHT

@@ -1,0 +1,288 @@
+"""Equal chords along a curve: ``N`` consecutive points on it, first at A, last at B ([PT] 2.3).
+
+Steepest descent on the chord as in [PT], Algorithm 1, with the corrections of the errata: it is
+bracketed and bisected where it does not settle, then chords that end at a later crossing of their
+circle are tried, and a curve without a solution is an error, never an unequal partition.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Ints
+from snakewalk.drivers.compiling import compiled, seen
+
+TOLERANCE = 1e-9
+"""Of the last point's place, in curve lengths."""
+_RATE = 0.95  # of the correction; 1 would be Newton's step for a straight curve
+_DESCENTS = 12
+_BISECTIONS = 80
+_SCAN = 96  # chords tried between the least and the greatest possible one
+_BENT = 1.05  # arc over chord from which several solutions are looked for
+
+
+class NoEquipartitionError(ValueError):
+    """No chord was found that divides this curve equally."""
+
+
+@dataclass(frozen=True, slots=True)
+class Equipartition:
+    """Points at equal chords."""
+
+    points: Floats
+    """(N + 1, 2), the first and the last one the curve's ends."""
+    at: Floats
+    """(N + 1,) arc length at the points, increasing."""
+    chord: float
+    """Distance of neighbouring points, in the curve's unit."""
+    way: str
+    """How it was found: ``descent``, ``bisection``, ``bisector`` (2 chords), ``later crossing``."""
+    solutions: int
+    """Solutions found, of which this is the closest to the curve; 1 where none was looked for, as
+    no chord leaves its arc by more than 5 %."""
+    distance: float
+    """Mean distance of the curve from the chords."""
+
+
+class _Curve:
+    """The curve continued straight past B, so that overshoot has a sign."""
+
+    def __init__(self, curve: Floats, segments: int) -> None:
+        step = np.hypot(*np.diff(curve, axis=0).T)
+        kept = curve[np.concatenate([[True], step > 0.0])]
+        step = step[step > 0.0]
+        self.arc = np.concatenate([[0.0], np.cumsum(step)])
+        self.length = float(self.arc[-1])
+        far = 3.0 * self.length
+        end = kept[-1] + (kept[-1] - kept[-2]) * (far / step[-1])
+        self.curve = kept
+        self.line = np.ascontiguousarray(np.vstack([kept, end]))
+        self.line_arc = np.append(self.arc, self.length + far)
+        self.segments = segments
+        self.first: Ints = np.zeros(segments, dtype=np.int64)
+        self.points = np.empty((segments + 1, 2))
+        self.at = np.empty(segments + 1)
+        # N chords are no longer than the curve, and no shorter than the way from A to B
+        self.least = float(np.hypot(*(kept[-1] - kept[0]))) / segments
+        self.most = self.length / segments
+
+    def residual(self, chord: float, crossing: Ints | None = None) -> float:
+        """Signed arc from B to where the last point came to lie; NaN if it does not exist."""
+        taken = self.first if crossing is None else crossing
+        done = march(self.line, self.line_arc, chord, taken, self.points, self.at)
+        return float(self.at[-1]) - self.length if done == self.segments else float("nan")
+
+    def solution(self, chord: float, way: str, crossing: Ints | None = None) -> Equipartition:
+        self.residual(chord, crossing)
+        points, at = self.points.copy(), self.at.copy()
+        points[-1], at[-1] = self.curve[-1], self.length
+        return Equipartition(points, at, chord, way, 1, self.distance(points, at))
+
+    def distance(self, points: Floats, at: Floats) -> float:
+        of = np.clip(np.searchsorted(at, self.arc, side="right") - 1, 0, self.segments - 1)
+        along = (points[of + 1] - points[of]) / np.hypot(*(points[of + 1] - points[of]).T)[:, None]
+        away = self.curve - points[of]
+        apart = np.abs(away[:, 0] * along[:, 1] - away[:, 1] * along[:, 0])
+        return float(np.trapezoid(apart, self.arc)) / self.length
+
+
+def equipartition(curve: Floats, segments: int = 100) -> Equipartition:
+    """Divide ``curve`` (M, 2), M 2 or more, into ``segments`` equal chords.
+
+    Where a chord leaves its arc by more than 5 % (few chords on a strong bend) all solutions by
+    first crossings are looked for, for 8 segments or fewer also those by later crossings, and the
+    closest to the curve is taken.
+
+    Raises:
+        ValueError: wrong shape, not finite, no length, or no segments.
+        NoEquipartitionError: no solution was found.
+
+    """
+    if curve.ndim != 2 or curve.shape[1] != 2 or len(curve) < 2 or not np.isfinite(curve).all():
+        raise ValueError(f"a curve is (2 or more, 2) finite points, not {curve.shape}")
+    if segments < 1:
+        raise ValueError(f"1 segment or more, not {segments}")
+    if not np.ptp(curve, axis=0).any():
+        raise ValueError("the curve has no length")
+    given = _Curve(np.asarray(curve, dtype=float), segments)
+    if segments == 1:
+        if given.least <= TOLERANCE * given.length:
+            raise NoEquipartitionError("one chord cannot span a closed curve")
+        ends = given.curve[[0, -1]]
+        whole = np.array([0.0, given.length])
+        return Equipartition(ends, whole, given.least, "descent", 1, given.distance(ends, whole))
+    if segments == 2:
+        return _halves(given)
+    found = _descend(given)
+    if found is not None and _fits(found):
+        return found
+    return _closest(given, found)
+
+
+def _fits(found: Equipartition) -> bool:
+    return float(np.diff(found.at).max()) <= _BENT * found.chord
+
+
+def _halves(given: _Curve) -> Equipartition:
+    """Two chords meet where the curve crosses the perpendicular bisector of AB: it always does."""
+    curve, arc = given.curve, given.arc
+    side = ((curve - curve[0]) ** 2 - (curve - curve[-1]) ** 2).sum(axis=1)
+    if given.least <= TOLERANCE * given.length:
+        side = arc - 0.5 * given.length  # A is B: any point will do, take the middle
+    found = []
+    for k in np.flatnonzero((side[:-1] < 0.0) != (side[1:] < 0.0)):
+        part = side[k] / (side[k] - side[k + 1])
+        points = np.stack([curve[0], curve[k] + part * (curve[k + 1] - curve[k]), curve[-1]])
+        at = np.array([0.0, arc[k] + part * (arc[k + 1] - arc[k]), given.length])
+        chord = float(np.hypot(*(points[1] - points[0])))
+        found.append(Equipartition(points, at, chord, "bisector", 1, given.distance(points, at)))
+    best = min(found, key=lambda one: one.distance)
+    return replace(best, solutions=len(found))
+
+
+def _descend(given: _Curve) -> Equipartition | None:
+    """[PT] Algorithm 1: correct the chord by the mean arc error; bisect where that cycles."""
+    tolerance = TOLERANCE * given.length
+    low, high, chord = 0.0, np.inf, given.most
+    for _ in range(_DESCENTS):
+        error = given.residual(chord)
+        if abs(error) <= tolerance:
+            return given.solution(chord, "descent")
+        low, high = (chord, high) if error < 0.0 else (low, chord)
+        chord -= _RATE * error / given.segments
+        if not low < chord < high:
+            break
+    if low == 0.0:
+        low = max(given.least * (1.0 - 1e-12), 1e-6 * given.most)
+    if not np.isfinite(high):
+        high = given.most
+    root = _bisect(given, low, high)
+    return None if root is None else given.solution(root, "bisection")
+
+
+def _bisect(given: _Curve, low: float, high: float, crossing: Ints | None = None) -> float | None:
+    """The chord between two of opposite sign; None where the residual jumps past zero."""
+    tolerance = TOLERANCE * given.length
+    rising = given.residual(low, crossing) < 0.0
+    for _ in range(_BISECTIONS):
+        chord = 0.5 * (low + high)
+        error = given.residual(chord, crossing)
+        if abs(error) <= tolerance:
+            return chord
+        if np.isnan(error) or chord in {low, high}:
+            return None
+        low, high = (chord, high) if (error < 0.0) == rising else (low, chord)
+    return None
+
+
+def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
+    """Look for every solution and take the one closest to the curve."""
+    found = [] if known is None else [known]
+    for way, crossing in _ways(given.segments, search=known is None):
+        for chord in _roots(given, crossing):
+            if all(abs(chord - other.chord) > 1e-7 * given.most for other in found):
+                found.append(given.solution(chord, way, crossing))
+        if way == "later crossing" and found and given.segments > 8:
+            break
+    if not found:
+        raise NoEquipartitionError(
+            f"no {given.segments} equal chords on this curve of {len(given.curve)} points"
+        )
+    best = min(found, key=lambda one: one.distance)
+    return Equipartition(best.points, best.at, best.chord, best.way, len(found), best.distance)
+
+
+def _ways(segments: int, *, search: bool) -> Iterator[tuple[str, Ints]]:
+    """First crossings, then one later crossing at any step, then (few segments) at two steps."""
+    crossing: Ints = np.zeros(segments, dtype=np.int64)
+    yield "bisection", crossing
+    if segments > 8 and not search:
+        return
+    most = 5 if segments == 3 else 2
+    for steps in range(1, 3 if segments <= 8 else 2):
+        for places in combinations(range(segments), steps):
+            for number in np.ndindex(*(most,) * steps):
+                later = crossing.copy()
+                later[list(places)] = np.array(number) + 1
+                yield "later crossing", later
+
+
+def _roots(given: _Curve, crossing: Ints) -> Iterator[float]:
+    tried = np.linspace(max(given.least, 1e-6 * given.most), given.most, _SCAN)
+    errors = np.array([given.residual(chord, crossing) for chord in tried])
+    for k in np.flatnonzero(np.abs(errors) <= TOLERANCE * given.length):
+        yield float(tried[k])
+    for k in np.flatnonzero(errors[:-1] * errors[1:] < 0.0):
+        root = _bisect(given, float(tried[k]), float(tried[k + 1]), crossing)
+        if root is not None:
+            yield root
+
+
+@compiled(
+    f"int64({seen(dimensions=2, layout='C')}, {seen(layout='C')}, float64,"
+    f" {seen('int64', layout='C')}, float64[:, ::1], float64[::1])"
+)
+def march(
+    line: Floats, arc: Floats, chord: float, crossing: Ints, points: Floats, at: Floats
+) -> int:
+    """Write the points at distance ``chord`` from one another along ``line``.
+
+    Args:
+        line: (M, 2) vertices; the last piece should be long enough that no step leaves it.
+        arc: (M,) arc length at the vertices.
+        chord: length of every step.
+        crossing: (N,) which crossing of its circle each step takes, 0 the first.
+        points: (N + 1, 2) written.
+        at: (N + 1,) arc length of them, written.
+
+    Returns:
+        N, or fewer steps where the wanted crossing does not exist.
+
+    """
+    px, py, here = line[0, 0], line[0, 1], 0.0
+    points[0, 0], points[0, 1], at[0] = px, py, 0.0
+    piece = 0
+    square = chord * chord
+    for step in range(crossing.shape[0]):
+        left = crossing[step]
+        found = False
+        j = piece
+        while j + 1 < line.shape[0] and not found:
+            ex, ey = line[j + 1, 0] - px, line[j + 1, 1] - py
+            if left == 0 and ex * ex + ey * ey < square:
+                # for the first crossing the piece so far lies inside the circle; for a later one
+                # it may cut the circle twice, which the roots below would tell
+                ax, ay = line[j, 0] - px, line[j, 1] - py
+                if j == piece or ax * ax + ay * ay < square:
+                    j += 1
+                    continue
+            ax, ay = line[j, 0], line[j, 1]
+            low = 0.0
+            if j == piece:
+                ax, ay = px, py
+            dx, dy = line[j + 1, 0] - ax, line[j + 1, 1] - ay
+            a = dx * dx + dy * dy
+            if a > 0.0:
+                b = dx * (ax - px) + dy * (ay - py)
+                c = (ax - px) ** 2 + (ay - py) ** 2 - square
+                inside = b * b - a * c
+                if inside >= 0.0:
+                    root = np.sqrt(inside)
+                    for side in range(2):
+                        t = (-b - root) / a if side == 0 else (-b + root) / a
+                        if low < t <= 1.0 and not found:
+                            if left > 0:
+                                left -= 1
+                                continue
+                            begin = here if j == piece else arc[j]
+                            here = begin + t * np.sqrt(a)
+                            px, py = ax + t * dx, ay + t * dy
+                            piece = j
+                            found = True
+            j += 1
+        if not found:
+            return step
+        points[step + 1, 0], points[step + 1, 1], at[step + 1] = px, py, here
+    return int(crossing.shape[0])

@@ -1,0 +1,147 @@
+"""The silhouette of one animal: where a frame differs from its background ([PT] 2.2)."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Image
+from snakewalk.controller.capture.frame_status import Verdict
+
+_MARGIN = 4
+_CLEAR = 6.0  # standard deviations of the noise that an animal's pixel must stand out
+_LEAST_PX = 12
+_RIVAL = 0.4  # of the largest body's size: a second animal, not dirt
+_SHRUNK_PX = 400  # longest side of the picture on which the noise is measured
+
+
+class Look(StrEnum):
+    """How the animal stands out from its ground."""
+
+    DARK = "dark"
+    LIGHT = "light"
+    BOTH = "both"
+
+
+@dataclass(frozen=True, slots=True)
+class Silhouette:
+    """One body in one image, cut out."""
+
+    level: NDArray[np.float32]
+    """(h, w) contrast against the background, grey values; other things in the cut-out are 0."""
+    threshold: float
+    """Contrast at the boundary: half of the body's own."""
+    least: float
+    """Contrast that noise alone may reach."""
+    origin_px: tuple[float, float]
+    """x, y of the cut-out's first pixel in the image."""
+    area_px: float
+    company: float
+    """Size of the next largest thing that stands out, of this body's; noise and dirt count."""
+    verdict: Verdict
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """(h, w) the body."""
+        return np.asarray(self.level > self.threshold)
+
+
+def contrast(image: Image, background: Image, look: Look) -> Image:
+    """(H, W) how much each pixel stands out; of a colour image its strongest channel."""
+    if look is Look.BOTH:
+        apart = cv2.absdiff(image, background)
+    elif look is Look.DARK:
+        apart = cv2.subtract(background, image)
+    else:
+        apart = cv2.subtract(image, background)
+    if apart.ndim == 3:
+        one, two, three = (cv2.extractChannel(apart, k) for k in range(3))
+        apart = cv2.max(cv2.max(one, two, dst=one), three, dst=one)
+    return np.asarray(apart)
+
+
+def noise_of(apart: Image) -> tuple[float, float]:
+    """Middle and spread of the contrast where nothing is: it is taken from every n-th pixel."""
+    every = max(1, min(apart.shape) // _SHRUNK_PX + 1)
+    some = apart[::every, ::every].ravel()
+    middle = float(np.median(some))
+    above = some[some >= middle].astype(float) - middle
+    return middle, float(1.4826 * np.median(above)) + 0.5
+
+
+def silhouette_of(image: Image, background: Image, look: Look = Look.BOTH) -> Silhouette:
+    """Find the animal of one frame.
+
+    Args:
+        image: (H, W) or (H, W, 3), 8 bit.
+        background: the same without the animal.
+        look: whether the animal is darker or lighter than its ground.
+
+    """
+    apart: Image = np.asarray(
+        cv2.GaussianBlur(contrast(image, background, look), (3, 3), 0.0), dtype=np.uint8
+    )
+    middle, spread = noise_of(apart)
+    sure = middle + _CLEAR * spread
+    found = _parts((apart > sure).astype(np.uint8))
+    if found is None:
+        return nothing()
+    label, stats = found
+    best = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    left, top, wide, high, _ = (int(v) for v in stats[best])
+    inside = apart[top : top + high, left : left + wide]
+    own = inside[label[top : top + high, left : left + wide] == best]
+    threshold = max(middle + 0.5 * (float(np.percentile(own, 70)) - middle), middle + 3.0 * spread)
+    return _cut_out(apart, threshold, sure)
+
+
+def nothing() -> Silhouette:
+    """No animal."""
+    empty = np.zeros((1, 1), dtype=np.float32)
+    return Silhouette(empty, 0.5, 0.0, (0.0, 0.0), 0.0, 0.0, Verdict.NOTHING)
+
+
+def _parts(mask: Image) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
+    """Labels and statistics of the parts, looked for only where there is anything."""
+    left, top, wide, high = cv2.boundingRect(mask)
+    if wide * high < _LEAST_PX:
+        return None
+    window = (slice(top, top + high), slice(left, left + wide))
+    count, inner, stats, _ = cv2.connectedComponentsWithStats(mask[window], connectivity=8)
+    if count < 2 or stats[1:, cv2.CC_STAT_AREA].max() < _LEAST_PX:
+        return None
+    label = np.zeros(mask.shape, dtype=np.int32)
+    label[window] = inner
+    stats[:, cv2.CC_STAT_LEFT] += left
+    stats[:, cv2.CC_STAT_TOP] += top
+    return label, np.asarray(stats, dtype=np.int32)
+
+
+def _cut_out(apart: Image, threshold: float, sure: float) -> Silhouette:
+    """The largest body above the threshold, with a margin, and whether it is alone and whole."""
+    found = _parts((apart > threshold).astype(np.uint8))
+    if found is None:
+        return nothing()
+    label, stats = found
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    best = 1 + int(np.argmax(areas))
+    left, top, wide, high, area = (int(v) for v in stats[best])
+    rows, columns = apart.shape
+    verdict = Verdict.GOOD
+    company = float(np.sort(areas)[-2:-1].sum()) / area
+    if company > _RIVAL:
+        verdict = Verdict.SEVERAL
+    elif left == 0 or top == 0 or left + wide == columns or top + high == rows:
+        verdict = Verdict.CUT
+    window = (
+        slice(max(0, top - _MARGIN), min(rows, top + high + _MARGIN)),
+        slice(max(0, left - _MARGIN), min(columns, left + wide + _MARGIN)),
+    )
+    level = apart[window].astype(np.float32)
+    other = (label[window] != best) & (label[window] != 0)
+    if other.any():
+        level[cv2.dilate(other.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = 0.0
+    origin = (float(window[1].start), float(window[0].start))
+    return Silhouette(level, threshold, sure, origin, float(area), company, verdict)

@@ -1,0 +1,49 @@
+"""The skin's picture: the body in an image, unrolled to a strip along the skeleton ([PT] 2.2)."""
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.controller.capture.resample import SEGMENTS, equal_arc_length
+
+ALONG, ACROSS = 512, 64
+"""Pixels of the strip."""
+_MIXED_PX = 0.75  # at the boundary pixels are partly background
+
+
+def unroll(image: Image, points_px: Floats, radius_px: Floats) -> Image:
+    """Sample an image (H, W) or (H, W, 3) across the body.
+
+    Args:
+        image: grey or colour.
+        points_px: (P, 2) skeleton in it, x and y with rows downwards, head first; whole numbers are
+            centres of pixels.
+        radius_px: (P,) distances to the boundary.
+
+    Returns:
+        (64, 512, 3): head at the left, the body's left side in the first row.
+
+    Raises:
+        ValueError: fewer than 4 distinct points.
+
+    """
+    colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
+    chord = np.hypot(*np.diff(points_px, axis=0).T)
+    arc = np.concatenate([[0.0], np.cumsum(chord)])
+    even = equal_arc_length(points_px, SEGMENTS)
+    at = np.linspace(0.0, 1.0, ALONG)
+    along = np.linspace(0.0, 1.0, SEGMENTS + 1)
+    centre = np.stack([np.interp(at, along, even[:, k]) for k in range(2)], axis=-1)
+    radius = np.interp(at, arc / arc[-1], radius_px)
+    radius = np.maximum(radius - _MIXED_PX, 0.5 * radius)
+    forward = -np.gradient(centre, axis=0)
+    forward /= np.hypot(*forward.T)[:, None]
+    left = np.stack([forward[:, 1], -forward[:, 0]], axis=-1)  # rows count down
+    side = np.linspace(1.0, -1.0, ACROSS)
+    place = centre[None] + (side[:, None] * radius)[..., None] * left[None]
+    at_px = [place[..., 1], place[..., 0]]
+    channels = [
+        map_coordinates(colour[..., k].astype(float), at_px, order=1, mode="nearest")
+        for k in range(3)
+    ]
+    return np.asarray(np.clip(np.rint(np.stack(channels, axis=-1)), 0, 255), dtype=np.uint8)

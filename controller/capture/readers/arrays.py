@@ -1,0 +1,171 @@
+"""Recordings as numpy files: our own tracks, skeletons found in images, and joint angles."""
+
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.resample import body_points
+from snakewalk.controller.capture.track import Track, track_from_points
+
+SKELETON_RATE_HZ = 30.0
+JOINT_RATE_HZ = 32.0
+"""Taken when nobody says otherwise: neither kind of file holds a frame rate."""
+_BODIES = ("points", "angles_rad", "x", "y", "skeletons")
+ARRAYS = {*_BODIES, "t", "rate_hz", "length_m", "score", "name", "source", "licence"}
+"""What is read of an .npz; others, such as the widths of a body, stay in the file."""
+
+
+def save_track(path: Path, track: Track) -> None:
+    """Write our own format: points (dropped frames as NaN), rate_hz, length_m (NaN: no scale)."""
+    number = np.rint(track.time_s * track.rate_hz).astype(int)
+    points = np.full((number[-1] + 1, *track.points.shape[1:]), np.nan)
+    points[number] = track.points
+    np.savez_compressed(
+        path,
+        points=points,
+        rate_hz=track.rate_hz,
+        length_m=np.nan if track.length_m is None else track.length_m,
+        name=track.name,
+        source=track.source,
+        licence=track.licence,
+    )
+
+
+def load_npz(file: Path, rate_hz: float | None, least_score: float | None = None) -> Track:
+    """Load the arrays of an .npz by ``track_from_arrays``; see ``formats.load_file``."""
+    try:
+        with np.load(file, allow_pickle=False) as data:
+            held = {name: np.asarray(data[name]) for name in data.files if name in ARRAYS}
+            others = [name for name in data.files if name not in ARRAYS]
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"{file}: is not an .npz of plain arrays: {error}") from None
+    return track_from_arrays(file, held, rate_hz, least_score, others)
+
+
+def track_from_arrays(
+    file: Path,
+    held: dict[str, NDArray[np.generic]],
+    rate_hz: float | None,
+    least_score: float | None = None,
+    others: Sequence[str] = (),
+) -> Track:
+    """Make a track of named arrays, as .npz and .mat hold them.
+
+    ``points`` are (T, P, 2) head first, or ``x`` and ``y`` (T, P), in metres where ``length_m`` is
+    a number; ``angles_rad`` are the (T, P) directions of equally long pieces, and ``length_m`` is
+    then the body's length. Frames a second are ``rate_hz``, or ``t`` in seconds. ``score`` (T, P)
+    is how sure the tracker was. ``skeletons`` are pixels, rows downwards.
+    """
+    given = _rate(file, held) if rate_hz is None else rate_hz
+    bodies = held.keys() & {"points", "angles_rad"} or {"x", "y"} <= held.keys()
+    if bodies and given is not None:
+        length_m = _scalar(file, "length_m", held.get("length_m", np.array(np.nan)))
+        points = _bodies(file, held, length_m if np.isfinite(length_m) else 1.0)
+        return track_from_points(
+            _text(held, "name", file.stem),
+            _sure(file, points, held, least_score),
+            given,
+            scale_m=1.0 if np.isfinite(length_m) else None,
+            source=_text(held, "source", "not stated"),
+            licence=_text(held, "licence", "not stated"),
+        )
+    if "skeletons" in held:
+        points = _floats(file, "skeletons", held["skeletons"])
+        if points.ndim == 3:
+            points = points * [1.0, -1.0]
+        points = _sure(file, points, held, least_score)
+        rate = SKELETON_RATE_HZ if given is None else given
+        return track_from_points(file.stem, points, rate, rate_assumed=given is None)
+    found = ", ".join(sorted([*held, *others])[:12]) or "none"
+    raise InputError(
+        f"{file}: expected the arrays points or angles_rad (or x and y), and rate_hz or t (and "
+        f"length_m); or skeletons; found {found}"
+    )
+
+
+def _rate(file: Path, held: dict[str, NDArray[np.generic]]) -> float | None:
+    """Frames a second that the file states; None if it states none."""
+    if "rate_hz" in held:
+        return _scalar(file, "rate_hz", held["rate_hz"])
+    if "t" not in held:
+        return None
+    step = np.diff(_floats(file, "t", held["t"]).ravel())
+    if len(step) == 0 or not (step > 0.0).all() or step.max() > 1.5 * np.median(step):
+        raise InputError(f"{file}: t must increase evenly from frame to frame, in seconds")
+    return float(1.0 / np.median(step))
+
+
+def _bodies(file: Path, held: dict[str, NDArray[np.generic]], length: float) -> Floats:
+    """Points (T, P, 2) from whichever array there is."""
+    if "points" in held:
+        return _floats(file, "points", held["points"])
+    if "angles_rad" in held:
+        angles = _floats(file, "angles_rad", held["angles_rad"])
+        if angles.ndim != 2 or angles.shape[1] < 4:
+            raise InputError(f"{file}: angles_rad must be (frames, 4 or more), {_is(angles)}")
+        return body_points(angles, length)
+    x, y = _floats(file, "x", held["x"]), _floats(file, "y", held["y"])
+    if x.shape != y.shape or x.ndim != 2:
+        raise InputError(f"{file}: x and y must both be (frames, points), not {x.shape}, {y.shape}")
+    return np.stack([x, y], axis=-1)
+
+
+def _sure(
+    file: Path, points: Floats, held: dict[str, NDArray[np.generic]], least_score: float | None
+) -> Floats:
+    """Points with those that the tracker was not sure of missing."""
+    if not least_score:
+        return points
+    if "score" not in held:
+        raise InputError(f"{file}: holds no scores to compare with a least score of {least_score}")
+    score = _floats(file, "score", held["score"])
+    if score.shape != points.shape[:2]:
+        raise InputError(f"{file}: score must be (frames, points), {_is(score)}")
+    return np.where((score < least_score)[..., None], np.nan, points)
+
+
+def load_npy(file: Path, rate_hz: float | None) -> Track:
+    """Load joint angles (T, J), rad, column 0 next to the head; see ``formats.load_file``.
+
+    Positive bends the head side to the left. Where the body was and faced is not in such a file:
+    every frame faces along x in the mean, its head at the origin.
+    """
+    try:
+        held = np.load(file, allow_pickle=False)
+    except (ValueError, OSError, EOFError) as error:
+        raise InputError(f"{file}: is not an .npy of plain numbers: {error}") from None
+    joints = _floats(file, "joint angles", np.asarray(held))
+    if joints.ndim != 2 or joints.shape[1] < 3:
+        raise InputError(f"{file}: expected joint angles (frames, 3 or more joints), {_is(joints)}")
+    link_rad = np.concatenate([np.zeros((len(joints), 1)), -np.cumsum(joints, axis=1)], axis=1)
+    points = body_points(link_rad - link_rad.mean(axis=1, keepdims=True))
+    rate = JOINT_RATE_HZ if rate_hz is None else rate_hz
+    return track_from_points(file.stem, points, rate, rate_assumed=rate_hz is None)
+
+
+def _floats(file: Path, what: str, values: NDArray[np.generic]) -> Floats:
+    if values.dtype.kind not in "fiu":
+        raise InputError(f"{file}: {what}: expected numbers, not {values.dtype}")
+    return np.asarray(values, dtype=float)
+
+
+def _scalar(file: Path, what: str, value: NDArray[np.generic]) -> float:
+    number = _floats(file, what, value)
+    if number.size != 1:
+        raise InputError(f"{file}: {what}: expected one number, {_is(number)}")
+    return float(number.reshape(()))
+
+
+def _text(held: dict[str, NDArray[np.generic]], name: str, default: str) -> str:
+    if name not in held or held[name].size != 1:
+        return default
+    return str(held[name].reshape(-1)[0])
+
+
+def _is(values: Floats) -> str:
+    return f"not an array of shape {values.shape}"

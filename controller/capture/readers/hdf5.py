@@ -1,0 +1,45 @@
+"""HDF5 files of recordings: SLEAP's analysis, DeepLabCut's table, MATLAB 7.3."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.readers.arrays import track_from_arrays
+from snakewalk.controller.capture.readers.deeplabcut import load_group
+from snakewalk.controller.capture.readers.kinds import KNOWN
+from snakewalk.controller.capture.readers.sleap import load_analysis
+from snakewalk.controller.capture.track import Track
+
+
+def load_hdf5(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
+    """Load whichever it is; see ``formats.load_file``."""
+    try:
+        with h5py.File(file, "r") as held:
+            if "tracks" in held and "track_occupancy" in held:
+                return load_analysis(file, held, rate_hz, least_score)
+            tables = [g for g in held.values() if isinstance(g, h5py.Group) and "table" in g]
+            if tables:
+                return load_group(file, tables[0], rate_hz, least_score)
+            arrays = {
+                name: _from_matlab(data)
+                for name, data in held.items()
+                if isinstance(data, h5py.Dataset)
+            }
+    except (OSError, RuntimeError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(f"{file}: is no HDF5 that can be read: {reason}; known: {KNOWN}") from None
+    if not arrays:
+        raise InputError(f"{file}: holds no arrays, and no table of DeepLabCut; known: {KNOWN}")
+    return track_from_arrays(file, arrays, rate_hz, least_score)
+
+
+def _from_matlab(data: h5py.Dataset) -> NDArray[np.generic]:
+    """One variable: MATLAB's axes are the other way round, and its text is numbers."""
+    values = np.asarray(data[()])
+    kind = data.attrs.get("MATLAB_class", b"")
+    if kind == b"char":
+        return np.array("".join(map(chr, values.ravel().tolist())))
+    return values if kind == b"" else values.T

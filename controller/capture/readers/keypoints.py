@@ -1,0 +1,58 @@
+"""Keypoints of pose trackers: what they were not sure of is missing, rows count downwards."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.track import Track, track_from_points
+
+KEYPOINT_RATE_HZ = 30.0
+"""Taken when nobody says otherwise: neither SLEAP's nor DeepLabCut's files hold a frame rate."""
+
+
+def track_from_keypoints(
+    file: Path,
+    pixels: Floats,
+    scores: Floats | None,
+    *,
+    rate_hz: float | None,
+    least_score: float,
+    frame: NDArray[np.int64] | None = None,
+) -> Track:
+    """Make a track of keypoints in the order of the file, head first.
+
+    Args:
+        file: for faults and the name.
+        pixels: (T, K, 2), columns to the right and rows downwards; NaN where nothing was seen.
+        scores: (T, K) how sure the tracker was, 0..1; None where the file says nothing.
+        rate_hz: frames a second; None takes ``KEYPOINT_RATE_HZ`` and says so.
+        least_score: keypoints below it count as missing, and their frames are left out.
+        frame: (T,) frame numbers; default 0, 1, 2...
+
+    Raises:
+        InputError: no scores to compare with, or too little is left.
+
+    """
+    if scores is None and least_score > 0.0:
+        raise InputError(f"{file}: holds no scores to compare with a least score of {least_score}")
+    if scores is not None:
+        unsure = scores < least_score  # NaN is no score: points set by hand have none
+        if least_score > 0.0 and unsure.any(axis=1).sum() > len(unsure) - 2:
+            worst = np.nanmedian(scores, axis=0)
+            raise InputError(
+                f"{file}: in {int(unsure.any(axis=1).sum())} of {len(unsure)} frames a keypoint "
+                f"scores less than {least_score:g} (keypoint {int(np.argmin(worst)) + 1}, the "
+                f"least sure, {worst.min():.2f} in the median); lower the least score, or export "
+                "fewer keypoints"
+            )
+        pixels = np.where(unsure[..., None], np.nan, pixels)
+    return track_from_points(
+        file.stem,
+        pixels * [1.0, -1.0],
+        KEYPOINT_RATE_HZ if rate_hz is None else rate_hz,
+        frame=frame,
+        rate_assumed=rate_hz is None,
+    )

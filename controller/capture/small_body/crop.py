@@ -1,0 +1,95 @@
+"""What is kept of a frame for the fit: a small body and the ground around it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Image
+
+LONGEST_PX = 120.0
+"""Bodies up to this length are fitted."""
+_AROUND = 0.3  # of the length, kept on each side
+_LEAST_AROUND_PX = 12.0
+_SOFTEN = 0.4  # working px, before pixels are left out
+_OWN_BLUR = 0.5  # working px: with that of going between pixels
+_WORKING_PX = 48.0  # length of the body while it is fitted, at most
+
+
+@dataclass(frozen=True, slots=True)
+class Glimpse:
+    """A cut-out of a frame and of its ground."""
+
+    image: Image
+    ground: Image
+    origin_px: tuple[int, int]
+    """x, y of its first pixel."""
+
+
+def glimpse(image: Image, ground: Image, points_px: Floats) -> Glimpse:
+    """Cut the body of (P, 2) points out."""
+    length = float(np.hypot(*np.diff(points_px, axis=0).T).sum())
+    reach = max(_AROUND * length, _LEAST_AROUND_PX)
+    left, top = np.maximum(np.floor(points_px.min(axis=0) - reach), 0.0).astype(int)
+    right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int) + 1
+    window = (slice(int(top), int(bottom)), slice(int(left), int(right)))
+    return Glimpse(image[window].copy(), ground[window].copy(), (int(left), int(top)))
+
+
+@dataclass(frozen=True, slots=True)
+class Workspace:
+    """The grid on which a film is fitted: whole pixels, or larger ones for longer bodies."""
+
+    scale: float
+    """Working pixels a pixel, at most 1."""
+    channels: Floats
+    """(C,) how channels are weighted: as the body stands out; 1 for grey images."""
+
+    @classmethod
+    def of(cls, glimpses: Sequence[Glimpse], length_px: float) -> "Workspace":
+        """Choose it from some frames."""
+        scale = min(1.0, _WORKING_PX / length_px)
+        if glimpses[0].image.ndim == 2:
+            # above 0 where the body is: which sign that is, the strongest pixels say
+            strong = np.concatenate([_strongest(one) for one in glimpses])
+            return cls(scale, np.array([np.sign(np.median(strong)) or 1.0]))
+        apart = np.median(np.concatenate([_strongest(one) for one in glimpses]), axis=0)
+        return cls(scale, apart / max(float(np.linalg.norm(apart)), 1e-9))
+
+    def to_px(self, points: Floats) -> Floats:
+        """Pixels of working coordinates."""
+        return (points + 0.5) / self.scale - 0.5
+
+    def from_px(self, points_px: Floats) -> Floats:
+        """Working coordinates of pixels."""
+        return (points_px + 0.5) * self.scale - 0.5
+
+    def blur_px(self, spot: float) -> float:
+        """Blur of the image, from that on the working grid, which adds its own."""
+        own = 0.0 if self.scale == 1.0 else _OWN_BLUR
+        return float(np.sqrt(max(spot**2 - own**2, 0.09))) / self.scale
+
+    def contrast(self, seen: Glimpse) -> tuple[Floats, tuple[int, int]]:
+        """Picture (h, w) on the working grid, above 0 where the body is, and its first pixel."""
+        apart = seen.ground.astype(np.float32) - seen.image.astype(np.float32)
+        apart = apart.reshape(*apart.shape[:2], -1) @ self.channels.astype(np.float32)
+        if self.scale == 1.0:
+            return np.asarray(apart, dtype=float), seen.origin_px
+        apart = np.asarray(cv2.GaussianBlur(apart, (0, 0), _SOFTEN / self.scale), dtype=np.float32)
+        size = np.array(apart.shape[::-1])
+        first = np.ceil(self.from_px(np.array(seen.origin_px, dtype=float))).astype(int)
+        last = np.floor(self.from_px(np.array(seen.origin_px) + size - 1.0)).astype(int)
+        there = self.to_px(first.astype(float)) - seen.origin_px
+        back = np.array([[1.0 / self.scale, 0.0, there[0]], [0.0, 1.0 / self.scale, there[1]]])
+        wide, high = (int(v) for v in last - first + 1)
+        how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        small = cv2.warpAffine(apart, back, (wide, high), flags=how)
+        return np.asarray(small, dtype=float), (int(first[0]), int(first[1]))
+
+
+def _strongest(seen: Glimpse) -> Floats:
+    """(K[, C]) contrast of the twelfth part of the pixels that stands out most."""
+    apart = seen.ground.astype(float) - seen.image.astype(float)
+    much = np.abs(apart) if apart.ndim == 2 else np.linalg.norm(apart, axis=2)
+    return np.asarray(apart[much >= np.percentile(much, 92.0)])

@@ -1,0 +1,255 @@
+"""One body for a whole film: length, widths, blur and shadow are the same in every frame.
+
+They are found together with the bends of a sample of frames by damped least squares on the grey
+values; the frames' own parameters are eliminated, so that the cost grows with the frames only
+linearly. With the body known, a frame tells where it lies far better than its two blurred ends do.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.ndimage import gaussian_filter
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.small_body.ribbon import (
+    BENDS,
+    BODY,
+    FRAME,
+    SHADOW,
+    STATIONS,
+    Grid,
+    Ribbon,
+    gram,
+)
+
+_ROUNDS = 14
+_SETTLED = 1e-4  # of the cost
+_LEARNING = 4  # rounds in which the noise is learnt
+_LEAST_NOISE2 = 1.0
+_LEVEL = 0.35  # what is known of the log of the width before
+_EVEN = 0.3  # of second differences of the logs of the widths
+_TIP = (-0.55, 0.3)  # of the log of the width at a tip beside that before it: a round cap
+_BLUR = 0.5  # of the log of the blur
+_STIFF = 1.0  # rad, of second differences of the bends
+_CONTRAST = 0.15  # of the contrast of one frame beside the film's
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """The part of a frame that shows the body."""
+
+    picture: Floats
+    """(h, w) contrast with its sign: above 0 where the body is."""
+    use: Floats
+    """(h, w) 1 where the picture counts, 0 elsewhere."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """One frame fitted with a body that is known."""
+
+    frame: Floats
+    """(FRAME,)"""
+    noise: float
+    """Standard deviation of what is left, raised where what is left hangs together."""
+    inverse: Floats
+    """(FRAME, FRAME) covariance of the parameters."""
+    by_body: Floats
+    """(FRAME, body) how the parameters move with those of the body."""
+    left: Floats
+    """(h, w) what the picture shows beyond the model."""
+
+
+@dataclass(frozen=True, slots=True)
+class FilmBody:
+    """What all frames share."""
+
+    values: Floats
+    """Length, log of the blur, log half widths; the shadow's four where there is one."""
+    covariance: Floats
+    grid: Grid
+    contrast: float
+    """Usual contrast of a frame."""
+
+
+def _frame_prior(contrast: float) -> tuple[Floats, Floats]:
+    """Rows (R, FRAME) and what they should give, each in its own standard deviations."""
+    bend = np.zeros((BENDS - 2, FRAME))
+    bend[:, 2 : 2 + BENDS] = np.diff(np.eye(BENDS), 2, axis=0) / _STIFF
+    level = np.zeros((3, FRAME))
+    level[0, 2 + BENDS] = 1.0 / (_CONTRAST * contrast)
+    level[1, -2] = level[2, -1] = 1.0 / (0.1 * contrast)
+    wanted = np.zeros(BENDS + 1)
+    wanted[BENDS - 2] = 1.0 / _CONTRAST
+    return np.vstack([bend, level]), wanted
+
+
+def _body_prior(start: Floats, size: int) -> tuple[Floats, Floats]:
+    stations = len(STATIONS)
+    even = np.zeros((stations - 4, size))
+    even[:, 2:BODY] = np.diff(np.eye(stations), 2, axis=0)[1:-1] / _EVEN
+    rows = np.zeros((4, size))
+    rows[0, 2:BODY] = 1.0 / stations / _LEVEL
+    rows[1, 1] = 1.0 / _BLUR
+    rows[2, [2, 3]] = rows[3, [BODY - 1, BODY - 2]] = np.array([1.0, -1.0]) / _TIP[1]
+    wanted = np.concatenate(
+        [
+            np.zeros(stations - 4),
+            [start[2:BODY].mean() / _LEVEL, start[1] / _BLUR],
+            [_TIP[0] / _TIP[1]] * 2,
+        ]
+    )
+    if size > BODY:
+        shade = np.zeros((SHADOW, size))
+        shade[0, BODY] = 0.01
+        shade[[1, 2], [BODY + 1, BODY + 2]] = 0.2
+        shade[3, BODY + 3] = 2.0
+        rows = np.vstack([rows, shade])
+        wanted = np.concatenate([wanted, [0.0, 0.0, 0.0, 2.0 * (start[1] + 0.3)]])
+    return np.vstack([even, rows]), wanted
+
+
+def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> Fit:
+    """Fit one frame; damped least squares from ``start`` (FRAME,)."""
+    ribbon = Ribbon(body.grid)
+    prior, wanted = _frame_prior(body.contrast)
+    shape, use = patch.picture.shape, patch.use.ravel()
+    seen = max(float(use.sum()), 1.0)
+    noise2 = 0.0
+    values, kept, best, damp = start, start, np.inf, 1e-3
+    normal, push = np.eye(FRAME), np.zeros(FRAME)
+    for turn in range(rounds):
+        shown, slopes = ribbon.picture(values, body.values, shape, shared=False)
+        rest = (patch.picture - shown).ravel() * use
+        squares = float(rest @ rest)
+        soft = wanted - prior @ values
+        if turn == 0:
+            noise2 = max(squares / seen, _LEAST_NOISE2)
+        cost = squares / noise2 + float(soft @ soft)
+        if cost < best:
+            done = best - cost < _SETTLED * cost
+            if turn < _LEARNING:  # what is left is noise only near the end
+                noise2 = max(squares / seen, _LEAST_NOISE2)
+                cost = squares / noise2 + float(soft @ soft)
+            best, kept, damp = cost, values, 0.3 * damp
+            products = gram(np.vstack([slopes.reshape(FRAME, -1) * use, rest])) / noise2
+            normal = products[:-1, :-1] + prior.T @ prior
+            push = products[:-1, -1] + prior.T @ soft
+            if done:
+                break
+        else:
+            damp *= 10.0
+        values = kept + np.linalg.solve(normal + damp * np.diag(np.diag(normal)), push)
+    shown, slopes = ribbon.picture(kept, body.values, shape)
+    left = (patch.picture - shown) * patch.use
+    raised = _hangs_together(left, float(np.exp(body.values[1])))
+    products = gram(slopes.reshape(len(slopes), -1) * use) / noise2
+    inverse = np.linalg.inv(products[:FRAME, :FRAME] + prior.T @ prior)
+    moved = -inverse @ products[:FRAME, FRAME:]
+    return Fit(kept, float(np.sqrt(noise2 * raised)), np.asarray(inverse * raised), moved, left)
+
+
+def _hangs_together(left: Floats, spot: float) -> float:
+    """Variance of the rest seen through the blur, over that of as much white noise; at least 1."""
+    # of white noise a Gaussian leaves 1 / (4 pi spot^2); less blur than that of a pixel is none
+    spot = max(spot, 0.8)
+    smooth = gaussian_filter(left, spot, mode="constant")
+    white = float((left**2).mean()) / (4.0 * np.pi * spot * spot)
+    return max(1.0, float((smooth**2).mean()) / max(white, 1e-12))
+
+
+def film_body(
+    patches: Sequence[Patch], starts: Sequence[Floats], start: Floats
+) -> tuple[FilmBody, list[Floats]]:
+    """Fit the shared body and every frame of a sample.
+
+    Args:
+        patches: the frames of the sample.
+        starts: (FRAME,) of each.
+        start: (BODY,) or, with a shadow, (BODY + SHADOW,).
+
+    """
+    size = len(start)
+    ribbon = Ribbon(Grid.of(start))
+    body_rows, body_wanted = _body_prior(start, size)
+    body = kept_body = start
+    frames = kept = [one.copy() for one in starts]
+    contrast = float(np.median([one[2 + BENDS] for one in starts]))
+    best, damp, noise2 = np.inf, 1e-2, 0.0
+    blocks: list[tuple[Floats, Floats, Floats]] = []
+    hss, gs = np.eye(size), np.zeros(size)
+    raised = 1.0
+    seen = sum(float(patch.use.sum()) for patch in patches)
+    for turn in range(_ROUNDS):
+        prior, wanted = _frame_prior(contrast)
+        rows = [_rows(ribbon, one, body, patch) for one, patch in zip(frames, patches, strict=True)]
+        squares = sum(float(row[-1] @ row[-1]) for row in rows)
+        if turn == 0:
+            noise2 = max(squares / seen, _LEAST_NOISE2)
+        soft_body = body_wanted - body_rows @ body
+        softs = [wanted - prior @ one for one in frames]
+        softness = float(soft_body @ soft_body) + sum(float(v @ v) for v in softs)
+        cost = squares / noise2 + softness
+        if cost < best:
+            done = best - cost < _SETTLED * cost and turn > _LEARNING
+            if turn < 2 * _LEARNING:
+                noise2 = max(squares / seen, _LEAST_NOISE2)
+                cost = squares / noise2 + softness
+            best, kept_body, kept, damp = cost, body, frames, 0.3 * damp
+            hss, gs = body_rows.T @ body_rows, body_rows.T @ soft_body
+            blocks = []
+            for row, soft in zip(rows, softs, strict=True):
+                products = gram(row) / noise2
+                own = products[:FRAME, :FRAME] + prior.T @ prior
+                push = products[:FRAME, -1] + prior.T @ soft
+                blocks.append((own, products[:FRAME, FRAME:-1], push))
+                hss = hss + products[FRAME:-1, FRAME:-1]
+                gs = gs + products[FRAME:-1, -1]
+            spot = float(np.exp(body[1]))
+            each = [
+                _hangs_together(row[-1].reshape(patch.picture.shape), spot)
+                for row, patch in zip(rows, patches, strict=True)
+            ]
+            raised = float(np.mean(each))
+            if done:
+                break
+            contrast = float(np.median([one[2 + BENDS] for one in frames]))
+        else:
+            damp *= 10.0
+        step, steps = _eliminated(hss, gs, blocks, damp)
+        body = kept_body + np.clip(step, -0.7, 0.7) * np.where(
+            np.arange(size) == 0, max(1.0, 0.05 * start[0]), 1.0
+        )
+        frames = [one + move for one, move in zip(kept, steps, strict=True)]
+    reduced = hss.copy()
+    for hff, hfs, _ in blocks:
+        reduced = reduced - hfs.T @ np.linalg.solve(hff, hfs)
+    covariance = np.asarray(np.linalg.inv(reduced) * raised, dtype=float)
+    contrast = float(np.median([one[2 + BENDS] for one in kept]))
+    return FilmBody(kept_body, covariance, ribbon.grid, contrast), kept
+
+
+def _rows(ribbon: Ribbon, frame: Floats, body: Floats, patch: Patch) -> Floats:
+    """(FRAME + body + 1, pixels) slopes, and last what is left."""
+    shown, slopes = ribbon.picture(frame, body, patch.picture.shape)
+    rows = np.concatenate([slopes, (patch.picture - shown)[None]]) * patch.use
+    return np.asarray(rows.reshape(len(rows), -1))
+
+
+def _eliminated(
+    hss: Floats, gs: Floats, blocks: list[tuple[Floats, Floats, Floats]], damp: float
+) -> tuple[Floats, list[Floats]]:
+    """Step of the shared and of each frame's parameters."""
+    normal = hss + damp * np.diag(np.diag(hss))
+    push = gs.copy()
+    solved = []
+    for hff, hfs, gf in blocks:
+        factor = cho_factor(hff + damp * np.diag(np.diag(hff)))
+        by, own = cho_solve(factor, hfs), cho_solve(factor, gf)
+        normal = normal - hfs.T @ by
+        push = push - hfs.T @ own
+        solved.append((by, own))
+    step = np.asarray(np.linalg.solve(normal, push), dtype=float)
+    return step, [own - by @ step for by, own in solved]

@@ -1,0 +1,228 @@
+"""Small bodies of a film fitted to its grey values, with one body for all frames.
+
+A frame's expected error is told from what is left of its picture and from how well the shared body
+is known; where it is above a hundredth of the length the frame is ``ROUGH``.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
+from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton
+from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px
+from snakewalk.controller.capture.small_body.crop import Glimpse, Workspace
+from snakewalk.controller.capture.small_body.film_body import (
+    FilmBody,
+    Fit,
+    Patch,
+    film_body,
+    fit_frame,
+)
+from snakewalk.controller.capture.small_body.film_ground import FilmGround
+from snakewalk.controller.capture.small_body.film_view import View, turned_round
+from snakewalk.controller.capture.small_body.ribbon import (
+    BENDS,
+    BODY,
+    STATIONS,
+    curve_of,
+    curve_slopes,
+)
+from snakewalk.controller.capture.small_body.shading import with_shadow
+
+ROUGH = 0.01
+"""Of the length: a larger expected error is told."""
+_SAMPLE_PX = 30000.0  # working pixels in all frames of the sample
+_FEWEST, _MOST = 8, 40
+_PASSES = 2
+_FORM = 0.004  # of the length: what the model of the tips may be wrong by
+_SHARP = 62.0  # times the blur: a longer body's medial axis is as good
+_LONG, _WIDE = 50.0, 2.4  # times the blur: so is that of a wide body, by length and half width
+_BY_BLUR = 0.6  # of the blur of all of the body, what its softness says: ``softness``
+_LOST = 2.0  # times the usual rest: the picture shows something else
+_FOUND = 1.5  # the same for a frame that had no skeleton
+_ALIKE = 0.3  # of the usual contrast
+_DOUBT = 0.35  # margin of the ends under which both ways are tried
+_TRIED = 5  # frames of a stretch between doubts
+
+
+@dataclass(frozen=True, slots=True)
+class Refined:
+    """A film's skeletons after the fit."""
+
+    skeletons: tuple[Skeleton, ...]
+    expected_px: Floats
+    """(T,) expected mean error of a point; NaN where nothing was fitted."""
+    body: FilmBody | None
+    """None where nothing was fitted: the bodies are long against their blur, or too few."""
+
+
+def refine(
+    skeletons: Sequence[Skeleton],
+    glimpses: Mapping[int, Glimpse],
+    margin: Floats,
+    expected_px: Floats,
+    *,
+    fixed: bool,
+) -> Refined:
+    """Fit all frames that have a glimpse.
+
+    Args:
+        skeletons: (T) the same end first in all.
+        glimpses: by frame.
+        margin: (T,) how surely the ends were told apart: ``identity.Followed``.
+        expected_px: (T,) error of frames that are not fitted, NaN where it is not known.
+        fixed: whether the ground stands still, so that frames tell it to one another.
+
+    """
+    good = [k for k in glimpses if skeletons[k].verdict is Verdict.GOOD]
+    if len(good) < 2:
+        return _unfitted(skeletons, expected_px)
+    length = float(np.median([skeletons[k].length_px for k in good]))
+    radius = float(np.median([np.median(skeletons[k].radius_px) for k in good]))
+    space = Workspace.of([glimpses[k] for k in good[:: max(1, len(good) // 20)]], length)
+    views = {k: View.of(glimpses[k], skeletons[k].points_px, radius, space) for k in good}
+    sample = _spread(good, views)
+    start = _first_body([views[k] for k in sample], length * space.scale)
+    starts = {k: views[k].start for k in good}
+    patches = {k: Patch(view.picture, view.use) for k, view in views.items()}
+    for turn in range(_PASSES):
+        body, frames = film_body([patches[k] for k in sample], [starts[k] for k in sample], start)
+        blur = space.blur_px(float(np.exp(body.values[1])))
+        wide = float(np.exp(body.values[2:BODY].max())) / space.scale
+        if turn == 0 and (
+            length > _SHARP * blur or (length > _LONG * blur and wide > _WIDE * blur)
+        ):
+            known = expected_px.copy()
+            known[good] = axis_error_px(_BY_BLUR * blur, length)
+            return _unfitted(skeletons, known)
+        if len(body.values) == BODY:
+            shaded = with_shadow(body, frames, [patches[k] for k in sample])
+            body = body if shaded is None else shaded[0]
+        fits = {k: fit_frame(patches[k], starts[k], body) for k in starts}
+        if turn == 0:
+            _tell_the_ends(fits, patches, body, margin)
+            _find_the_lost(fits, views, glimpses, body, radius, space)
+            ground = FilmGround.of(views, fits, body) if fixed else None
+            for k, fit in fits.items():
+                beside = 0.0 if ground is None else ground.beside(views[k], fit, body)
+                patches[k] = Patch(views[k].picture - beside, views[k].use)
+        start, starts = body.values, {k: fit.frame for k, fit in fits.items()}
+    out = list(skeletons)
+    expected = expected_px.copy()
+    usual = float(np.median([fit.noise for fit in fits.values()]))
+    for k, fit in fits.items():
+        if fit.noise > _LOST * usual:
+            out[k] = replace(out[k], verdict=Verdict.ROUGH) if k in good else out[k]
+            continue
+        expected[k] = expected_error(fit, body) / space.scale
+        line = space.to_px(curve_of(fit.frame, float(body.values[0])) + views[k].first)
+        out[k] = _skeleton(line, body, space, expected[k])
+    rest = [one if k in fits else _told(one, expected[k], length) for k, one in enumerate(out)]
+    return Refined(tuple(rest), expected, body)
+
+
+def _unfitted(skeletons: Sequence[Skeleton], expected_px: Floats) -> Refined:
+    """Skeletons as they are, rough where their error says so."""
+    good = [one.verdict is Verdict.GOOD for one in skeletons]
+    length = np.array([one.length_px for one in skeletons])
+    usual = float(np.median(length[good])) if any(good) else 1.0
+    out = [_told(one, error, usual) for one, error in zip(skeletons, expected_px, strict=True)]
+    return Refined(tuple(out), expected_px, None)
+
+
+def _told(body: Skeleton, error_px: float, length_px: float) -> Skeleton:
+    """The body, rough where its error says so."""
+    if body.verdict is Verdict.GOOD and error_px > ROUGH * length_px:
+        return replace(body, verdict=Verdict.ROUGH)
+    return body
+
+
+def expected_error(fit: Fit, body: FilmBody) -> float:
+    """Expected error of a point, mean along the body, working pixels."""
+    length = float(body.values[0])
+    slopes = curve_slopes(fit.frame, length)
+    own, size = slopes[:, :, :-1], 2 + BENDS
+    shared = np.einsum("kij,jm->kim", own, fit.by_body[:size])
+    shared[:, :, 0] += slopes[:, :, -1]
+    square = np.einsum("kij,jl,kil->k", own, fit.inverse[:size, :size], own)
+    square += np.einsum("kij,jl,kil->k", shared, body.covariance, shared)
+    return float(np.sqrt(np.maximum(square, 0.0) + (_FORM * length) ** 2).mean())
+
+
+def _tell_the_ends(
+    fits: dict[int, Fit], patches: Mapping[int, Patch], body: FilmBody, margin: Floats
+) -> None:
+    """Turn stretches round whose grey values fit the body better from its other end."""
+    stretches: list[list[int]] = []
+    for k in sorted(fits):
+        joined = stretches and stretches[-1][-1] == k - 1 and margin[k] >= _DOUBT
+        if joined:
+            stretches[-1].append(k)
+        else:
+            stretches.append([k])
+    if len(stretches) == 1:
+        return
+    for stretch in stretches:
+        worse = 0.0
+        for k in stretch[:: max(1, len(stretch) // _TRIED)]:
+            other = fit_frame(patches[k], turned_round(fits[k].frame), body)
+            worse += float((other.left**2).sum() - (fits[k].left ** 2).sum())
+        if worse < 0.0:
+            for k in stretch:
+                fits[k] = fit_frame(patches[k], turned_round(fits[k].frame), body)
+
+
+def _find_the_lost(
+    fits: dict[int, Fit],
+    views: dict[int, View],
+    glimpses: Mapping[int, Glimpse],
+    body: FilmBody,
+    radius: float,
+    space: Workspace,
+) -> None:
+    """Fit frames without a skeleton from their neighbour's place; kept where they look alike."""
+    usual = float(np.median([fit.noise for fit in fits.values()]))
+    lost = sorted(set(glimpses) - set(fits))
+    for step, order in ((-1, lost), (1, lost[::-1])):
+        for k in order:
+            if k in fits or k + step not in fits:
+                continue
+            near = fits[k + step].frame
+            line = curve_of(near, float(body.values[0]), SEGMENTS) + views[k + step].first
+            view = View.of(glimpses[k], space.to_px(line), radius, space)
+            first = near.copy()
+            first[:2] += np.subtract(views[k + step].first, view.first)
+            fit = fit_frame(Patch(view.picture, view.use), first, body, rounds=16)
+            strange = abs(fit.frame[2 + BENDS] / body.contrast - 1.0) > _ALIKE
+            if fit.noise < _FOUND * usual and not strange:
+                fits[k], views[k] = fit, view
+
+
+def _spread(good: list[int], views: Mapping[int, View]) -> list[int]:
+    each = float(np.median([views[k].picture.size for k in good]))
+    most = int(np.clip(_SAMPLE_PX / each, _FEWEST, _MOST))
+    at = np.linspace(0, len(good) - 1, min(most, len(good)))
+    return [good[round(k)] for k in at]
+
+
+def _first_body(views: Sequence[View], length: float) -> Floats:
+    wide = np.median([(v.picture * v.use).sum() / v.start[2 + BENDS] / length for v in views])
+    half = max(0.5 * float(wide), 0.3)
+    return np.concatenate([[length, np.log(1.2)], np.full(len(STATIONS), np.log(half))])
+
+
+def _skeleton(line: Floats, body: FilmBody, space: Workspace, expected_px: float) -> Skeleton:
+    try:
+        even = equipartition(line, SEGMENTS)
+    except (NoEquipartitionError, ValueError):
+        even = None
+    points = line[:: (len(line) - 1) // SEGMENTS] if even is None else even.points
+    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    at = np.linspace(0.0, 1.0, SEGMENTS + 1)
+    radius = np.interp(at, STATIONS, np.exp(body.values[2:BODY])) / space.scale
+    rough = even is None or expected_px > ROUGH * length
+    return Skeleton(points, radius, length, Verdict.ROUGH if rough else Verdict.GOOD)

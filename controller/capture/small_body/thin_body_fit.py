@@ -1,0 +1,126 @@
+"""Small bodies, as thin as their own blur: the curve whose blurred picture is the image's.
+
+The ridge of a blurred bend lies inside the bend, and blur takes tips away. So a line of Gaussian
+spots along a cubic spline is fitted to the contrast by damped least squares: control points,
+thickness at a few stations, and the width of the spots, which blur and body share.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.linalg import block_diag
+
+from snakewalk.config.arrays import Floats
+
+THIN_PX = 6.0
+"""Width below which a body is fitted."""
+_SPOTS = 60
+_CONTROLS = 9
+_STATIONS = 5
+_ROUNDS = 12
+_STIFF = 0.02  # of second differences of the controls, against the picture's own information
+_EVEN = 0.3  # the same of the differences in thickness
+_LEAST_WIDTH = 0.5  # px, of a spot
+_TAPER = 0.02  # of the length: what tapers off at each end and is too little to be fitted
+_MISFIT = 0.25  # of the picture's own strength: more left over, and the curve is not the body's
+
+
+def _basis(count: int) -> Floats:
+    at = np.linspace(0.0, 1.0, count)
+    inner = np.linspace(0.0, 1.0, _CONTROLS - 2)
+    knots = np.concatenate([[0.0] * 3, inner, [1.0] * 3])
+    return np.asarray(BSpline.design_matrix(at, knots, 3).toarray(), dtype=float)
+
+
+_ALONG = _basis(_SPOTS)
+_FINE = _basis(401)
+_HATS = np.stack(
+    [
+        np.interp(np.linspace(0.0, 1.0, _SPOTS), np.linspace(0.0, 1.0, _STATIONS), row)
+        for row in np.eye(_STATIONS)
+    ],
+    axis=1,
+)
+_BEND = np.diff(np.eye(_CONTROLS), 2, axis=0)
+
+
+def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floats, float] | None:
+    """Curve (403, 2) from tip to tip whose blurred picture is closest to ``level``.
+
+    Args:
+        line: (P, 2) x, y in pixels of ``level``, a first guess with equal steps.
+        level: (h, w) contrast of one body.
+        width: of the body with its blur, px.
+
+    Returns:
+        The curve and what is left of the picture, of its own strength; None where it is the
+        fit of something else.
+
+    """
+    picture = np.asarray(level, dtype=float)
+    start = np.stack(
+        [np.interp(np.linspace(0, 1, 401), np.linspace(0, 1, len(line)), v) for v in line.T]
+    )
+    controls = np.linalg.lstsq(_FINE, start.T, rcond=None)[0]
+    length = float(np.hypot(*np.diff(line, axis=0).T).sum())
+    spot = max(0.4 * width, 1.0)
+    weights = np.full(_STATIONS, picture.sum() / _SPOTS)
+    values = np.concatenate([controls.T.ravel(), weights, [spot]])
+    damp, worst = 1e-3, np.inf
+    kept = values
+    scale = np.concatenate([np.ones(2 * _CONTROLS), np.full(_STATIONS, weights[0]), [1.0]])
+    strong = float(np.abs(picture).max())
+    stiff = strong * block_diag(
+        _STIFF * _BEND,
+        _STIFF * _BEND,
+        _EVEN / weights[0] * np.diff(np.eye(_STATIONS), axis=0),
+        np.zeros((1, 1)),
+    )
+    normal, push = np.eye(len(values)), np.zeros(len(values))
+    for _ in range(_ROUNDS):
+        shown, slopes = _picture(values, picture.shape)
+        rest = (picture - shown).ravel()
+        soft = stiff @ values
+        cost = float(rest @ rest + soft @ soft)
+        if cost < worst:
+            done = worst - cost < 1e-4 * cost
+            worst, kept, damp = cost, values, 0.3 * damp
+            slopes = slopes * scale
+            stiffness = stiff * scale
+            normal = slopes.T @ slopes + stiffness.T @ stiffness
+            push = slopes.T @ rest - stiffness.T @ soft
+            if done:
+                break
+        else:
+            damp *= 10.0
+        step = np.linalg.solve(normal + damp * np.diag(np.diag(normal) + 1e-9), push)
+        values = kept + np.clip(step, -1.0, 1.0) * scale
+        values[-1] = max(values[-1], _LEAST_WIDTH)
+    curve = _FINE @ kept[: 2 * _CONTROLS].reshape(2, -1).T
+    shown, _ = _picture(kept, picture.shape)
+    left = float(np.linalg.norm(picture - shown) / max(float(np.linalg.norm(picture)), 1e-9))
+    grown = float(np.hypot(*np.diff(curve, axis=0).T).sum()) / length
+    reach = _TAPER * length
+    ends = [
+        reach * (a - b) / float(np.hypot(*(a - b))) for a, b in (curve[[0, 8]], curve[[-1, -9]])
+    ]
+    curve = np.vstack([curve[0] + ends[0], curve, curve[-1] + ends[1]])
+    if left > _MISFIT or not 0.7 < grown < 1.5:
+        return None
+    return curve, left
+
+
+def _picture(values: Floats, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
+    """The picture (h, w) of a line of spots, and its slopes (h w, values)."""
+    x, y = _ALONG @ values[:_CONTROLS], _ALONG @ values[_CONTROLS : 2 * _CONTROLS]
+    weights, spot = _HATS @ values[2 * _CONTROLS : -1], float(values[-1])
+    away_x, away_y = np.arange(shape[1])[:, None] - x, np.arange(shape[0])[:, None] - y
+    across = np.exp(-0.5 * (away_x / spot) ** 2)
+    down = np.exp(-0.5 * (away_y / spot) ** 2) / (2.0 * np.pi * spot * spot)
+    each = down[:, None, :] * across[None, :, :]  # (h, w, spots)
+    heavy = each * weights
+    by_x = (heavy * (away_x / spot**2)[None]) @ _ALONG
+    by_y = (heavy * (away_y / spot**2)[:, None]) @ _ALONG
+    wide = ((away_x[None] ** 2 + away_y[:, None] ** 2) / spot**3 - 2.0 / spot) * heavy
+    slopes = np.concatenate([by_x, by_y, each @ _HATS, wide.sum(axis=2)[..., None]], axis=2)
+    return heavy.sum(axis=2), slopes.reshape(-1, len(values))

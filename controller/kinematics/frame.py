@@ -1,0 +1,64 @@
+"""The frame that travels with a body ([YT] 3.1, Eq. 1-5): origin at its centre, x to its head."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from snakewalk.config.arrays import Floats
+
+UP = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A body's place and axes in the world."""
+
+    rotation: Floats
+    """(3, 3) columns: forward, left, up. [YT]'s R."""
+    origin_m: Floats
+    """(3,) [YT]'s o."""
+
+    @staticmethod
+    def flat(x_m: float, y_m: float, heading_rad: float, z_m: float = 0.0) -> "Frame":
+        """Return a level frame."""
+        c, s = np.cos(heading_rad), np.sin(heading_rad)
+        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return Frame(rotation, np.array([x_m, y_m, z_m]))
+
+    @property
+    def heading_rad(self) -> float:
+        """Direction of x in the horizontal plane."""
+        return float(np.arctan2(self.rotation[1, 0], self.rotation[0, 0]))
+
+    def world_m(self, points_m: Floats) -> Floats:
+        """(..., 3) points of the body frame in the world."""
+        return np.asarray(points_m @ self.rotation.T + self.origin_m)
+
+    def body_m(self, points_m: Floats) -> Floats:
+        """(..., 3) points of the world in the body frame."""
+        return np.asarray((points_m - self.origin_m) @ self.rotation)
+
+
+def body_frame(link_m: Floats, up: ArrayLike = UP) -> Frame:
+    """Frame of links with centres ``link_m`` (L, 3), head first.
+
+    x goes from the mean of the centres to the head; y is *normalised*: ``up`` is not at a right
+    angle to x on a slope, and Eq. 3 as printed leaves a short axis there.
+
+    Raises:
+        ValueError: the head is at the centre, or x is parallel to ``up``.
+
+    """
+    origin = link_m.mean(axis=0)
+    ahead = link_m[0] - origin
+    length = float(np.linalg.norm(ahead))
+    if length < 1e-9:
+        raise ValueError("the head lies at the centre of the body: no forward axis")
+    x = ahead / length
+    side = np.cross(np.asarray(up, dtype=float), x)
+    width = float(np.linalg.norm(side))
+    if width < 1e-9:
+        raise ValueError("the body stands upright: no left axis")
+    y = side / width
+    return Frame(np.column_stack([x, y, np.cross(x, y)]), origin)

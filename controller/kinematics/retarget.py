@@ -1,0 +1,65 @@
+"""Skeleton to joints: 100 tangent angles to the yaw joints of this robot, link lengths respected.
+
+Links that no yaw joint separates form one rigid group in the plane; a group's heading is the mean
+tangent angle over its span, so the headings' mean is the skeleton's and nothing needs wrapping.
+"""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+
+
+class Retarget:
+    """Maps skeletons of ``points`` segments, head first, to joint angles of ``robot``."""
+
+    def __init__(self, robot: RobotConfig, points: int = 100) -> None:
+        yaw = np.array(robot.yaw_joints, dtype=int)
+        if len(yaw) == 0:
+            raise ValueError(f"{robot.name} has no yaw joint; a skeleton cannot be put on it")
+        links = robot.joint_count + 1
+        edges = np.concatenate([[0], yaw + 1, [links]])
+        self._at = edges * points / links
+        self._yaw = yaw
+        self._joints = robot.joint_count
+        self._group_of_link = np.repeat(np.arange(len(yaw) + 1), np.diff(edges))
+        self._points = points
+        self._link_length_m = robot.link_length_m
+        self._length_m = robot.length_m
+
+    def group_headings_rad(self, skeleton_rad: Floats) -> Floats:
+        """(..., G) mean tangent angle over each rigid group; ``skeleton_rad`` is (..., points)."""
+        zero = np.zeros((*skeleton_rad.shape[:-1], 1))
+        area = np.concatenate([zero, np.cumsum(skeleton_rad, axis=-1)], axis=-1)
+        low = np.minimum(self._at.astype(int), self._points - 1)
+        part = self._at - low
+        at_edges = area[..., low] * (1.0 - part) + area[..., low + 1] * part
+        return np.asarray(np.diff(at_edges, axis=-1) / np.diff(self._at))
+
+    def joints_rad(self, skeleton_rad: Floats) -> Floats:
+        """(..., J) joint angles; pitch joints are 0, the ground step is theirs."""
+        headings = self.group_headings_rad(np.asarray(skeleton_rad, dtype=float))
+        joints = np.zeros((*headings.shape[:-1], self._joints))
+        joints[..., self._yaw] = headings[..., :-1] - headings[..., 1:]
+        return joints
+
+    def residual_m(self, skeleton_rad: Floats) -> Floats:
+        """(...) largest distance between link ends and the skeleton, both centred on their mean."""
+        skeleton = np.asarray(skeleton_rad, dtype=float)
+        links = self.group_headings_rad(skeleton)[..., self._group_of_link]
+        robot = _ends(links, self._link_length_m)
+        fine = _ends(skeleton, self._length_m / self._points)
+        at = np.linspace(0.0, self._points, links.shape[-1] + 1)
+        low = np.minimum(at.astype(int), self._points - 1)
+        part = (at - low)[:, None]
+        curve = fine[..., low, :] * (1.0 - part) + fine[..., low + 1, :] * part
+        gap = robot - curve
+        gap = gap - gap.mean(axis=-2, keepdims=True)
+        return np.asarray(np.hypot(gap[..., 0], gap[..., 1]).max(axis=-1))
+
+
+def _ends(angles_rad: Floats, step_m: float) -> Floats:
+    """(..., n + 1, 2) ends of n segments behind a head at the origin."""
+    steps = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1) * -step_m
+    zero = np.zeros((*steps.shape[:-2], 1, 2))
+    return np.concatenate([zero, np.cumsum(steps, axis=-2)], axis=-2)

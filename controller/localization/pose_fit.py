@@ -1,0 +1,114 @@
+"""Where a chain of known shape lies, from a line seen of its body.
+
+The joints are measured, so only place and heading are open: the link centres by forward kinematics
+are laid on the seen line by Procrustes' rigid fit, at equal ways from its middle, which may slide
+a little: a tip that is hidden or sticks out moves it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.kinematics.links import body_in_world, pose_at
+
+_ROUNDS = 5
+_BLUR_M = 0.003
+"""How far a link's place on the line is usually off."""
+_TIPS_M = 0.02
+"""How far the line's middle may be off the body's."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseFit:
+    """One way to lay the chain on the line."""
+
+    head_m: Floats
+    """(2,) centre of the head link."""
+    heading_rad: float
+    """Of the head link, in (-pi, pi]."""
+    links_m: Floats
+    """(L, 2) centres of the links as fitted."""
+    error_m: float
+    """Root of the mean square distance of the links from their places on the line."""
+
+
+def both_ways(robot: RobotConfig, line_m: Floats, joint_rad: Floats) -> tuple[PoseFit, PoseFit]:
+    """Fit with the line's first end as the head, and with its last end.
+
+    Args:
+        robot: its links.
+        line_m: (P, 2) from tip to tip.
+        joint_rad: (J,) measured when the line was seen.
+
+    """
+    body = body_in_world(robot, pose_at(np.zeros(2), 0.0), joint_rad)
+    links = body.link_m[:, :2]
+    return _fit(robot, line_m, links), _fit(robot, line_m[::-1], links)
+
+
+def _fit(robot: RobotConfig, line_m: Floats, links: Floats) -> PoseFit:
+    arc = np.concatenate([[0.0], np.hypot(*np.diff(line_m, axis=0).T).cumsum()])
+    number = np.arange(len(links)) - 0.5 * (len(links) - 1)
+    middle_m = 0.5 * arc[-1] + number * robot.link_length_m
+    weight = np.ones(len(links))
+    slide_m = 0.0
+    for _ in range(_ROUNDS):
+        seen, ahead = _along(line_m, arc, middle_m + slide_m)
+        turn, shift = _rigid(links, seen, weight)
+        away = seen - links @ turn.T - shift
+        size = np.hypot(*away.T)
+        usual = 1.4826 * float(np.median(size)) + 1e-4
+        weight = 1.0 / np.maximum(1.0, size / (1.5 * usual))  # Huber
+        slide_m += _slide(links @ turn.T, ahead, away, weight, slide_m)
+    return PoseFit(
+        shift,
+        float(np.arctan2(turn[1, 0], turn[0, 0])),
+        links @ turn.T + shift,
+        float(np.sqrt((size * size).mean())),
+    )
+
+
+def _along(line_m: Floats, arc: Floats, at: Floats) -> tuple[Floats, Floats]:
+    """Places (L, 2) on the line and its directions there; beyond its ends it goes on straight."""
+    k = np.clip(np.searchsorted(arc, at), 1, len(arc) - 1)
+    step = line_m[k] - line_m[k - 1]
+    ahead = step / np.maximum(arc[k] - arc[k - 1], 1e-9)[:, None]
+    return line_m[k - 1] + (at - arc[k - 1])[:, None] * ahead, ahead
+
+
+def _slide(links: Floats, ahead: Floats, away: Floats, weight: Floats, slid_m: float) -> float:
+    """How much further along the line the links lie, if the body's bends tell.
+
+    One step of least squares for slide, shift and turn together; tips that are lost or stick out
+    move the middle by a few millimetres, and a straight body leaves it there.
+    """
+    count = len(links)
+    row = np.sqrt(np.repeat(weight, 2))
+    one, none = np.ones(count), np.zeros(count)
+    columns = [
+        np.stack([one, none], axis=1),
+        np.stack([none, one], axis=1),
+        np.stack([-links[:, 1], links[:, 0]], axis=1),
+        -ahead,
+    ]
+    matrix = np.stack([column.ravel() for column in columns], axis=1) * row[:, None]
+    normal = matrix.T @ matrix + 1e-9 * np.eye(4)
+    right = matrix.T @ (away.ravel() * row)
+    stiff = (_BLUR_M / _TIPS_M) ** 2
+    normal[3, 3] += stiff
+    right[3] -= stiff * slid_m
+    return float(np.linalg.solve(normal, right)[3])
+
+
+def _rigid(links: Floats, seen: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Turn (2, 2) and shift (2,) that lay ``links`` on ``seen`` with the least squares."""
+    share = weight / weight.sum()
+    a, b = share @ links, share @ seen
+    p, q = links - a, seen - b
+    sin = float(share @ (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]))
+    cos = float(share @ (p * q).sum(axis=1))
+    size = float(np.hypot(sin, cos)) or 1.0
+    turn = np.array([[cos, -sin], [sin, cos]]) / size
+    return turn, b - turn @ a

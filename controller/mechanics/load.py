@@ -1,0 +1,59 @@
+"""What the joints must hold against the ground: torque from the Coulomb friction of the links."""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.world import FrictionConfig
+
+_STILL_M_S = 1e-4
+STANDARD_GRAVITY_M_S2 = 9.80665
+
+
+def friction_n(
+    velocity_m_s: Floats, headings_rad: Floats, friction: FrictionConfig, weight_n: float
+) -> Floats:
+    """Force (L, 2) of level ground on links that slide, each bearing ``weight_n``.
+
+    Args:
+        velocity_m_s: (L, 2) of the link centres.
+        headings_rad: (L,) link headings.
+        friction: the ellipse: the force points against the velocity weighted by its axes.
+        weight_n: on each link.
+
+    """
+    cos, sin = np.cos(headings_rad), np.sin(headings_rad)
+    along = friction.along * (cos * velocity_m_s[:, 0] + sin * velocity_m_s[:, 1])
+    across = friction.across * (cos * velocity_m_s[:, 1] - sin * velocity_m_s[:, 0])
+    size = np.sqrt(along**2 + across**2 + (_STILL_M_S * friction.across) ** 2)
+    ahead, left = -friction.along * along / size, -friction.across * across / size
+    return np.asarray(weight_n * np.stack([cos * ahead - sin * left, sin * ahead + cos * left], 1))
+
+
+def yaw_load_n_m(
+    centres_m: Floats, headings_rad: Floats, link_length_m: float, force_n: Floats
+) -> Floats:
+    """Moment (J,) about the vertical that each joint must hold, if nothing is accelerated.
+
+    The part of the body behind joint j is in balance under its ground forces and the joint: the
+    moment of those forces about the joint is what the joint carries.
+
+    Args:
+        centres_m: (L, 2) link centres, head first.
+        headings_rad: (L,)
+        link_length_m: axis to axis; joint j is at the back end of link j.
+        force_n: (L, 2) of the ground on each link.
+
+    """
+    back = np.stack([np.cos(headings_rad), np.sin(headings_rad)], axis=1) * (-0.5 * link_length_m)
+    joints_m = (centres_m + back)[:-1]
+    behind = _tail_sums(force_n)[1:]
+    about_origin = _tail_sums(_cross(centres_m, force_n))[1:]
+    return np.asarray(about_origin - _cross(joints_m, behind))
+
+
+def _tail_sums(values: Floats) -> Floats:
+    return np.asarray(values[::-1].cumsum(axis=0)[::-1])
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

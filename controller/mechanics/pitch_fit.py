@@ -1,0 +1,84 @@
+"""What the pitch joints do on uneven ground ([PT] 2.6.5 for a chain of links).
+
+The ground step lays the links' middle line on the ground; pitch goals then bring the link centres
+as near to it as the robot can. A robot without pitch joints can only tilt as a whole, and the
+residual says how badly it lies.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.mechanics.ground_step import GroundStep, half_heights_m
+
+_REGULAR = 0.05  # of a link length: a straight body's roll changes no height; goals stay small
+
+
+@dataclass(frozen=True, slots=True)
+class Lifted:
+    """Pitch goals and how well the body then lies."""
+
+    goal_rad: Floats
+    """(J,) goals, positive lifts the head side; 0 on yaw joints."""
+    gap_m: Floats
+    """(J + 1,) height of each link's centre over where the ground step puts it."""
+    pitch_rad: Floats
+    """(J + 1,) inclination of each link in the ground step."""
+
+    @property
+    def residual_m(self) -> float:
+        """Root mean square of the gaps."""
+        return float(np.sqrt(np.mean(self.gap_m**2)))
+
+
+class Lift:
+    """Pitch goals of one robot on one ground; ``None`` is a level floor."""
+
+    def __init__(self, robot: RobotConfig, ground: HeightField | None) -> None:
+        self._step = GroundStep(ground)
+        self._link_m = robot.link_length_m
+        self._half_m = half_heights_m(robot, robot.joint_count + 1)
+        self._pitch = np.array(robot.pitch_joints, dtype=np.intp)
+        self._limit_rad = robot.pitch_limit_rad
+        self._joints = robot.joint_count
+        behind = np.arange(robot.joint_count + 1)[:, None] > self._pitch
+        self._behind = behind.astype(float)
+
+    def __call__(self, head_in_world_m: ArrayLike, heading_rad: Floats) -> Lifted:
+        """Fit the chain to the ground under it.
+
+        Heights of link centres are linear in the joints for the slopes that [PT] allows (25
+        degrees): a joint raises what is behind it by its distance along the joint's heading. The
+        body's own height, roll and pitch are free, so the fit is one small least squares.
+
+        Args:
+            head_in_world_m: (2,) centre of the head link in plan.
+            heading_rad: (J + 1,) headings of the links in plan.
+
+        """
+        forward = np.column_stack([np.cos(heading_rad), np.sin(heading_rad)])
+        tip = np.asarray(head_in_world_m, float)[:2] + 0.5 * self._link_m * forward[0]
+        laid = self._step.one(heading_rad, tip, self._link_m, self._half_m, known="head")
+        wanted = 0.5 * (laid.points_m[1:, 2] + laid.points_m[:-1, 2])
+
+        ends = np.zeros((self._joints + 2, 2))
+        ends[1:] = -self._link_m * np.cumsum(forward, axis=0)
+        centres = 0.5 * (ends[1:] + ends[:-1])
+        at, along = ends[self._pitch + 1], forward[self._pitch]
+        lever = self._behind * ((at * along).sum(axis=1) - centres @ along.T)
+        rise = np.column_stack([centres - centres.mean(axis=0), lever])
+
+        mean = rise.mean(axis=0)
+        centred, target = rise - mean, wanted - wanted.mean()
+        normal = centred.T @ centred
+        normal.flat[:: len(normal) + 1] += (_REGULAR * self._link_m) ** 2
+        tilt = np.linalg.solve(normal, centred.T @ target)
+
+        goal = np.zeros(self._joints)
+        goal[self._pitch] = np.clip(tilt[2:], -self._limit_rad, self._limit_rad)
+        tilt[2:] = goal[self._pitch]
+        return Lifted(goal, centred @ tilt - target, laid.pitch_rad)

@@ -1,0 +1,268 @@
+"""The three rigid velocities of a planar body whose shape changes on Coulomb friction.
+
+Without inertia the ground's forces and moment sum to zero; with the Coulomb ellipse that is the
+minimum of the dissipated power, which is convex in (vx, vy, omega), so Newton's method finds it.
+On a slope gravity's power, linear in them, is taken off: still convex, but without a minimum where
+the slope is more than friction holds.
+"""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.mechanics.load import STANDARD_GRAVITY_M_S2
+from snakewalk.drivers.compiling import compiled
+
+_STILL_M_S = 1e-4  # smooths the kink of |v| at rest
+_STEPS = 50
+_NONE = np.zeros((3, 3))
+
+
+class NoBalanceError(ArithmeticError):
+    """The pull is more than friction can hold: a body without inertia would be infinitely fast."""
+
+
+def rigid_velocity(
+    points_m: Floats,
+    headings_rad: Floats,
+    shape_m_s: Floats,
+    friction: FrictionConfig,
+    guess: Floats | None = None,
+    *,
+    pull: Floats | None = None,
+    share: Floats | None = None,
+) -> Floats:
+    """Velocity (vx, vy, omega) of a body frame at its origin that balances friction.
+
+    Args:
+        points_m: (L, 2) link centres in the body frame.
+        headings_rad: (L,) link headings in the body frame.
+        shape_m_s: (L, 2) velocities of the links relative to the body frame.
+        friction: the ellipse; every link carries the same weight.
+        guess: start of the iteration, the last solution in a sequence.
+        pull: (L, 2) tangential part of gravity on each link, in the body frame, in weights of a
+            link: ``sin(slope)`` down the slope. None is level ground.
+        share: (L,) load of each link on the ground, in weights of a link: ``cos(slope)``.
+
+    Returns:
+        (3,) m/s, m/s, rad/s.
+
+    Raises:
+        NoBalanceError: the pull is more than friction can hold; the body slides.
+
+    """
+    velocity = np.zeros(3) if guess is None else np.array(guess, dtype=float)
+    fall = np.zeros(3) if pull is None else _about(points_m, pull)
+    if not _solved(points_m, headings_rad, shape_m_s, friction, share, fall, _NONE, velocity):
+        raise NoBalanceError
+    return velocity
+
+
+def carried_velocity(
+    points_m: Floats,
+    headings_rad: Floats,
+    shape_m_s: Floats,
+    friction: FrictionConfig,
+    before_m_s: Floats,
+    step_s: float,
+    guess: Floats | None = None,
+    *,
+    pull: Floats | None = None,
+    share: Floats | None = None,
+) -> Floats:
+    """``rigid_velocity`` of a body with inertia, at the end of a step (implicit Euler).
+
+    The power gains half the links' change of velocity squared, ``1 / (g step)`` per weight, so that
+    a body that nothing holds slides ever faster instead of at once infinitely fast.
+
+    Args:
+        points_m: as in ``rigid_velocity``.
+        headings_rad: likewise.
+        shape_m_s: likewise.
+        friction: likewise.
+        before_m_s: (L, 2) velocities of the links at the start of the step, in the body frame.
+        step_s: of time.
+        guess: as in ``rigid_velocity``.
+        pull: likewise.
+        share: likewise.
+
+    Returns:
+        (3,) m/s, m/s, rad/s.
+
+    """
+    velocity = np.zeros(3) if guess is None else np.array(guess, dtype=float)
+    heavy = 1.0 / (STANDARD_GRAVITY_M_S2 * step_s)
+    x, y = points_m[:, 0], points_m[:, 1]
+    links, sx, sy = float(len(x)), x.sum(), y.sum()
+    heft = heavy * np.array([[links, 0.0, -sy], [0.0, links, sx], [-sy, sx, x @ x + y @ y]])
+    fall = heavy * _about(points_m, before_m_s - shape_m_s)
+    if pull is not None:
+        fall += _about(points_m, pull)
+    _solved(points_m, headings_rad, shape_m_s, friction, share, fall, heft, velocity)
+    return velocity
+
+
+def _about(points_m: Floats, force: Floats) -> Floats:
+    """Sum (3,) of forces (L, 2) and of their moments about the origin."""
+    (px, py), (x, y) = force.T, points_m.T
+    return np.array([px.sum(), py.sum(), x @ py - y @ px])
+
+
+def _solved(
+    points_m: Floats,
+    headings_rad: Floats,
+    shape_m_s: Floats,
+    friction: FrictionConfig,
+    share: Floats | None,
+    fall: Floats,
+    heft: Floats,
+    velocity: Floats,
+) -> bool:
+    """``_balance`` of arrays of any layout."""
+    return _balance(
+        np.ascontiguousarray(points_m, dtype=float),
+        np.ascontiguousarray(headings_rad, dtype=float),
+        np.ascontiguousarray(shape_m_s, dtype=float),
+        friction.along,
+        friction.across,
+        np.ones(len(points_m)) if share is None else np.ascontiguousarray(share, dtype=float),
+        fall,
+        heft,
+        velocity,
+    )
+
+
+@compiled(
+    "float64(float64[:, ::1], float64[:, ::1], float64, float64[::1], float64[:, ::1],"
+    " float64[::1])"
+)
+def _power(
+    rows: Floats, start: Floats, still: float, fall: Floats, heft: Floats, w: Floats
+) -> float:
+    """Dissipated by all links, less what the pull does; arguments as in ``_balance``."""
+    power = 0.0
+    for i in range(3):
+        power -= fall[i] * w[i]
+        for j in range(3):
+            power += 0.5 * heft[i, j] * w[i] * w[j]
+    for k in range(len(start)):
+        u, v = start[k, 0], start[k, 1]
+        for i in range(3):
+            u += rows[2 * k, i] * w[i]
+            v += rows[2 * k + 1, i] * w[i]
+        power += np.sqrt(u * u + v * v + still * still)
+    return power
+
+
+@compiled("void(float64[:, ::1], float64[::1], float64[::1])")
+def _solve(a: Floats, b: Floats, x: Floats) -> None:
+    """Positive definite ``a`` (3, 3) x = b, by Cholesky; ``a`` is used up."""
+    for i in range(3):
+        for j in range(i + 1):
+            for k in range(j):
+                a[i, j] -= a[i, k] * a[j, k]
+            a[i, j] = np.sqrt(a[i, i]) if i == j else a[i, j] / a[j, j]
+    for i in range(3):
+        x[i] = b[i]
+        for k in range(i):
+            x[i] -= a[i, k] * x[k]
+        x[i] /= a[i, i]
+    for i in range(2, -1, -1):
+        for k in range(i + 1, 3):
+            x[i] -= a[k, i] * x[k]
+        x[i] /= a[i, i]
+
+
+@compiled("boolean(float64[:, ::1], float64[::1], float64[::1])")
+def _runaway(rows: Floats, fall: Floats, w: Floats) -> bool:
+    """Whether the pull outdoes friction ever faster in the direction ``w``: no minimum."""
+    power = 0.0
+    for k in range(len(rows) // 2):
+        u, v = 0.0, 0.0
+        for i in range(3):
+            u += rows[2 * k, i] * w[i]
+            v += rows[2 * k + 1, i] * w[i]
+        power += np.sqrt(u * u + v * v)
+    gain = fall[0] * w[0] + fall[1] * w[1] + fall[2] * w[2]
+    return bool(power < (1.0 - 1e-9) * gain)
+
+
+@compiled(
+    "boolean(float64[:, ::1], float64[::1], float64[:, ::1], float64, float64, float64[::1],"
+    " float64[::1], float64[:, ::1], float64[::1])"
+)
+def _balance(
+    points_m: Floats,
+    headings_rad: Floats,
+    shape_m_s: Floats,
+    along: float,
+    across: float,
+    share: Floats,
+    fall: Floats,
+    heft: Floats,
+    w: Floats,
+) -> bool:
+    """Newton's method on the power, from ``w`` (3,) on, which is written; whether it has a minimum.
+
+    ``fall`` (3,) is the pull's power per (vx, vy, omega), ``heft`` (3, 3) a quadratic term.
+    """
+    links = len(points_m)
+    # weighted along and across velocity of each link as a linear map of (vx, vy, omega)
+    rows, start = np.empty((2 * links, 3)), np.empty((links, 2))
+    for k in range(links):
+        c, s = np.cos(headings_rad[k]), np.sin(headings_rad[k])
+        x, y = points_m[k, 0], points_m[k, 1]
+        ease, grip = along * share[k], across * share[k]
+        rows[2 * k, 0], rows[2 * k, 1], rows[2 * k, 2] = (
+            c * ease,
+            s * ease,
+            (s * x - c * y) * ease,
+        )
+        rows[2 * k + 1, 0], rows[2 * k + 1, 1] = -s * grip, c * grip
+        rows[2 * k + 1, 2] = (c * x + s * y) * grip
+        u, v = shape_m_s[k, 0], shape_m_s[k, 1]
+        start[k, 0], start[k, 1] = (c * u + s * v) * ease, (c * v - s * u) * grip
+    still = _STILL_M_S * across
+    gradient, step, pull, trial = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    hessian = np.empty((3, 3))
+    falling = not heft.any() and (fall[0] != 0.0 or fall[1] != 0.0 or fall[2] != 0.0)
+    best = _power(rows, start, still, fall, heft, w)
+    for _ in range(_STEPS):
+        for i in range(3):
+            gradient[i] = heft[i, 0] * w[0] + heft[i, 1] * w[1] + heft[i, 2] * w[2] - fall[i]
+        hessian[:] = heft
+        for k in range(links):
+            u, v = start[k, 0], start[k, 1]
+            for i in range(3):
+                u += rows[2 * k, i] * w[i]
+                v += rows[2 * k + 1, i] * w[i]
+            size = np.sqrt(u * u + v * v + still * still)
+            for i in range(3):
+                pull[i] = (u * rows[2 * k, i] + v * rows[2 * k + 1, i]) / size
+                gradient[i] += pull[i]
+            for i in range(3):
+                for j in range(i + 1):
+                    stiff = rows[2 * k, i] * rows[2 * k, j]
+                    stiff += rows[2 * k + 1, i] * rows[2 * k + 1, j]
+                    hessian[i, j] += (stiff - pull[i] * pull[j]) / size
+        steepest = max(abs(gradient[0]), abs(gradient[1]), abs(gradient[2]))
+        if steepest < 1e-9 * links * across:
+            break
+        for i in range(3):
+            hessian[i, i] += 1e-9
+        _solve(hessian, -gradient, step)
+        slope = gradient[0] * step[0] + gradient[1] * step[1] + gradient[2] * step[2]
+        scale = 1.0
+        trial[:] = w + step
+        now = _power(rows, start, still, fall, heft, trial)
+        while now > best + 1e-4 * scale * slope and scale > 1e-9:
+            scale *= 0.5
+            trial[:] = w + scale * step
+            now = _power(rows, start, still, fall, heft, trial)
+        if now >= best:
+            break
+        w[:] = trial
+        best = now
+        if falling and _runaway(rows, fall, w):
+            return False
+    return True

@@ -1,0 +1,110 @@
+"""How fast the synthesised body goes: viscous and Coulomb friction against its bends ([PT] 2.6.3).
+
+``dv/dt = max(0, c3 K - c4 |dO/dt|) - c1 v - c2`` with K the standard deviation of the skeleton
+angles and O the heading (Eq. 8-9). Corrections: Eq. 9 equates norms, by which no body ever slows
+down: here the acceleration is signed; ``v >= 0``, as friction never pushes backwards at rest; the
+printed constants have a length unit that the text does not name: here it is declared.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import least_squares, lsq_linear
+
+from snakewalk.config.arrays import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedLaw:
+    """The four constants, in SI units."""
+
+    viscous_1_s: float
+    """c1"""
+    coulomb_m_s2: float
+    """c2"""
+    bend_m_s2_rad: float
+    """c3, per radian of K"""
+    turn_m_s: float
+    """c4: m/s^2 lost per rad/s of turning"""
+
+    @classmethod
+    def printed(cls, unit_m: float, c4: float = 1.0) -> Self:
+        """Return the constants of [PT] (c1 = 1, c2 = 0.5, c3 = 6, c4 < 2) in a unit of length."""
+        return cls(1.0, 0.5 * unit_m, 6.0 * unit_m, c4 * unit_m)
+
+    def steady_m_s(self, bend_rad: ArrayLike, turn_rad_s: ArrayLike = 0.0) -> Floats:
+        """Speed at which nothing changes, ``(c3 K - c4 |O'| - c2) / c1``, or rest."""
+        free = self._push(bend_rad, turn_rad_s) - self.coulomb_m_s2
+        return np.asarray(np.maximum(free, 0.0) / self.viscous_1_s)
+
+    def step_m_s(self, speed_m_s: float, bend_rad: float, turn_rad_s: float, dt_s: float) -> float:
+        """Speed after one Euler step.
+
+        Raises:
+            ValueError: ``dt_s`` is not below ``2 / c1``, where Euler's method diverges.
+
+        """
+        if not 0.0 < dt_s * self.viscous_1_s < 2.0:
+            raise ValueError(f"time step {dt_s} s: below {2.0 / self.viscous_1_s:.3g} s is stable")
+        push = max(0.0, self.bend_m_s2_rad * bend_rad - self.turn_m_s * abs(turn_rad_s))
+        pull = self.viscous_1_s * speed_m_s + self.coulomb_m_s2
+        return max(0.0, speed_m_s + dt_s * (push - pull))
+
+    def _push(self, bend_rad: ArrayLike, turn_rad_s: ArrayLike) -> Floats:
+        bend = self.bend_m_s2_rad * np.asarray(bend_rad, float)
+        return np.asarray(np.maximum(bend - self.turn_m_s * np.abs(turn_rad_s), 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Identified:
+    """A law fitted to what a robot did."""
+
+    law: SpeedLaw
+    rms_m_s2: float
+    """Residual of the balance of accelerations; of steady samples, c1 times that of the speed."""
+    explained: float
+    """Share of the variance that the law explains; 0 or less: the samples do not follow it."""
+    samples: int
+    """Moving samples used; one at rest says only that the push is at most c2."""
+
+
+def identify(
+    bend_rad: Floats,
+    turn_rad_s: Floats,
+    speed_m_s: Floats,
+    acceleration_m_s2: Floats | None = None,
+    viscous_1_s: float = 1.0,
+) -> Identified:
+    """Fit the law to samples (S,) of a run, in simulation or measured, by bounded least squares.
+
+    Steady samples hold only ratios to c1, so without accelerations c1 is ``viscous_1_s``.
+
+    Raises:
+        ValueError: fewer moving samples than constants.
+
+    """
+    moving = speed_m_s > 1e-3 * max(float(np.max(speed_m_s, initial=0.0)), 1e-9)
+    k, turn, v = bend_rad[moving], np.abs(turn_rad_s[moving]), speed_m_s[moving]
+    steady = acceleration_m_s2 is None
+    if len(v) < (3 if steady else 4):
+        raise ValueError(f"{len(v)} moving samples are too few for the speed law")
+    columns = [-np.ones_like(v), k, -turn]
+    if acceleration_m_s2 is None:
+        wanted = viscous_1_s * v
+    else:
+        columns, wanted = [-v, *columns], acceleration_m_s2[moving]
+    start = lsq_linear(np.column_stack(columns), wanted, bounds=(0.0, np.inf)).x
+
+    def missing(at: Floats) -> Floats:
+        c2, c3, c4 = at[-3:]
+        drag = 0.0 if steady else at[0] * v
+        return np.asarray(np.maximum(c3 * k - c4 * turn, 0.0) - c2 - drag - wanted)
+
+    found = least_squares(missing, start, bounds=(0.0, np.inf))
+    c2, c3, c4 = (float(value) for value in found.x[-3:])
+    c1 = viscous_1_s if steady else max(float(found.x[0]), 1e-9)
+    rms = float(np.sqrt(np.mean(found.fun**2)))
+    explained = 1.0 - rms**2 / max(float(np.var(wanted)), 1e-30)
+    return Identified(SpeedLaw(c1, c2, c3, c4), rms, explained, len(v))

@@ -1,0 +1,144 @@
+"""Where a replay departs from its original: the first time and joint, and how far in all."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.runlog.record import RunRecord
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One quantity of two runs, row by row over the rows that both have."""
+
+    name: str
+    rows: int
+    """Rows compared."""
+    largest: float
+    """Largest absolute difference; inf where only one of the two is known."""
+    rms: float
+    """Root mean square over all rows and columns that both know."""
+    by_column: tuple[float, ...]
+    """Largest of each joint, or axis."""
+    first_s: float | None
+    """Time of the first row that differs; None if none does."""
+    first_column: int | None
+    """Joint, or axis, that differs there."""
+
+    @property
+    def same(self) -> bool:
+        """Whether every row agrees."""
+        return self.first_s is None
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Two runs, side by side."""
+
+    same_config: bool
+    cycles: tuple[int, int]
+    """Rows of the original and of the replay."""
+    differences: tuple[Difference, ...]
+
+    @property
+    def same(self) -> bool:
+        """Whether the replay is the original, as far as it was compared."""
+        return self.cycles[0] == self.cycles[1] and all(d.same for d in self.differences)
+
+    @property
+    def identical(self) -> bool:
+        """Whether no digit differs."""
+        return self.same and all(d.largest == 0.0 for d in self.differences)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "same": self.same,
+            "identical": self.identical,
+            "same_config": self.same_config,
+            "cycles": list(self.cycles),
+            "differences": {
+                d.name: {
+                    "rows": d.rows,
+                    "largest": d.largest if np.isfinite(d.largest) else None,
+                    "rms": d.rms,
+                    "by_column": [x if np.isfinite(x) else None for x in d.by_column],
+                    "first_s": d.first_s,
+                    "first_column": d.first_column,
+                }
+                for d in self.differences
+            },
+        }
+
+    def lines(self) -> tuple[str, ...]:
+        """For people, the first departure first."""
+        head = f"{self.cycles[0]} cycles against {self.cycles[1]}"
+        if not self.same_config:
+            head += "; the configurations differ"
+        if self.identical:
+            return (f"{head}: the replay is the same to the last digit of the log",)
+        order = sorted(self.differences, key=lambda d: np.inf if d.same else (d.first_s or 0.0))
+        return (head, *(_line(d) for d in order))
+
+
+def compare(
+    original: RunRecord,
+    replay: RunRecord,
+    tolerance: float = 0.0,
+    tolerances: Mapping[str, float] | None = None,
+) -> Comparison:
+    """Compare two runs cycle by cycle.
+
+    Args:
+        original: of the two.
+        replay: the other.
+        tolerance: a difference up to this, in SI units, counts as none.
+        tolerances: the same for single quantities, by name; infinite: told, never held against it.
+
+    """
+    limits = dict(tolerances or {})
+    a, b = original.cycle, replay.cycle
+    names = ("asked_rad", "sent_rad", "measured_rad", "velocity_rad_s", "current_a")
+    pairs: list[tuple[str, Floats, Floats, Floats]] = [
+        (name, a.deadline_s, getattr(a, name), getattr(b, name)) for name in names
+    ]
+    p, q = original.pose, replay.pose
+    pairs += [("head_m", p.time_s, p.head_m, q.head_m)]
+    pairs += [("deadline_s", a.deadline_s, a.deadline_s[:, None], b.deadline_s[:, None])]
+    return Comparison(
+        same_config=original.header.config_hash == replay.header.config_hash,
+        cycles=(len(a.time_s), len(b.time_s)),
+        differences=tuple(_difference(*pair, limits.get(pair[0], tolerance)) for pair in pairs),
+    )
+
+
+def _difference(name: str, time_s: Floats, a: Floats, b: Floats, tolerance: float) -> Difference:
+    rows = min(len(a), len(b))
+    if a.shape[1:] != b.shape[1:]:
+        first_s = float(time_s[0]) if rows else 0.0
+        return Difference(name, rows, float("inf"), float("inf"), (), first_s, None)
+    gap = np.abs(a[:rows] - b[:rows])
+    gap[np.isnan(a[:rows]) & np.isnan(b[:rows])] = 0.0
+    gap[np.isnan(gap)] = np.inf
+    known = gap[np.isfinite(gap)]
+    rms = float(np.sqrt(np.square(known).mean())) if known.size else 0.0
+    sizes = float(gap.max(initial=0.0)), rms, tuple(gap.max(axis=0, initial=0.0).tolist())
+    bad = np.argwhere(gap > tolerance)
+    if len(bad) == 0:
+        return Difference(name, rows, *sizes, None, None)
+    row, column = bad[0]
+    return Difference(name, rows, *sizes, float(time_s[row]), int(column))
+
+
+def _line(d: Difference) -> str:
+    if d.largest == 0.0:
+        return f"{d.name}: same in {d.rows} rows"
+    if d.same:
+        return f"{d.name}: within its tolerance; {d.largest:.3g} at most, {d.rms:.3g} RMS"
+    part = "axis" if d.name == "head_m" else "joint"
+    where = "" if d.first_column is None or d.name == "deadline_s" else f", {part} {d.first_column}"
+    size = f"{d.largest:.3g} at most, {d.rms:.3g} RMS"
+    return f"{d.name}: differs first at {d.first_s:.3f} s{where}; by {size}"

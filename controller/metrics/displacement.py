@@ -1,0 +1,79 @@
+"""How far a gait carried the body in a cycle, by its log: in the frame of the virtual chassis."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.gaits.registry import make_gait
+from snakewalk.controller.kinematics.virtual_chassis import Frame, virtual_chassis
+from snakewalk.controller.motion.gait_cycle import Cycle
+from snakewalk.controller.motion.stop_profile import STOP_S
+from snakewalk.controller.runlog.record import RunRecord
+
+SKIPPED_S = 1.5
+"""After the ramp: the gait comes up to speed and the body into its shape."""
+
+
+@dataclass(frozen=True, slots=True)
+class GaitWay:
+    """Means over whole cycles at full rate; NaN where the log holds none."""
+
+    cycles: int
+    frequency_hz: float
+    forward_bl: float
+    """Body lengths a cycle along the virtual chassis, towards the head."""
+    left_bl: float
+    turn_rad: float
+    """A cycle, positive to the left."""
+    speed_m_s: float
+    """Over the ground."""
+    up_bl: float = float("nan")
+    """Body lengths a cycle: what a climber is for."""
+
+
+def gait_way(record: RunRecord) -> GaitWay:
+    """Judge a gait run whose parameters did not change.
+
+    Raises:
+        InputError: the log is of another motion.
+
+    """
+    config, robot, pose = record.header.run.gait, record.header.robot, record.pose
+    if config is None:
+        raise InputError("the log is of no gait")
+    hz = Cycle(make_gait(config.name, config.parameters), robot).frequency_hz
+    nothing = GaitWay(0, hz, *(float("nan"),) * 4)
+    known = np.isfinite(pose.links_m).all(axis=(1, 2))
+    if not known.any() or hz <= 0.0:
+        return nothing
+    time_s, links = pose.time_s[known], pose.links_m[known]
+    up = pose.rotation[known][:, :, 2]
+    last_s = time_s[-1] - STOP_S
+    first_s = max(last_s - config.duration_s + SKIPPED_S, float(time_s[0]))
+    count = int((last_s - first_s) * hz + 1e-9)
+    if count < 1:
+        return nothing
+    frames: list[Frame] = []
+    marks: list[Frame] = []
+    due = last_s - np.arange(count, -1, -1) / hz
+    for k in range(int(np.searchsorted(time_s, due[0])), len(time_s)):
+        frames = [virtual_chassis(links[k], up[k], frames[0] if frames else None)]
+        if len(marks) <= count and time_s[k] >= due[len(marks)] - 1e-9:
+            marks.append(frames[0])
+    count = len(marks) - 1
+    centre = np.array([mark.origin_m[:2] for mark in marks])
+    heading = np.unwrap([mark.heading_rad for mark in marks])
+    middle = 0.5 * (heading[1:] + heading[:-1])
+    dx, dy = np.diff(centre, axis=0).T
+    forward = np.cos(middle) * dx + np.sin(middle) * dy
+    left = -np.sin(middle) * dx + np.cos(middle) * dy
+    return GaitWay(
+        count,
+        hz,
+        float(forward.mean()) / robot.length_m,
+        float(left.mean()) / robot.length_m,
+        float((heading[-1] - heading[0]) / count),
+        float(np.hypot(forward.mean(), left.mean())) * hz,
+        float(marks[-1].origin_m[2] - marks[0].origin_m[2]) / count / robot.length_m,
+    )

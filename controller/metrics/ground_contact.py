@@ -1,0 +1,38 @@
+"""How the body lay on the ground during a run: how far it rolled, how much hung in the air."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.heightfield import HeightField
+from snakewalk.controller.runlog.record import RunRecord
+
+CLEAR_M = 0.005
+"""A link this far above where it would rest is counted as in the air."""
+
+
+@dataclass(frozen=True, slots=True)
+class Footing:
+    """Over all cycles of a run."""
+
+    roll_max_rad: float
+    """Largest lean of the head link to a side."""
+    in_air: float
+    """Share of links in the air, mean."""
+
+
+def footing(record: RunRecord, ground: HeightField | None) -> Footing:
+    """Judge a run's poses; NaN where the log has none."""
+    pose = record.pose
+    if len(pose.time_s) == 0 or not np.isfinite(pose.links_m).all():
+        return Footing(float("nan"), float("nan"))
+    x, y, z = np.moveaxis(pose.links_m, -1, 0)
+    rest = np.zeros_like(z)
+    if ground is not None:
+        gx, gy = ground.gradient(x, y)
+        # a ball on a slope touches uphill of its centre
+        lean = record.header.robot.body_radius_m * (np.sqrt(1.0 + gx**2 + gy**2) - 1.0)
+        rest = ground.elevation_m(x, y) + lean
+    gap = z - rest - record.header.robot.body_radius_m
+    roll = np.arcsin(np.clip(pose.rotation[:, 2, 1], -1.0, 1.0))
+    return Footing(float(np.abs(roll).max()), float((gap > CLEAR_M).mean()))

@@ -1,0 +1,77 @@
+"""Where the body went against where it should: waypoints in order, distance from the path."""
+
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.runlog.record import PlanSummary, PoseTable, RunRecord
+
+_WINDOW_M: Final = 0.5  # around the place reached, so that a crossing branch is not the nearest
+_ROUNDING_M: Final = 2e-6  # of the log
+_ROWS: Final = 2000
+
+
+def waypoint_times_s(pose: PoseTable, plan: PlanSummary) -> Floats:
+    """Find the times (k,) at which the centre of mass came to the waypoints, in order, k <= w."""
+    times: list[float] = []
+    first = 0
+    for waypoint in plan.waypoints_m:
+        far = np.hypot(*(pose.centre_m[first:, :2] - waypoint).T)
+        inside = np.flatnonzero(far <= plan.waypoint_radius_m + _ROUNDING_M)
+        if len(inside) == 0:
+            break
+        first += int(inside[0])
+        times.append(float(pose.time_s[first]))
+    return np.array(times)
+
+
+def path_error_m(record: RunRecord) -> Floats:
+    """Distance (P,) of the centre of mass from the path then in force, in the horizontal plane.
+
+    NaN for a run without waypoints: its plan has no path.
+    """
+    pose = record.pose
+    if len(record.header.plan.waypoints_m) == 0:
+        return np.full(len(pose.time_s), np.nan)
+    starts = [start for start, _ in record.paths]
+    which = np.searchsorted(starts, pose.time_s, side="right") - 1
+    error = np.full(len(pose.time_s), np.nan)
+    for k, (_, path) in enumerate(record.paths):
+        rows = np.flatnonzero(which == k)
+        for part in np.split(rows, range(_ROWS, len(rows), _ROWS)):
+            error[part] = distance_m(pose.centre_m[part, :2], path[:, :2], pose.path_s_m[part])
+    return error
+
+
+def distance_m(points_m: Floats, path_m: Floats, along_m: Floats) -> Floats:
+    """Distance (n,) of points (n, 2) from a polyline (m, 2) near arc lengths ``along_m`` (n,).
+
+    The path is taken to come straight to its start: a body that lies behind it is not off it.
+    Where ``along_m`` is NaN the whole path is searched.
+    """
+    step = np.diff(path_m, axis=0)
+    length = np.hypot(*step.T)
+    keep = length > 1e-9
+    if not keep.any():
+        return np.asarray(np.hypot(*(points_m - path_m[0]).T))
+    a, step, length = path_m[:-1][keep], step[keep], length[keep]
+    end = np.cumsum(length)
+    t = np.einsum("nmi,mi->nm", points_m[:, None] - a, step) / length**2
+    low = np.zeros(len(a))
+    low[0] = -np.inf
+    foot = a + np.clip(t, low, 1.0)[..., None] * step
+    gap = np.hypot(*np.moveaxis(points_m[:, None] - foot, -1, 0))
+    at = np.clip(along_m, 0.0, end[-1])[:, None]
+    far = (end < at - _WINDOW_M) | (end - length > at + _WINDOW_M)  # False where NaN
+    return np.asarray(np.where(far, np.inf, gap).min(axis=1))
+
+
+def travelled_m(pose: PoseTable) -> float:
+    """Length of the way of the centre of mass in the horizontal plane."""
+    return float(np.hypot(*np.diff(pose.centre_m[:, :2], axis=0).T).sum())
+
+
+def length_m(path_m: Floats) -> float:
+    """Length of a polyline (m, 2 or 3) in the horizontal plane."""
+    return float(np.hypot(*np.diff(path_m[:, :2], axis=0).T).sum())

@@ -1,0 +1,37 @@
+"""Joints that follow a wish as fast as they may: speed and acceleration are limited by making."""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+
+
+class Follower:
+    """A second-order follower; call ``step`` with the angles wished for."""
+
+    def __init__(
+        self,
+        angle_rad: Floats,
+        speed_limit_rad_s: float,
+        acceleration_limit_rad_s2: float,
+        gain_per_s: float = 12.0,
+    ) -> None:
+        self.angle_rad = np.array(angle_rad, dtype=float)
+        self.speed_rad_s = np.zeros(len(self.angle_rad))
+        self._speed, self._acceleration = speed_limit_rad_s, acceleration_limit_rad_s2
+        self._gain = gain_per_s
+
+    def step(self, dt_s: float, wish_rad: Floats) -> Floats:
+        """Go on by ``dt_s`` towards ``wish_rad`` (n,); returns the angles (n,).
+
+        The speed wanted is never one from which it could not stop at the wish.
+        """
+        if dt_s <= 0.0:
+            return self.angle_rad
+        error = wish_rad - self.angle_rad
+        stoppable = np.sqrt(self._acceleration * np.abs(error))
+        most = np.minimum(np.minimum(self._gain * np.abs(error), stoppable), self._speed)
+        change = np.sign(error) * most - self.speed_rad_s
+        room = self._acceleration * dt_s
+        self.speed_rad_s = self.speed_rad_s + np.clip(change, -room, room)
+        self.angle_rad = self.angle_rad + dt_s * self.speed_rad_s
+        return self.angle_rad

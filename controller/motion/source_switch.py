@@ -1,0 +1,70 @@
+"""A motion source that can be handed from one source to another while it runs."""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Needs
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.blend import Blend
+from snakewalk.controller.motion.source import MotionSource, Pace
+
+
+class Relay:
+    """Begins at rest where its first source begins; ``join`` changes the source, C1."""
+
+    def __init__(self, robot: RobotConfig, first: MotionSource) -> None:
+        first.needs.check(robot, "this motion")
+        self._robot = robot
+        self._limit = Pace.limit(robot)
+        start = first.goal_rad()
+        self._blend = Blend(start, np.zeros(len(start)), first, self._limit)
+
+    @property
+    def source(self) -> MotionSource:
+        """What runs now."""
+        return self._blend.target
+
+    @property
+    def blending(self) -> bool:
+        """Whether a join is under way."""
+        return not self._blend.over
+
+    def join(self, source: MotionSource) -> float:
+        """Hand over to ``source``; returns how long the join takes, s.
+
+        Raises:
+            InputError: the robot lacks joints that it needs.
+            ValueError: it asks for more than the robot's limits.
+
+        """
+        source.needs.check(self._robot, "this motion")
+        blend = Blend(self.goal_rad(), self.velocity_rad_s(), source, self._limit)
+        self._blend = blend
+        return blend.join.duration_s
+
+    @property
+    def needs(self) -> Needs:
+        """Those of what runs now."""
+        return self.source.needs
+
+    @property
+    def done(self) -> bool:
+        """Whether what runs now is done."""
+        return self._blend.over and self.source.done
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return self._blend.goal_rad()
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        return self._blend.velocity_rad_s()
+
+    def pace(self) -> Pace:
+        """At most the robot's limits while it joins, and the source's own pace afterwards."""
+        return self._limit if self.blending else self.source.pace()
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Go on by ``dt_s`` and return the new targets (J,)."""
+        return self._blend.step(dt_s, view)

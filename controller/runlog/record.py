@@ -1,0 +1,205 @@
+"""A run as its log tells it: one table a topic, rows in order of time, NaN where nothing is known.
+
+T, S, P, W count the rows of a topic; J joints, L links.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+
+
+@dataclass(frozen=True, slots=True)
+class PlanSummary:
+    """What the plan promises."""
+
+    path_m: Floats
+    """(n, 2) or (n, 3) points of the path that the run starts with."""
+    waypoints_m: Floats
+    """(w, 2)"""
+    waypoint_radius_m: float
+    predicted_speed_m_s: float = float("nan")
+    states: Mapping[str, int] | None = None
+    """Counts of the state library, e.g. ``{"recorded": 40, "random": 160, "refused": 71}``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Laid:
+    """How a simulated robot was laid down."""
+
+    heading_rad: float
+    """Of the head link."""
+    joint_rad: Floats
+    """(J,)"""
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What ran, with what."""
+
+    software: str
+    backend: str
+    config_hash: str
+    seed: int
+    run: RunConfig
+    robot: RobotConfig
+    world: WorldConfig
+    plan: PlanSummary
+    ground: HeightField | None
+    """Thinned; None on a flat floor."""
+    torque_constant_n_m_a: float
+    laid: Laid | None
+    """None on metal."""
+
+
+@dataclass(frozen=True, slots=True)
+class CycleTable:
+    """Control cycles."""
+
+    time_s: Floats
+    """(T,)"""
+    asked_rad: Floats
+    """(T, J) what the motion wanted."""
+    sent_rad: Floats
+    """(T, J) what safety let through."""
+    measured_rad: Floats
+    """(T, J)"""
+    velocity_rad_s: Floats
+    """(T, J)"""
+    current_a: Floats
+    """(T, J)"""
+    age_s: Floats
+    """(T, J)"""
+    valid: NDArray[np.bool_]
+    """(T, J)"""
+    error: Ints
+    """(T, J) error byte."""
+    deadline_s: Floats
+    """(T,)"""
+    lateness_s: Floats
+    """(T,)"""
+    wire_busy_s: Floats
+    """(T,)"""
+    verdict: tuple[str, ...]
+    """T of pass, clamp, veto."""
+    reason: tuple[str, ...]
+    joints: tuple[tuple[int, ...], ...]
+    """Joints that a verdict concerns."""
+
+
+@dataclass(frozen=True, slots=True)
+class SlowTable:
+    """Slow round: a row for each change."""
+
+    time_s: Floats
+    """(S,)"""
+    temperature_c: Floats
+    """(S, J)"""
+    voltage_v: Floats
+    """(S, J)"""
+    hardware_error: Ints
+    """(S, J)"""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseTable:
+    """Where the body was."""
+
+    time_s: Floats
+    """(P,)"""
+    head_m: Floats
+    """(P, 3)"""
+    rotation: Floats
+    """(P, 3, 3) head link in the world."""
+    links_m: Floats
+    """(P, L, 3); NaN where unknown."""
+    centre_m: Floats
+    """(P, 3) centre of mass."""
+    speed_m_s: Floats
+    """(P,) forward speed of the links."""
+    predicted_speed_m_s: Floats
+    """(P,)"""
+    pulse_m_s: Floats
+    """(P,) u, at which the shape travels along the body."""
+    path_s_m: Floats
+    """(P,) arc length reached on the path."""
+    target: Ints
+    """(P,) index of the next waypoint."""
+
+
+@dataclass(frozen=True, slots=True)
+class WalkTable:
+    """Decisions of the walk."""
+
+    time_s: Floats
+    """(W,)"""
+    state: Ints
+    """(W,)"""
+    visited: Ints
+    """(W,) distinct states so far."""
+    heading_error_rad: Floats
+    """(W,)"""
+    ramp_rad: Floats
+    """(W,)"""
+    candidates: Ints
+    """(W,)"""
+    eta_q: Floats
+    """(W,)"""
+
+
+@dataclass(frozen=True, slots=True)
+class QposTable:
+    """Generalised positions of the simulation."""
+
+    time_s: Floats
+    """(Q,)"""
+    qpos: Floats
+    """(Q, nq)"""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened."""
+
+    time_s: float
+    level: str
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class RunRecord:
+    """Everything that a log holds."""
+
+    header: Header
+    cycle: CycleTable
+    slow: SlowTable
+    pose: PoseTable
+    walk: WalkTable
+    qpos: QposTable
+    paths: tuple[tuple[float, Floats], ...]
+    """Paths in force from a time on; the first is the plan's, at 0."""
+    events: tuple[Event, ...]
+    complete: bool
+    """Whether the file was closed properly."""
+    note: str
+    """What is missing, if it was not; empty otherwise."""
+
+    @property
+    def period_s(self) -> float:
+        """Length of a control cycle."""
+        return 1.0 / self.header.run.cycle_hz
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last row."""
+        ends = [t.time_s[-1] for t in (self.cycle, self.pose, self.walk) if len(t.time_s)]
+        ends += [e.time_s for e in self.events[-1:]]
+        return float(max(ends, default=0.0))

@@ -1,0 +1,163 @@
+"""Rows to tables: lists of JSON objects become arrays with one entry a row."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.runlog.record import (
+    CycleTable,
+    Event,
+    Header,
+    Laid,
+    PlanSummary,
+    PoseTable,
+    QposTable,
+    RunRecord,
+    SlowTable,
+    WalkTable,
+)
+
+Row = Mapping[str, Any]
+
+
+def record_of(rows: Mapping[str, Sequence[Row]], *, complete: bool, note: str) -> RunRecord:
+    """Build the record from rows by topic; the first ``/config`` counts.
+
+    Raises:
+        KeyError: a row lacks a field.
+        pydantic.ValidationError: the configuration is not of this version.
+
+    """
+    header = _header(rows["/config"][0])
+    joints = header.robot.joint_count
+    laid = tuple((float(r["time_s"]), _floats([r], "points_m")[0]) for r in rows.get("/path", ()))
+    return RunRecord(
+        header=header,
+        cycle=_cycle(rows.get("/cycle", ()), joints),
+        slow=_slow(rows.get("/slow", ()), joints),
+        pose=_pose(rows.get("/pose", ()), joints + 1),
+        walk=_walk(rows.get("/walk", ())),
+        qpos=_qpos(rows.get("/qpos", ())),
+        paths=((0.0, header.plan.path_m), *laid),
+        events=tuple(
+            Event(float(r["time_s"]), r["level"], r["kind"], r["text"])
+            for r in rows.get("/event", ())
+        ),
+        complete=complete,
+        note=note,
+    )
+
+
+def _header(row: Row) -> Header:
+    plan, ground = row["plan"], row["ground"]
+    return Header(
+        software=row["software"],
+        backend=row["backend"],
+        config_hash=row["config_hash"],
+        seed=row["seed"],
+        run=RunConfig.model_validate(row["run"]),
+        robot=RobotConfig.model_validate(row["robot"]),
+        world=WorldConfig.model_validate(row["world"]),
+        plan=PlanSummary(
+            path_m=_array(plan["path_m"]),
+            waypoints_m=_array(plan["waypoints_m"]).reshape(-1, 2),
+            waypoint_radius_m=plan["waypoint_radius_m"],
+            predicted_speed_m_s=float(_array(plan["predicted_speed_m_s"])),
+            states=plan["states"],
+        ),
+        ground=None
+        if ground is None
+        else HeightField(
+            _array(ground["z_m"]), ground["spacing_m"], ground["x0_m"], ground["y0_m"]
+        ),
+        torque_constant_n_m_a=float(_array(row["torque_constant_n_m_a"])),
+        laid=None
+        if row.get("laid") is None
+        else Laid(row["laid"]["heading_rad"], _array(row["laid"]["joint_rad"])),
+    )
+
+
+def _cycle(rows: Sequence[Row], joints: int) -> CycleTable:
+    def per_joint(name: str) -> Floats:
+        return _floats(rows, name, joints)
+
+    return CycleTable(
+        time_s=_floats(rows, "time_s"),
+        asked_rad=per_joint("asked_rad"),
+        sent_rad=per_joint("sent_rad"),
+        measured_rad=per_joint("measured_rad"),
+        velocity_rad_s=per_joint("velocity_rad_s"),
+        current_a=per_joint("current_a"),
+        age_s=per_joint("age_s"),
+        valid=np.array([r["valid"] for r in rows], dtype=bool).reshape(len(rows), joints),
+        error=_ints(rows, "error", joints),
+        deadline_s=_floats(rows, "deadline_s"),
+        lateness_s=_floats(rows, "lateness_s"),
+        wire_busy_s=_floats(rows, "wire_busy_s"),
+        verdict=tuple(r["verdict"] for r in rows),
+        reason=tuple(r["reason"] for r in rows),
+        joints=tuple(tuple(r["joints"]) for r in rows),
+    )
+
+
+def _slow(rows: Sequence[Row], joints: int) -> SlowTable:
+    return SlowTable(
+        time_s=_floats(rows, "time_s"),
+        temperature_c=_floats(rows, "temperature_c", joints),
+        voltage_v=_floats(rows, "voltage_v", joints),
+        hardware_error=_ints(rows, "hardware_error", joints),
+    )
+
+
+def _pose(rows: Sequence[Row], links: int) -> PoseTable:
+    unknown = [[None] * 3] * links
+    known = [r["links_m"] if r["links_m"] is not None else unknown for r in rows]
+    return PoseTable(
+        time_s=_floats(rows, "time_s"),
+        head_m=_floats(rows, "head_m", 3),
+        rotation=_floats(rows, "rotation", 9).reshape(-1, 3, 3),
+        links_m=_array(known).reshape(len(rows), links, 3),
+        centre_m=_floats(rows, "centre_m", 3),
+        speed_m_s=_floats(rows, "speed_m_s"),
+        predicted_speed_m_s=_floats(rows, "predicted_speed_m_s"),
+        pulse_m_s=_floats(rows, "pulse_m_s"),
+        path_s_m=_floats(rows, "path_s_m"),
+        target=_ints(rows, "target"),
+    )
+
+
+def _walk(rows: Sequence[Row]) -> WalkTable:
+    return WalkTable(
+        time_s=_floats(rows, "time_s"),
+        state=_ints(rows, "state"),
+        visited=_ints(rows, "visited"),
+        heading_error_rad=_floats(rows, "heading_error_rad"),
+        ramp_rad=_floats(rows, "ramp_rad"),
+        candidates=_ints(rows, "candidates"),
+        eta_q=_floats(rows, "eta_q"),
+    )
+
+
+def _qpos(rows: Sequence[Row]) -> QposTable:
+    width = len(rows[0]["qpos"]) if rows else 0
+    return QposTable(_floats(rows, "time_s"), _floats(rows, "qpos", width))
+
+
+def _array(values: Any) -> Floats:
+    return np.array(values, dtype=float)  # None becomes NaN
+
+
+def _floats(rows: Sequence[Row], name: str, width: int | None = None) -> Floats:
+    values = _array([r[name] for r in rows])
+    return values if width is None else values.reshape(len(rows), width)
+
+
+def _ints(rows: Sequence[Row], name: str, width: int | None = None) -> Ints:
+    values: Ints = np.array([r[name] for r in rows], dtype=np.int64)
+    return values if width is None else values.reshape(len(rows), width)

@@ -1,0 +1,248 @@
+"""Writes the log row by row: a kill costs half a second at most, a disk fault stops the run."""
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Literal, Self
+
+import numpy as np
+from mcap.writer import Writer
+from numpy.typing import ArrayLike
+
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.loader import digest
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.runlog.encode import (
+    encode,
+    exact,
+    exact_text,
+    flags_text,
+    floats,
+    number,
+    rounded_text,
+    rounded_texts,
+    text,
+    thinned,
+)
+from snakewalk.controller.runlog.record import Laid, PlanSummary
+from snakewalk.controller.runlog.schema import FORMAT, TOPICS, schema_json, schema_name
+from snakewalk.drivers.types import JointState
+
+Level = Literal["info", "warning", "error"]
+VerdictKind = Literal["pass", "clamp", "veto"]
+_FLUSH_S: Final = 0.5
+_CHUNK_BYTES: Final = 1 << 20
+
+
+class RunLog:
+    """One run's log; a context manager. Writes ``<path>.part``, renamed to ``path`` on leaving.
+
+    Times must not be negative. Any method raises OSError when the disk does not take the bytes.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._part = part_path(path)
+        self._file = self._part.open("wb")
+        self._writer: Any = Writer(  # half untyped
+            self._file, chunk_size=_CHUNK_BYTES, enable_data_crcs=True
+        )
+        self._writer.start(profile="", library=f"snakewalk {version('snakewalk')}")
+        self._channels: dict[str, int] = {}
+        for topic in TOPICS:
+            schema = self._writer.register_schema(
+                schema_name(topic), "jsonschema", schema_json(topic)
+            )
+            self._channels[topic] = self._writer.register_channel(topic, "json", schema)
+        self._flushed_s = 0.0
+        self._slow = b""
+
+    def __enter__(self) -> Self:
+        """Start at once."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Finish the file also when the run ends with an error: the log says how it came to it."""
+        self._writer.finish()
+        self._file.close()
+        self._part.replace(self.path)
+
+    def config(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        world: WorldConfig,
+        *,
+        backend: str,
+        plan: PlanSummary,
+        ground: HeightField | None = None,
+        torque_constant_n_m_a: float = float("nan"),
+        laid: Laid | None = None,
+    ) -> None:
+        """Say once, first, what runs; the ground is thinned, so that a report can draw it."""
+        row = {
+            "format": FORMAT,
+            "software": version("snakewalk"),
+            "backend": backend,
+            "config_hash": digest(run, robot, world),
+            "seed": run.seed,
+            "run": run.model_dump(mode="json"),
+            "robot": robot.model_dump(mode="json"),
+            "world": world.model_dump(mode="json"),
+            "torque_constant_n_m_a": number(torque_constant_n_m_a),
+            "laid": None
+            if laid is None
+            else {"heading_rad": float(laid.heading_rad), "joint_rad": exact(laid.joint_rad)},
+            "plan": {
+                "path_m": floats(plan.path_m),
+                "waypoints_m": floats(plan.waypoints_m),
+                "waypoint_radius_m": number(plan.waypoint_radius_m),
+                "predicted_speed_m_s": number(plan.predicted_speed_m_s),
+                "states": dict(plan.states or {}),
+            },
+            "ground": None if ground is None else thinned(ground),
+        }
+        self._add("/config", 0.0, row)
+        self._writer.flush()
+
+    def cycle(
+        self,
+        time_s: float,
+        asked_rad: ArrayLike,
+        sent_rad: ArrayLike,
+        state: JointState,
+        *,
+        deadline_s: float,
+        lateness_s: float,
+        wire_busy_s: float = float("nan"),
+        verdict: VerdictKind = "pass",
+        reason: str = "",
+        joints: Sequence[int] = (),
+    ) -> None:
+        """One control cycle; writes ``/slow`` too when temperature, voltage or alarms changed."""
+        asked, sent = np.asarray(asked_rad, dtype=float), np.asarray(sent_rad, dtype=float)
+        asked_text = exact_text(asked)
+        same = sent.tobytes() == asked.tobytes()
+        position, velocity, current, age = rounded_texts(
+            (state.position_rad, state.velocity_rad_s, state.current_a, state.age_s)
+        )
+        row = (
+            f'{{"time_s":{text(time_s)},"asked_rad":{asked_text},'
+            f'"sent_rad":{asked_text if same else exact_text(sent)},'
+            f'"measured_rad":{position},"velocity_rad_s":{velocity},"current_a":{current},'
+            f'"age_s":{age},"valid":{flags_text(state.valid.tobytes(), state.valid.dtype.char)},'
+            f'"error":{flags_text(state.error.tobytes(), state.error.dtype.char)},'
+            f'"deadline_s":{text(deadline_s)},'
+            f'"lateness_s":{rounded_text(lateness_s)},"wire_busy_s":{rounded_text(wire_busy_s)},'
+            f'"verdict":"{verdict}","reason":{encode(reason)},'
+            f'"joints":{encode([int(j) for j in joints])}}}'
+        )
+        self._add_text("/cycle", time_s, row)
+        self._slow_row(time_s, state)
+
+    def pose(
+        self,
+        time_s: float,
+        head_m: ArrayLike,
+        rotation: ArrayLike,
+        *,
+        links_m: ArrayLike | None = None,
+        centre_m: ArrayLike,
+        speed_m_s: float = float("nan"),
+        predicted_speed_m_s: float = float("nan"),
+        pulse_m_s: float = float("nan"),
+        path_s_m: float = float("nan"),
+        target: int = 0,
+    ) -> None:
+        """Where the body is: head (3,), rotation (3, 3), links (L, 3), centre of mass (3,)."""
+        given = (head_m, np.ravel(rotation), centre_m, *(() if links_m is None else (links_m,)))
+        head, turn, centre, *links = rounded_texts([np.asarray(a, dtype=float) for a in given])
+        row = (
+            f'{{"time_s":{text(time_s)},"head_m":{head},"rotation":{turn},'
+            f'"links_m":{links[0] if links else "null"},"centre_m":{centre},'
+            f'"speed_m_s":{rounded_text(speed_m_s)},'
+            f'"predicted_speed_m_s":{rounded_text(predicted_speed_m_s)},'
+            f'"pulse_m_s":{rounded_text(pulse_m_s)},"path_s_m":{rounded_text(path_s_m)},'
+            f'"target":{int(target)}}}'
+        )
+        self._add_text("/pose", time_s, row)
+
+    def path_laid(self, time_s: float, points_m: ArrayLike) -> None:
+        """Log a path (n, 2) or (n, 3) that replaces the plan's."""
+        self._add("/path", time_s, {"time_s": time_s, "points_m": floats(points_m)})
+
+    def walk(
+        self,
+        time_s: float,
+        *,
+        state: int,
+        visited: int,
+        heading_error_rad: float,
+        ramp_rad: float,
+        candidates: int,
+        eta_q: float = float("nan"),
+    ) -> None:
+        """One decision of the walk."""
+        row = {
+            "time_s": time_s,
+            "state": int(state),
+            "visited": int(visited),
+            "heading_error_rad": number(heading_error_rad),
+            "ramp_rad": number(ramp_rad),
+            "candidates": int(candidates),
+            "eta_q": number(eta_q),
+        }
+        self._add("/walk", time_s, row)
+
+    def event(self, time_s: float, kind: str, text: str, level: Level = "info") -> None:
+        """Log something that happened; above ``info`` it is on the disk when this returns."""
+        self._add("/event", time_s, {"time_s": time_s, "level": level, "kind": kind, "text": text})
+        if level != "info":
+            self._writer.flush()
+
+    def qpos(self, time_s: float, qpos: ArrayLike) -> None:
+        """Generalised position (nq,) of the simulation, for film and replay."""
+        self._add("/qpos", time_s, {"time_s": time_s, "qpos": floats(qpos)})
+
+    def _slow_row(self, time_s: float, state: JointState) -> None:
+        now = (
+            state.temperature_c.tobytes()
+            + state.voltage_v.tobytes()
+            + state.hardware_error.tobytes()
+        )
+        if now == self._slow:
+            return
+        self._slow = now
+        row = {
+            "time_s": time_s,
+            "temperature_c": floats(state.temperature_c),
+            "voltage_v": floats(state.voltage_v),
+            "hardware_error": state.hardware_error.tolist(),
+        }
+        self._add("/slow", time_s, row)
+
+    def _add(self, topic: str, time_s: float, row: Mapping[str, Any]) -> None:
+        self._add_text(topic, time_s, encode(row))
+
+    def _add_text(self, topic: str, time_s: float, row: str) -> None:
+        stamp_ns = round(time_s * 1e9)
+        self._writer.add_message(
+            self._channels[topic], stamp_ns, row.encode(), publish_time=stamp_ns
+        )
+        if time_s - self._flushed_s >= _FLUSH_S:
+            self._flushed_s = time_s
+            self._writer.flush()
+
+
+def part_path(path: Path) -> Path:
+    """Where a log is while it is being written, and stays when the run is killed."""
+    return path.with_name(path.name + ".part")

@@ -1,0 +1,58 @@
+"""The angle track: tangent angles along the way that the head goes, grown piece by piece.
+
+[PT] 2.6.4 looks the angles up again and again, a fraction of a point at a time, which blurs them.
+Here the samples stay untouched and one accumulated shift says where the head is on them, so with
+no sliding every point of the body passes through the angles of the head exactly.
+"""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+
+
+class AngleTrack:
+    """Unwrapped tangent angles, one sample per body segment length, oldest first.
+
+    Sample ``k`` is the angle at arc length ``k`` (in segments). A body of N segments whose head has
+    travelled ``head`` segments shows the samples ``head - 1, head - 2, ... head - N``, head first.
+    """
+
+    def __init__(self, body_rad: Floats) -> None:
+        self.points = len(body_rad)
+        """N, segments of the body."""
+        self._samples = np.array(body_rad[::-1], dtype=float)
+
+    @property
+    def end(self) -> int:
+        """Head position, in segments, at which the track runs out."""
+        return len(self._samples)
+
+    @property
+    def last_rad(self) -> float:
+        """Angle of the newest sample."""
+        return float(self._samples[-1])
+
+    def append(self, piece_rad: Floats) -> None:
+        """Add ``piece_rad`` (n,), oldest (tail side) first, as it is."""
+        self._samples = np.concatenate([self._samples, piece_rad])
+
+    def body_rad(self, head: float) -> Floats:
+        """Angles (N,), head first, of a body whose head has travelled ``head`` segments.
+
+        Raises:
+            ValueError: the head would be beyond the end, or the tail before the start.
+
+        """
+        if not self.points <= head <= self.end:
+            raise ValueError(f"head at {head:.2f}; the track serves {self.points} to {self.end}")
+        at = head - np.arange(1, self.points + 1)
+        return np.asarray(np.interp(at, np.arange(self.end), self._samples))
+
+    def at_rad(self, sample: Floats) -> Floats:
+        """Angles at places on the track, between samples linearly; clamped to its ends."""
+        return np.asarray(np.interp(sample, np.arange(self.end), self._samples))
+
+    def way(self, start: int, stop: int, rotation_rad: float = 0.0) -> Floats:
+        """Displacement (2,), in segments, of a head that follows the samples without slip."""
+        angles = self._samples[start:stop] + rotation_rad
+        return np.array([np.cos(angles).sum(), np.sin(angles).sum()])

@@ -1,0 +1,102 @@
+"""The angle track as this robot's joints see it: goals along the head's way, smooth to one order.
+
+Joint angles are known at whole heads, where the skeleton falls on the samples; between them a
+quadratic B-spline runs, so that slope is continuous and the second derivative is known everywhere.
+That is what lets a time law keep joint speed *and* acceleration within limits.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.drivers.compiling import compiled
+
+
+class JointTrack:
+    """Joint angles of a body whose head has travelled ``head`` segments along ``track``."""
+
+    def __init__(
+        self,
+        track: AngleTrack,
+        joints_of: Callable[[Floats], Floats],
+        limit_rad: ArrayLike = np.inf,
+    ) -> None:
+        """Follow ``track``.
+
+        Args:
+            track: grown by others.
+            joints_of: maps skeletons (..., N) to joints (..., J).
+            limit_rad: (J,) half ranges; a window between two shapes that bends further is kept to
+                them, and the measured heading makes up for it in the next decision.
+
+        """
+        self.track = track
+        self._limit_rad = np.asarray(limit_rad, dtype=float)
+        self._joints = joints_of
+        self.first = track.points
+        """The head at which the first sample of the tables stands."""
+        self._q = self._joints_of(track.body_rad(float(track.points)))[None]
+
+    def _joints_of(self, body_rad: Floats) -> Floats:
+        return np.clip(self._joints(body_rad), -self._limit_rad, self._limit_rad)
+
+    @property
+    def last(self) -> int:
+        """Largest head at which the goal no longer depends on what will be appended, plus one."""
+        return self.first + len(self._q) - 1
+
+    def grow(self) -> bool:
+        """Take in what was appended to the track; true if anything was."""
+        if self.track.end == self.last:
+            return False
+        heads = range(self.last + 1, self.track.end + 1)
+        bodies = np.stack([self.track.body_rad(float(head)) for head in heads])
+        self._q = np.concatenate([self._q, self._joints_of(bodies)])
+        return True
+
+    def goal_rad(self, head: float) -> Floats:
+        """(J,) joint angles; at both ends of what is known the spline runs on straight."""
+        goal = np.empty(self._q.shape[1])
+        _spline(self._q, head - self.first, goal)
+        return goal
+
+    def bends(self, start: int) -> tuple[Floats, Floats]:
+        """Largest |dq/dS| and |d2q/dS2| over the joints near each whole head from ``start`` on.
+
+        Returns:
+            Two arrays (last - start + 1,): rad per segment, rad per segment squared, each the
+            largest within one segment to either side.
+
+        """
+        low = max(start - 2 - self.first, 0)
+        q = self._q[low:]
+        if len(q) < 2:
+            return np.zeros(1), np.zeros(1)
+        steps = np.diff(q, axis=0)
+        slope = np.abs(steps).max(axis=1)
+        turn = np.abs(np.diff(steps, axis=0)).max(axis=1) if len(q) > 2 else np.zeros(0)
+        slope = np.maximum(np.append(slope, slope[-1]), np.insert(slope, 0, slope[0]))
+        turn = np.concatenate([[0.0], turn, [0.0]])
+        wide = np.maximum(turn, np.maximum(np.append(turn[1:], 0.0), np.insert(turn[:-1], 0, 0.0)))
+        skip = start - self.first - low
+        return slope[skip:], wide[skip:]
+
+
+@compiled("void(float64[:, ::1], float64, float64[::1])")
+def _spline(q: Floats, at: float, goal: Floats) -> None:
+    """Quadratic B-spline through the table ``q`` (n, J) at place ``at`` into ``goal`` (J,)."""
+    last = len(q) - 1
+    middle = int(min(max(np.rint(at), 0.0), float(last)))
+    t = at - middle + 0.5
+    before, here, after = 0.5 * (1.0 - t) ** 2, 0.5 + t - t * t, 0.5 * t * t
+    for joint in range(len(goal)):
+        own = q[middle, joint]
+        low, high = q[max(middle - 1, 0), joint], q[min(middle + 1, last), joint]
+        if middle == 0:
+            low = 2.0 * own - high
+        if middle == last:  # a table of one row is constant
+            high = 2.0 * own - low
+        goal[joint] = before * low + here * own + after * high

@@ -1,0 +1,211 @@
+"""The pilot: measured body in, joint goals out; decides when the track runs out, counts waypoints.
+
+With ``feedback`` off it believes that the body goes where the track goes, without slip: the printed
+method, kept to show what a body with friction makes of it.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Protocol
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.kinematics.rotations import offset_rad
+from snakewalk.controller.mechanics.pitch_fit import Lift
+from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.controller.walk.steering import Path, aim_rad
+from snakewalk.controller.walk.time_law import Pulse
+from snakewalk.controller.walk.walker import Decision
+
+_ASTRAY_BODIES = 0.5
+
+# Segments of track left when the next piece is decided: the time law must see beyond the head.
+_FORESIGHT = 6.0
+_LIFT_S = 0.1
+
+# Body lengths of track before another path may be laid: turning back takes about as much.
+_PATIENCE_BODIES = 2.0
+Planner = Callable[[Floats], Path]
+"""Lays a path through (n, 2) points in order."""
+
+
+class TrackSource(Protocol):
+    """What grows the angle track."""
+
+    track: AngleTrack
+
+    def decide(self, offset_rad: float, aim_rad: float) -> Decision:
+        """Append the next piece towards the aim."""
+        ...
+
+
+class Pilot:
+    """Steers a track source along a path through waypoints."""
+
+    def __init__(
+        self,
+        source: TrackSource,
+        pulse: Pulse,
+        *,
+        plan: Planner,
+        lift: Lift | None = None,
+        fall_back: Callable[[bool], None] = lambda lost: None,
+        start_m: Floats,
+        waypoints_m: Sequence[tuple[float, float]],
+        length_m: float,
+        carrot_m: float,
+        waypoint_radius_m: float,
+        feedback: bool = True,
+        aim_at_waypoint: bool = False,
+    ) -> None:
+        self._source = source
+        self._pulse = pulse
+        self._plan = plan
+        self._lift = lift
+        self._fall_back = fall_back
+        self._pitch_rad: Floats | None = None
+        self._waypoints_m = np.asarray(waypoints_m, float)
+        self._goals_m: list[list[float]] = self._waypoints_m.tolist()  # to numbers once, for speed
+        self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
+        self._length_m = length_m
+        self._lay_path(np.asarray(start_m, float), 0)
+        self._segment_m = length_m / source.track.points
+        self._carrot_m = carrot_m
+        self._radius_m = waypoint_radius_m
+        self._feedback = feedback
+        self._aim_at_waypoint = aim_at_waypoint
+        self._start: tuple[Floats, float] | None = None
+        self.reached = 0
+        self._patience = 0.0
+        self.missed = 0
+        """How often a waypoint was passed outside its radius, and a new path laid to it."""
+        self.decision: Decision | None = None
+        """Made in the last step, if one was."""
+
+    @property
+    def done(self) -> bool:
+        """Whether every waypoint has been reached."""
+        return self.reached == len(self._goals_m)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether every waypoint has been reached and the shape has come to rest."""
+        return self.done and self._pulse.speed_segments_s == 0.0
+
+    @property
+    def head(self) -> float:
+        """Segments that the head has travelled along the track."""
+        return self._pulse.head
+
+    @property
+    def along_m(self) -> float:
+        """Arc length of the path point nearest to the body's centre."""
+        return float(self._along_m[0])
+
+    @property
+    def pulse_m_s(self) -> float:
+        """Pulse speed u: how fast the shape travels along the body."""
+        return self._pulse.speed_segments_s * self._segment_m
+
+    def first_goal_rad(self) -> Floats:
+        """Joint angles of the initial shape."""
+        return self._pulse.goal_rad()
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Advance by ``dt_s`` and return the joint goals (J,)."""
+        followers_m = self._followers_m
+        followers_m[0], followers_m[1] = view.centre_m[:2], view.link_m[0, :2]
+        self.path.follow(followers_m, self._along_m, self._gap_m)
+        self._count(followers_m[0], followers_m[1])
+        self.decision = None
+        if self.head >= self._source.track.end - _FORESIGHT:
+            self.decision = self._source.decide(*self._aim(view))
+        if self.done:
+            self._pulse.stop()
+        self._pulse.advance(dt_s)
+        return self.lay(self._pulse.goal_rad(), dt_s, view)
+
+    def lay(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:
+        """Add to yaw goals (J,) the pitch that lays the body on the ground under it.
+
+        Smoothed over ``_LIFT_S``: the ground is known in facets.
+        """
+        if self._lift is None:
+            return goal_rad
+        wanted = self._lift(view.link_m[0], view.headings_rad).goal_rad
+        if self._pitch_rad is None:
+            self._pitch_rad = wanted
+        self._pitch_rad = self._pitch_rad + min(1.0, dt_s / _LIFT_S) * (wanted - self._pitch_rad)
+        return goal_rad + self._pitch_rad
+
+    def _count(self, centre_m: Floats, head_m: Floats) -> None:
+        """Count a waypoint when the centre is near it; when it was passed by, go back for it."""
+        if self.done:
+            return
+        x_m, y_m = self._goals_m[self.reached]
+        if math.hypot(x_m - centre_m[0], y_m - centre_m[1]) <= self._radius_m:
+            self.reached += 1
+            self._fall_back(False)
+        elif self._feedback and self.head >= self._patience and self._astray(centre_m):
+            self.missed += 1
+            self._fall_back(True)
+            self._patience = self.head + _PATIENCE_BODIES * self._source.track.points
+            with suppress(InputError):  # from here no safe way leads back: the old path stays
+                self._lay_path(head_m, self.reached)
+
+    def _astray(self, centre_m: Floats) -> bool:
+        """Whether the next waypoint has been passed by, or the path been left by half a body."""
+        path, end_m = self.path, self.path.length_m
+        along_m, gap_m = float(self._along_m[0]), float(self._gap_m[0])
+        if along_m >= end_m - 1e-6:  # how far beyond the end, the way that the path led there
+            last = path.position([end_m - 0.05, end_m])
+            ahead = (last[1] - last[0]) / 0.05
+            along_m += float((centre_m - last[1]) @ ahead)
+        return bool(
+            along_m > self._passed_m[self.reached] + self._radius_m
+            or gap_m > _ASTRAY_BODIES * self._length_m
+        )
+
+    def _lay_path(self, from_m: Floats, first: int) -> None:
+        """Plan from a point through the waypoints from ``first`` on."""
+        self.path = self._plan(np.vstack([from_m, self._waypoints_m[first:]]))
+        self._along_m = np.zeros(2)  # of the body's centre, and of its head
+        self._passed_m = [0.0] * len(self._waypoints_m)
+        at = 0.0
+        for k in range(first, len(self._waypoints_m)):
+            at = self._passed_m[k] = self.path.first_pass(self._waypoints_m[k], at)
+
+    def _aim(self, view: BodyView) -> tuple[float, float]:
+        """Offset from track to world, and the direction wanted there."""
+        offset, head_m, centre_m = self._measured(view)
+        if self._start is None:
+            self._start = (head_m, offset)
+        if self._aim_at_waypoint:
+            target = self._waypoints_m[min(self.reached, len(self._waypoints_m) - 1)]
+            return offset, float(np.arctan2(*(target - centre_m)[::-1]))
+        if not self._feedback:
+            offset = self._start[1]
+            head_m = self._believed(self._start[0], offset)
+            along_m = self.path.nearest(head_m, self.along_m)
+            return offset, aim_rad(self.path, head_m, along_m, self._carrot_m)
+        # The piece begins where the track ends now: aim from where the head will be by then.
+        lead_m = (self._source.track.end - self.head) * self._segment_m
+        heading = view.headings_rad.mean()
+        ahead_m = head_m + lead_m * np.array([np.cos(heading), np.sin(heading)])
+        return offset, aim_rad(self.path, ahead_m, float(self._along_m[1]) + lead_m, self._carrot_m)
+
+    def _measured(self, view: BodyView) -> tuple[float, Floats, Floats]:
+        body = self._source.track.body_rad(self.head)
+        links = len(view.link_m)
+        at = (np.arange(links) + 0.5) * self._source.track.points / links - 0.5
+        believed = np.interp(at, np.arange(len(body)), body)
+        return offset_rad(view.headings_rad, believed), view.link_m[0, :2], view.centre_m[:2]
+
+    def _believed(self, start_m: Floats, offset: float) -> Floats:
+        """Head of a body that never slipped since the first decision."""
+        track = self._source.track
+        return start_m + self._segment_m * track.way(track.points, round(self.head), offset)

@@ -1,0 +1,65 @@
+"""A serpenoid on the angle track: the baseline and fallback, steered by bending its mean line."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.controller.walk.walker import Decision
+
+
+@dataclass(frozen=True, slots=True)
+class SerpentineParameters:
+    """Hirose's serpenoid, ``theta = base + A sin(2 pi k s / L)``, over a body of length L."""
+
+    amplitude_rad: float = 0.7
+    waves: float = 1.2
+    """k, on the body."""
+    turn_limit_rad: float = 1.2
+    """Largest bend of the mean line over one body length."""
+    pieces: int = 10
+    """Decisions per body length."""
+
+
+class Serpentine:
+    """Appends short pieces of a travelling sine whose mean line turns towards the aim."""
+
+    def __init__(
+        self,
+        points: int,
+        parameters: SerpentineParameters | None = None,
+        track: AngleTrack | None = None,
+    ) -> None:
+        self._p = parameters or SerpentineParameters()
+        self._base_rad = 0.0
+        self._at = float(points)  # of the wave's next sample
+        self._points = points
+        self.track = track or AngleTrack(self._wave(np.arange(points))[::-1])
+
+    def take_over(self) -> None:
+        """Go on from a track that others have grown: at its last angle, bending the same way."""
+        p, track = self._p, self.track
+        recent = track.at_rad(np.arange(track.end - self._points, track.end, dtype=float))
+        phase = np.arcsin(np.clip((recent[-1] - recent.mean()) / p.amplitude_rad, -0.95, 0.95))
+        if recent[-1] < recent[-2]:
+            phase = np.pi - phase
+        self._base_rad = float(recent[-1] - p.amplitude_rad * np.sin(phase))
+        self._at = float(phase) * self._points / (2.0 * np.pi * p.waves) + 1.0
+
+    def decide(self, offset_rad: float, aim_rad: float) -> Decision:
+        """Append the next piece; same contract as ``Walker.decide``."""
+        p = self._p
+        keep = max(1, round(self._points / p.pieces))
+        error = float(wrap(self._base_rad + offset_rad - aim_rad))
+        limit = p.turn_limit_rad * keep / self._points
+        bend = float(np.clip(-error, -limit, limit))
+        line = self._base_rad + bend * np.arange(1, keep + 1) / keep
+        self.track.append(line + self._wave(self._at + np.arange(keep)))
+        self._base_rad += bend
+        self._at += keep
+        return Decision(0, error, bend, 1, 1)
+
+    def _wave(self, sample: np.ndarray) -> np.ndarray:
+        p = self._p
+        return np.asarray(p.amplitude_rad * np.sin(2.0 * np.pi * p.waves * sample / self._points))

@@ -1,0 +1,45 @@
+"""Which shapes this robot can use on this ground: the tests of the library and of every piece."""
+
+import numpy as np
+
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import StatesConfig
+from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.kinematics.retarget import Retarget
+from snakewalk.controller.mechanics.traction import quasi_static_gain
+from snakewalk.controller.shape.crossing import self_touches
+from snakewalk.controller.shape.library import Refuse
+
+
+def refusals(
+    robot: RobotConfig, friction: FrictionConfig, states: StatesConfig, points: int = 100
+) -> dict[str, Refuse]:
+    """Tests by reason, cheapest first: each takes shapes (S, points) to a mask (S,) of bad ones.
+
+    No turn beyond ``states.turn_limit_rad``: a walk decides again after a part of a shape, so that
+    a coil's turn is never completed as it was aimed. Joints inside the limits after retargeting, no
+    part of the body on another, a quasi-static gain above the limit (docs/method.md).
+    """
+    joints_rad = Retarget(robot, points).joints_rad
+    limit = np.array(robot.limit_rad)
+
+    def coiled(shapes_rad: Floats) -> Bools:
+        turn = shapes_rad.mean(axis=-1) - shapes_rad[..., -1]
+        return np.asarray(np.abs(turn) > states.turn_limit_rad)
+
+    def beyond(shapes_rad: Floats) -> Bools:
+        return np.asarray((np.abs(joints_rad(shapes_rad)) > limit).any(axis=-1))
+
+    def touching(shapes_rad: Floats) -> Bools:
+        return self_touches(shapes_rad, robot.length_m, robot.body_radius_m)
+
+    def slipping(shapes_rad: Floats) -> Bools:
+        return np.asarray(quasi_static_gain(shapes_rad, friction) < states.gain_limit)
+
+    return {
+        "turn": coiled,
+        "joint limits": beyond,
+        "self-contact": touching,
+        "traction": slipping,
+    }

@@ -1,0 +1,124 @@
+"""How fast the head may travel along the track: joint speed and acceleration are the limits.
+
+Retimed by joint speed alone, ``u = min(u0, limit / max |dq/dS|)``, a shape that bends
+quickly then asks for a jump of speed. Here half of the acceleration limit is left to the bending
+(``q'' u^2``) and half to speeding up and braking (``q' du/dt``), and the brake looks ahead over all
+of the track that is known.
+"""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.walk.joint_track import JointTrack
+from snakewalk.drivers.compiling import compiled
+
+_TINY = 1e-9
+
+
+class Pulse:
+    """Time law of a head on a joint track."""
+
+    def __init__(
+        self,
+        joints: JointTrack,
+        wanted_segments_s: float,
+        *,
+        speed_limit_rad_s: float,
+        acceleration_limit_rad_s2: float,
+        ramp_time_s: float = 1.0,
+    ) -> None:
+        """Start at rest on the first head of ``joints``; ``ramp_time_s`` to the wanted speed."""
+        self.joints = joints
+        self.head = float(joints.first)
+        """Segments travelled."""
+        self.speed_segments_s = 0.0
+        self._wanted = wanted_segments_s
+        self._speed_limit = speed_limit_rad_s
+        self._half_acceleration = 0.5 * acceleration_limit_rad_s2
+        self._slew = wanted_segments_s / ramp_time_s
+        self._stopping = False
+        self._first = joints.first
+        self._allowed = np.array([wanted_segments_s])
+        self._slope = np.zeros(1)
+        self._least = wanted_segments_s
+
+    def stop(self) -> None:
+        """Slow down to rest from now on."""
+        self._stopping = True
+
+    def advance(self, dt_s: float) -> float:
+        """Move on by ``dt_s``; returns the head, never beyond what is known of the track."""
+        if self.joints.grow():
+            self._look_ahead()
+        slew = -self._slew if self._stopping else self._slew
+        at, self.speed_segments_s = _moved(
+            self.head - self._first,
+            self.speed_segments_s,
+            dt_s,
+            slew,
+            self._half_acceleration,
+            self._allowed,
+            self._slope,
+        )
+        self.head = min(self._first + at, float(self.joints.last))
+        return self.head
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint goals at the head's place."""
+        return self.joints.goal_rad(self.head)
+
+    def _look_ahead(self) -> None:
+        """Tabulate the speed allowed from the head's place on, braking distance included."""
+        self._first = max(self.joints.first, int(self.head) - 1)
+        slope, turn = self.joints.bends(self._first)
+        by_speed = self._speed_limit / np.maximum(slope, _TINY)
+        by_bend = np.sqrt(self._half_acceleration / np.maximum(turn, _TINY))
+        self._slope = slope
+        here = np.minimum(np.minimum(by_speed, by_bend), self._wanted)
+        # least of three neighbours: between two places no limit is missed, and none is a step
+        around = np.pad(here, 1, mode="edge")
+        allowed = np.minimum(np.minimum(around[:-2], around[2:]), here)
+        # what comes behind the end may be as steep as the steepest so far: be able to brake for it
+        self._least = min(self._least, float(allowed.min()))
+        allowed[-1] = self._least
+        _brake(allowed, slope, self._half_acceleration)
+        self._allowed = allowed
+
+
+@compiled("float64(float64[::1], float64)")
+def _limit_at(allowed: Floats, at: float) -> float:
+    """Between two places the squares of the speeds lie on a line, as in even braking."""
+    at = min(max(at, 0.0), len(allowed) - 1.0)
+    low = max(min(int(at), len(allowed) - 2), 0)
+    part = at - low
+    if part == 0.0:
+        return float(allowed[low])
+    return float(np.sqrt(allowed[low] ** 2 * (1.0 - part) + allowed[low + 1] ** 2 * part))
+
+
+@compiled(
+    "UniTuple(float64, 2)(float64, float64, float64, float64, float64, float64[::1], float64[::1])"
+)
+def _moved(
+    at: float,
+    speed: float,
+    dt_s: float,
+    slew: float,
+    half_acceleration: float,
+    allowed: Floats,
+    slope: Floats,
+) -> tuple[float, float]:
+    """Place from the tables' start on, and speed, after ``dt_s``; ``slew`` < 0 stops."""
+    bend = slope[max(min(int(at), len(slope) - 1), 0)]
+    thrust = min(abs(slew), half_acceleration / max(bend, _TINY))
+    limit = min(_limit_at(allowed, at), _limit_at(allowed, at + speed * dt_s))
+    speed = max(0.0, min(limit, speed + (thrust if slew > 0.0 else -thrust) * dt_s))
+    return at + speed * dt_s, speed
+
+
+@compiled("void(float64[::1], float64[::1], float64)")
+def _brake(allowed: Floats, slope: Floats, half_acceleration: float) -> None:
+    """Lower the speeds so that each place's can be braked down to the next one's."""
+    for k in range(len(allowed) - 2, -1, -1):
+        brake = half_acceleration / max(slope[k], slope[k + 1], _TINY)
+        allowed[k] = min(allowed[k], np.sqrt(allowed[k + 1] ** 2 + 2.0 * brake))

@@ -1,0 +1,84 @@
+"""The tongue: a second-order Markov chain over heights ([PT] 2.6.6), for any head accessory.
+
+``P(H(t) | H(t - 1), H(t - 2))`` is counted on a short sequence; a servo, an LED or the viewer's
+tongue shows ``Tongue.height(t)``, 0 is drawn in and 1 is out.
+"""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+
+RATE_LIMITS = (0.4, 2.5)
+"""Range of b_st, how fast the tongue plays."""
+
+
+def flicks(rate_hz: float = 25.0) -> Floats:
+    """Make up a sequence (T,) to learn from, as no tracked one is published.
+
+    Three bursts of two to four quick strokes, each out in a sixth of a second, with rests between.
+    """
+    stroke = np.abs(np.sin(np.pi * np.arange(round(rate_hz / 3.0)) / round(rate_hz / 3.0)))
+    rest = np.zeros(round(0.8 * rate_hz))
+    parts = [part for strokes in (2, 4, 3) for part in (rest, *[stroke] * strokes)]
+    return np.concatenate([*parts, rest])
+
+
+class HeightChain:
+    """Transition counts of quantised heights, learned from one sequence."""
+
+    def __init__(self, heights: Floats, levels: int = 9) -> None:
+        """Count ``heights`` (T,) in 0..1 on ``levels`` values.
+
+        Raises:
+            ValueError: fewer than three heights or levels, or heights outside 0..1.
+
+        """
+        if len(heights) < 3 or levels < 3 or heights.min() < 0.0 or heights.max() > 1.0:
+            raise ValueError("the tongue learns from three or more heights within 0..1")
+        self.levels = levels
+        seen = np.rint(heights * (levels - 1)).astype(np.intp)
+        self._start = (int(seen[0]), int(seen[1]))
+        counts = np.zeros((levels, levels, levels))
+        np.add.at(counts, (seen[:-2], seen[1:-1], seen[2:]), 1.0)
+        # the sequence repeats, so that its last pair has a successor
+        np.add.at(counts, (seen[[-2, -1]], seen[[-1, 0]], seen[[0, 1]]), 1.0)
+        total = counts.sum(axis=2, keepdims=True)
+        self.probability = np.divide(counts, total, out=np.zeros_like(counts), where=total > 0.0)
+        """(z, y, x): of height x after y after z; rows of pairs never seen are 0."""
+
+    def sequence(self, steps: int, rng: np.random.Generator) -> Floats:
+        """Draw heights (steps,) in 0..1, from the learned sequence's own beginning."""
+        two, one = self._start
+        drawn = np.empty(steps, dtype=np.intp)
+        cumulative = np.cumsum(self.probability, axis=2)
+        for k in range(steps):
+            x = int(np.searchsorted(cumulative[two, one], rng.random(), side="right"))
+            drawn[k] = min(x, self.levels - 1)
+            two, one = one, int(drawn[k])
+        return drawn / (self.levels - 1)
+
+
+class Tongue:
+    """Heights over time, drawn ahead in blocks from one seed."""
+
+    def __init__(
+        self, chain: HeightChain, seed: int, rate_hz: float = 25.0, speed: float = 1.0
+    ) -> None:
+        """Play ``chain`` at ``speed`` (b_st) times its ``rate_hz``.
+
+        Raises:
+            ValueError: the speed is outside 0.4 to 2.5.
+
+        """
+        if not RATE_LIMITS[0] <= speed <= RATE_LIMITS[1]:
+            raise ValueError(f"tongue speed {speed}: expected 0.4 to 2.5")
+        self._chain, self._seed, self._pace = chain, seed, rate_hz * speed
+        self._heights = chain.sequence(256, np.random.default_rng(seed))
+
+    def height(self, time_s: float) -> float:
+        """Height at a time since the start, between samples linearly."""
+        at = max(time_s, 0.0) * self._pace
+        while at > len(self._heights) - 1:  # the same seed again gives the same beginning
+            more = 2 * len(self._heights)
+            self._heights = self._chain.sequence(more, np.random.default_rng(self._seed))
+        return float(np.interp(at, np.arange(len(self._heights)), self._heights))

@@ -1,0 +1,105 @@
+"""The snake walk as a motion source: shapes appended to the angle track, steered by the pose.
+
+[PT] 2.6.2 with what a body with friction needs: a decision every half state, of which only the tail
+half is appended; a carrot on the path; a linear ramp that cancels the heading error
+of the chosen shape. ``decision_fraction = 1`` and ``ramp_limit_rad = 0`` is the printed rule.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.run import WalkConfig
+from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.shape.star import star_order
+from snakewalk.controller.walk.angle_track import AngleTrack
+
+Accept = Callable[[Floats], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What was chosen, and from what."""
+
+    state: int
+    heading_error_rad: float
+    """Mean heading of the placed shape minus the aim, before the ramp."""
+    ramp_rad: float
+    candidates: int
+    """Shapes within the heading tolerance; 0 means that the nearest few were taken instead."""
+    visited: int
+    """Distinct states visited so far."""
+
+
+class Walker:
+    """Grows an ``AngleTrack`` from a library of shapes (S, N), head first."""
+
+    def __init__(self, shapes_rad: Floats, walk: WalkConfig, accept: Accept | None = None) -> None:
+        if len(shapes_rad) == 0:
+            raise ValueError("the walk needs at least one shape")
+        self._shapes = shapes_rad
+        self._walk = walk
+        self._accept = accept
+        self._visits = np.zeros(len(shapes_rad), dtype=np.int64)
+        self._failures = np.zeros(len(shapes_rad), dtype=np.int64)
+        self._current = 0
+        self._visits[0] = 1
+        self.track = AngleTrack(shapes_rad[0] - shapes_rad[0].mean())
+
+    def decide(self, offset_rad: float, aim_rad: float) -> Decision:
+        """Choose the next shape and append its tail part.
+
+        Args:
+            offset_rad: rotation from the track's angles to the world.
+            aim_rad: where the next shape shall head, in the world.
+
+        """
+        walk, track = self._walk, self.track
+        placed = self._shapes + (track.last_rad - self._shapes[:, -1])[:, None]
+        error = wrap(placed.mean(axis=1) + offset_rad - aim_rad)
+        size = np.abs(error)
+        size[self._current] = np.inf  # a walk leaves its state
+        near = np.flatnonzero(size <= walk.heading_tolerance_rad)
+        pool = near if len(near) else np.argsort(size, kind="stable")[: walk.nearest_count]
+        state = self._choose(pool, placed, error)
+        track.append(self._piece(placed[state], error[state]))
+        if self._visits[state]:
+            self._failures[self._current] += 1  # left for a state already visited (corrected F)
+        self._visits[state] += 1
+        self._current = state
+        ramp = self._ramp(error[state])
+        return Decision(state, float(error[state]), ramp, len(near), self.visited)
+
+    @property
+    def visited(self) -> int:
+        """Distinct states visited so far."""
+        return int(np.count_nonzero(self._visits))
+
+    def _choose(self, pool: NDArray[np.intp], placed_rad: Floats, error_rad: Floats) -> int:
+        """First of ``pool`` in the order of W whose body is acceptable; the very first if none."""
+        first = -1
+        for k in star_order(self._visits[pool], self._failures[pool], error_rad[pool]):
+            state = int(pool[k])
+            if self._fits(self._piece(placed_rad[state], error_rad[state])):
+                return state
+            first = state if first < 0 else first
+        return first
+
+    def _ramp(self, error_rad: float) -> float:
+        return float(np.clip(-error_rad, -self._walk.ramp_limit_rad, self._walk.ramp_limit_rad))
+
+    def _piece(self, placed_rad: Floats, error_rad: float) -> Floats:
+        """Tail part of a placed shape, oldest first, bent towards the aim."""
+        keep = max(1, round(self._walk.decision_fraction * self.track.points))
+        bend = self._ramp(error_rad) * np.linspace(0.0, 1.0, keep)
+        return np.asarray(placed_rad[::-1][:keep] + bend)
+
+    def _fits(self, piece_rad: Floats) -> bool:
+        """Whether the body is acceptable when the piece has become its front."""
+        if self._accept is None:
+            return True
+        old = self.track.body_rad(self.track.end)[: self.track.points - len(piece_rad)]
+        return self._accept(np.concatenate([piece_rad[::-1], old]))

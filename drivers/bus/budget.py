@@ -1,0 +1,116 @@
+"""Wire time of a control cycle: what the bus can do, counted before a run asks for more.
+
+A cycle is one sync write and one sync read, or *fast* sync read, of N servos. Each byte takes ten
+bit times (start, eight data bits, stop). Packet lengths: e-manual, DYNAMIXEL Protocol 2.0.
+"""
+
+from dataclasses import dataclass
+
+from snakewalk.drivers.errors import BudgetError
+
+BITS_PER_BYTE = 10
+GROUP_BYTES = 14
+"""Sync instruction: header 4, id, length 2, instruction, address 2, data length 2, CRC 2."""
+STATUS_BYTES = 11
+"""Status packet without data: header 4, id, length 2, instruction, error, CRC 2."""
+FAST_HEAD_BYTES = 8
+"""Of the common answer to a fast read: header 4, id, length 2, instruction."""
+FAST_SHARE_BYTES = 4
+"""Of each servo in it, beside its data: error, id, CRC 2."""
+
+
+@dataclass(frozen=True, slots=True)
+class WireBudget:
+    """Bytes and seconds that one cycle takes on the wire."""
+
+    servos: int
+    baud: int
+    fast: bool
+    write_bytes: int
+    """Sync write of the goals."""
+    request_bytes: int
+    """Sync read instruction."""
+    answer_bytes: int
+    """All servos' answers."""
+    return_delay_s: float
+    """Sum over the answers."""
+
+    @property
+    def total_bytes(self) -> int:
+        """On the wire in a cycle."""
+        return self.write_bytes + self.request_bytes + self.answer_bytes
+
+    @property
+    def cycle_s(self) -> float:
+        """Shortest possible cycle; adapters and stuffing only add to it."""
+        return self.total_bytes * BITS_PER_BYTE / self.baud + self.return_delay_s
+
+    @property
+    def answer_s(self) -> float:
+        """From the end of the request to the end of the answers."""
+        return self.answer_bytes * BITS_PER_BYTE / self.baud + self.return_delay_s
+
+    @property
+    def limit_hz(self) -> float:
+        """Highest rate that the wire allows."""
+        return 1.0 / self.cycle_s
+
+    def share(self, rate_hz: float) -> float:
+        """Part of the time that the wire is busy at ``rate_hz``; beyond 1 it is impossible."""
+        return rate_hz * self.cycle_s
+
+    def check(self, rate_hz: float) -> None:
+        """Refuse a rate above the limit.
+
+        Raises:
+            BudgetError: with the limit and what would raise it.
+
+        """
+        if self.share(rate_hz) > 1.0:
+            fast = "" if self.fast else ", use fast sync read"
+            raise BudgetError(
+                f"{rate_hz:g} Hz: {self.servos} servos at {self.baud} baud take "
+                f"{self.cycle_s * 1e3:.2f} ms of wire a cycle; at most {self.limit_hz:.0f} Hz: "
+                f"lower the rate, raise the baud rate{fast}"
+            )
+
+
+def wire_budget(
+    servos: int,
+    baud: int,
+    *,
+    fast: bool,
+    read_bytes: int = 10,
+    goal_bytes: int = 4,
+    slow_read_bytes: int = 0,
+    return_delay_s: float = 0.0,
+) -> WireBudget:
+    """Budget of a cycle of ``servos`` servos.
+
+    Args:
+        servos: N, at least 1.
+        baud: bit/s.
+        fast: fast sync read (one common answer) instead of sync read (one packet each).
+        read_bytes: length of the block read from each servo.
+        goal_bytes: length of the goal written to each; 0 for a cycle that only reads.
+        slow_read_bytes: length of the second block that some cycles read (the slow round); with it
+            the budget is that of such a cycle, the longest.
+        return_delay_s: register 9 of each servo, s. A fast read waits once, a sync read N times.
+
+    """
+    if servos < 1 or baud < 1:
+        raise ValueError(f"a bus has at least one servo and a speed, got {servos} at {baud} baud")
+    write = GROUP_BYTES + servos * (1 + goal_bytes) if goal_bytes else 0
+    request = answer = delays = 0
+    for length in (read_bytes, slow_read_bytes):
+        if length:
+            request += GROUP_BYTES + servos
+            answer += _answer_bytes(servos, length, fast=fast)
+            delays += 1 if fast else servos
+    return WireBudget(servos, baud, fast, write, request, answer, delays * return_delay_s)
+
+
+def _answer_bytes(servos: int, length: int, *, fast: bool) -> int:
+    if fast:
+        return FAST_HEAD_BYTES + servos * (FAST_SHARE_BYTES + length)
+    return servos * (STATUS_BYTES + length)

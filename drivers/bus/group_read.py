@@ -1,0 +1,177 @@
+"""Answers of many servos to one (fast) sync read: bytes to one result per servo.
+
+The plain case, all answers there and none stuffed, is one compiled or vectorised pass
+(``drivers.protocol.frames``). Everything else goes the slow way and yields what can be proved
+to belong to the question, servo by servo.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Bytes
+from snakewalk.drivers.protocol.crc import crc16
+from snakewalk.drivers.protocol.frames import FLAWLESS, HEAD, IRREGULAR, read_fast, read_plain
+from snakewalk.drivers.protocol.packet import (
+    BROADCAST_ID,
+    HEADER,
+    STATUS,
+    Instruction,
+    InstructionPacket,
+    StatusPacket,
+    encode_instruction,
+)
+from snakewalk.drivers.protocol.parser import PacketReader
+
+S = TypeVar("S", bound=np.generic)
+_RESULT = 0x7F
+
+
+class GroupAnswer(NamedTuple):
+    """One result per servo, in the order asked."""
+
+    data: Bytes
+    """(N, length) the block read; meaningless where not ``valid``."""
+    valid: NDArray[np.bool_]
+    """(N,) answered in this cycle, with the right CRC and length and without a result error."""
+    error: Bytes
+    """(N,) error byte of the answer; 0 where there was none."""
+    answered: NDArray[np.bool_]
+    """(N,) whether a status packet came at all."""
+    clean: bool
+    """Nothing but the expected bytes was on the line."""
+    whole: bool = False
+    """Known to be complete, as it came in one piece."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether all have answered."""
+        return self.whole or int(np.count_nonzero(self.answered)) == len(self.answered)
+
+
+class GroupQuestion:
+    """One sync read of ``length`` bytes at ``address`` from ``ids``, fast or plain."""
+
+    def __init__(self, ids: Sequence[int], address: int, length: int, *, fast: bool) -> None:
+        params = address.to_bytes(2, "little") + length.to_bytes(2, "little") + bytes(ids)
+        kind = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ
+        self.request = encode_instruction(InstructionPacket(BROADCAST_ID, kind, params))
+        self.fast = fast
+        self.frame_bytes = length + (4 if fast else 11)
+        """Of one servo's share of the answer, without stuffing."""
+        self.ids = tuple(ids)
+        self.length = length
+        """Of the block asked for."""
+        self._index = {servo_id: k for k, servo_id in enumerate(ids)}
+        count = len(self.ids)
+        share = (count * self.frame_bytes + 1).to_bytes(2, "little")
+        self._fast_head = HEADER + bytes([BROADCAST_ID]) + share + bytes([STATUS])
+        heads = b"".join(
+            HEADER + bytes([servo_id]) + (length + 4).to_bytes(2, "little") + bytes([STATUS])
+            for servo_id in ids
+        )
+        heads = self._fast_head if fast else heads
+        self.heads = np.frombuffer(heads, np.uint8).reshape(-1, HEAD).copy()
+        """(N, 8) how the answers must begin; (1, 8) if fast."""
+        self._id_bytes = np.array(self.ids, np.uint8)
+        self._error = np.zeros(count, np.uint8)
+        self._all_there = _constant(np.ones(count, np.bool_))
+        self._no_error = _constant(np.zeros(count, np.uint8))
+        self.answer_bytes = (len(self._fast_head) if fast else 0) + count * self.frame_bytes
+        """Length of the whole answer when nothing is stuffed."""
+
+    def parse(self, raw: bytes) -> GroupAnswer:
+        """Find each servo's result in all that came between the question and its deadline."""
+        if len(raw) == self.answer_bytes:
+            answer = self._regular(np.frombuffer(raw, np.uint8))
+            if answer is not None:
+                return answer
+        return self._salvage_fast(raw) if self.fast else self._salvage_plain(raw)
+
+    def regular(self, found: int, data: Bytes, error: Bytes) -> GroupAnswer:
+        """All replies as they should be: what the frame reader found; ``data`` is kept."""
+        there = self._all_there
+        if found == FLAWLESS:
+            return GroupAnswer(data, there, self._no_error, there, clean=True, whole=True)
+        error = error.copy()
+        return GroupAnswer(data, (error & _RESULT) == 0, error, there, clean=True, whole=True)
+
+    def missing_bytes(self, raw: bytes) -> int:
+        """How many bytes more would complete plain answers that stuffing made longer; 0 if none."""
+        if self.fast:
+            return 0
+        reader = PacketReader()
+        seen = {p.servo_id for p in reader.feed(raw)}
+        missing = sum(servo_id not in seen for servo_id in self.ids)
+        return max(1, missing * self.frame_bytes - reader.pending) if missing else 0
+
+    def _regular(self, raw: Bytes) -> GroupAnswer | None:
+        """All answers as they should be; None if anything is otherwise."""
+        data = np.empty((len(self.ids), self.length), np.uint8)
+        if self.fast:
+            found = read_fast(raw, self.heads[0], self._id_bytes, data, self._error)
+        else:
+            found = read_plain(raw, self.heads, data, self._error)
+        if found == IRREGULAR:
+            return None
+        return self.regular(found, data, self._error)
+
+    def _salvage_plain(self, raw: bytes) -> GroupAnswer:
+        reader = PacketReader()
+        packets = reader.feed(raw)
+        strange = reader.dropped_bytes + reader.pending
+        found: dict[int, StatusPacket] = {}
+        twice: set[int] = set()
+        for packet in packets:
+            if not isinstance(packet, StatusPacket) or packet.servo_id not in self._index:
+                strange += 1
+            elif len(packet.params) not in (self.length, 0):
+                strange += 1  # the answer to another question: an older one
+            elif packet.servo_id in found:
+                twice.add(packet.servo_id)
+            else:
+                found[packet.servo_id] = packet
+        for servo_id in twice:
+            del found[servo_id]  # which of the two is new cannot be known
+        return self._partial(found, clean=not strange and not twice)
+
+    def _salvage_fast(self, raw: bytes) -> GroupAnswer:
+        """Shares in front of the first damage, each proved by its CRC of everything so far."""
+        found: dict[int, StatusPacket] = {}
+        start = raw.find(self._fast_head)
+        if start < 0:
+            return self._partial(found, clean=not raw)
+        at = start + len(self._fast_head)
+        crc = crc16(raw[start:at])
+        for servo_id in self.ids:
+            share = raw[at : at + self.frame_bytes]
+            if len(share) < self.frame_bytes or share[1] != servo_id:
+                break
+            crc = crc16(share[:-2], crc)
+            if crc != share[-2] | share[-1] << 8:
+                break
+            found[servo_id] = StatusPacket(servo_id, share[0], share[2:-2])
+            crc = crc16(share[-2:], crc)
+            at += self.frame_bytes
+        return self._partial(found, clean=start == 0 and at == len(raw))
+
+    def _partial(self, found: dict[int, StatusPacket], *, clean: bool) -> GroupAnswer:
+        count = len(self.ids)
+        data = np.zeros((count, self.length), np.uint8)
+        valid, answered = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+        error = np.zeros(count, np.uint8)
+        for servo_id, packet in found.items():
+            k = self._index[servo_id]
+            answered[k], error[k] = True, packet.error
+            # an error status may come without data: an answer, but no value
+            if packet.result == 0 and len(packet.params) == self.length:
+                data[k] = np.frombuffer(packet.params, np.uint8)
+                valid[k] = True
+        return GroupAnswer(data, valid, error, answered, clean)
+
+
+def _constant(array: NDArray[S]) -> NDArray[S]:
+    array.setflags(write=False)
+    return array

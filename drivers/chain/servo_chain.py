@@ -1,0 +1,326 @@
+"""The chain of servos as a joint link: radians to raw goals, raw blocks to a ``JointState``."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.bus.control_cycle import CycleCounters, GroupCycle
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.joint_codec import GoalTicks, Readings
+from snakewalk.drivers.chain.recheck import Recheck, recheck
+from snakewalk.drivers.chain.start_up import (
+    Inspection,
+    check_pose,
+    configure,
+    goal_limits_raw,
+    inspect,
+)
+from snakewalk.drivers.clock import Clock
+from snakewalk.drivers.errors import BusError, ChainError, PortError
+from snakewalk.drivers.port.byte_port import BytePort, reopen
+from snakewalk.drivers.protocol.registers import WATCHDOG_UNIT_S, ServoUnits
+from snakewalk.drivers.types import JointCommand, JointState
+
+_FIRST_READS = 5
+"""Tries to get one complete answer at the start."""
+
+
+class ServoChain:
+    """Joints of ``robot`` on ``bus``; implements ``JointLink``.
+
+    Hand out a ``SafeLink`` around it, never itself.
+    """
+
+    def __init__(
+        self,
+        bus: DynamixelBus,
+        robot: RobotConfig,
+        *,
+        watchdog_s: float = 0.2,
+        slow_every: int = 16,
+        fast: bool = True,
+    ) -> None:
+        """Prepare; nothing is sent before ``enable``.
+
+        Args:
+            bus: servos of the robot's model.
+            robot: ids, limits, gains.
+            watchdog_s: after so long without an instruction the servos stop by themselves.
+            slow_every: cycles from one reading of voltages and temperatures to the next, at least
+                3; torque and watchdog are looked at as often, in other cycles.
+            fast: use fast sync reads where every firmware has them.
+
+        Raises:
+            ControlTableError: the model lacks a register or a unit that the cycle needs.
+            ValueError: ``slow_every`` is below 3.
+
+        """
+        if slow_every < 3:
+            raise ValueError(f"slow_every must be at least 3, got {slow_every}")
+        self.robot = robot
+        self.inspection: Inspection | None = None
+        """The servos as found by the last ``enable``."""
+        self._bus = bus
+        self._clock = bus.port.clock
+        self._units = ServoUnits.of(bus.table)
+        self._watchdog_s = watchdog_s
+        self._slow_every = slow_every
+        self._fast = fast
+        self._ticks = GoalTicks(self._units, goal_limits_raw(robot, self._units))
+        self._readings = Readings(robot.joint_count, bus.table, self._units)
+        self._cycle: GroupCycle = bus.cycle(robot.servo_ids, fast=fast)
+        self._slow: GroupCycle = bus.slow_cycle(robot.servo_ids, fast=fast)
+        self._alive = AliveCheck(bus, robot.servo_ids, fast=fast)
+        self._reads = 0
+        self._armed = False
+        self._spoke_at_s = -np.inf
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints J."""
+        return self.robot.joint_count
+
+    @property
+    def port(self) -> BytePort:
+        """The line."""
+        return self._bus.port
+
+    @property
+    def clock(self) -> Clock:
+        """The port's."""
+        return self._clock
+
+    @property
+    def counters(self) -> CycleCounters:
+        """What went wrong on the wire so far."""
+        return self._cycle.counters
+
+    @property
+    def fast(self) -> bool:
+        """Whether fast sync reads are in use."""
+        return self._cycle.fast
+
+    def enable(self) -> JointState:
+        """Check and set up all servos, goal = present, torque on, watchdog armed.
+
+        Raises:
+            ChainError: the servos are not the robot's, have an alarm, or stand beyond a limit.
+            BusError: a servo does not do as told; torque is off again then.
+            PortError: the port is gone.
+
+        """
+        bus, ids = self._bus, self.robot.servo_ids
+        self.inspection = inspect(bus, self.robot)
+        if self.inspection.faults:
+            raise ChainError(self.inspection.faults)
+        configure(bus, self.robot, self._units)
+        fast = self._fast and self.inspection.fast_reads
+        self._cycle = bus.cycle(ids, fast=fast)
+        self._slow = bus.slow_cycle(ids, fast=fast)
+        self._alive = AliveCheck(bus, ids, fast=fast)
+        self._reads = 0
+        state = self._first_state()
+        check_pose(self.robot, state.position_rad)
+        try:
+            return self._hold_and_arm(state)
+        except BaseException:
+            self.disable()
+            raise
+
+    def recheck(self) -> Recheck:
+        """Look at the chain after an interruption and compare it with what it was; moves nothing.
+
+        Raises:
+            BusError: a servo does not answer.
+            PortError: the port is gone.
+
+        """
+        before = self._readings.state(self._clock.now_s()).position_rad
+        return recheck(self._bus, self.robot, self._units, self.inspection, before)
+
+    def resume(self, found: Recheck) -> JointState:
+        """Go on after an interruption: torque that is on stays on, nothing moves.
+
+        Servos that lost their torque (rebooted) are set up again. The others are freed from their
+        watchdog's stop and in the same breath told to stay where they are.
+
+        Raises:
+            ChainError: ``found`` forbids it.
+            BusError: a servo does not do as told; torque is off again then.
+            PortError: the port is gone.
+
+        """
+        if found.faults:
+            raise ChainError(found.faults)
+        configure(self._bus, self.robot, self._units, found.torque_off)
+        self._reads = 0
+        state = self._first_state()
+        check_pose(self.robot, state.position_rad)
+        try:
+            return self._hold_and_arm(state)
+        except BaseException:
+            self.disable()
+            raise
+
+    def hold(self) -> None:
+        """Tell all servos to stay where they were last seen.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        here = self._readings.state(self._clock.now_s()).position_rad
+        if np.isfinite(here).all():
+            self._send_goals(here)
+
+    def _hold_and_arm(self, state: JointState) -> JointState:
+        """Goal = present, torque on, watchdog armed; every step read back."""
+        bus, ids = self._bus, self.robot.servo_ids
+        bus.sync_write(ids, "Bus Watchdog", 0)  # no gap before the goals: an old one would count
+        goals = self._send_goals(state.position_rad)
+        for servo_id, goal in zip(ids, goals.tolist(), strict=True):
+            self._expect(servo_id, "Goal Position", goal)
+        bus.sync_write(ids, "Torque Enable", 1)
+        for servo_id in ids:
+            self._expect(servo_id, "Torque Enable", 1)
+        ticks = min(127, max(1, round(self._watchdog_s / WATCHDOG_UNIT_S)))
+        bus.sync_write(ids, "Bus Watchdog", ticks)
+        for servo_id in ids:
+            self._expect(servo_id, "Bus Watchdog", ticks)
+        self._armed = True
+        return self.read()
+
+    def disable(self) -> None:
+        """Torque off, then the watchdog; every servo is asked, whatever the others do.
+
+        Raises:
+            BusError: servos that did not confirm; their watchdog stays armed and stops them.
+            PortError: the port is gone and cannot be opened again; the watchdog stops the servos.
+
+        """
+        self._armed = False
+        bus, ids = self._bus, self.robot.servo_ids
+        try:
+            bus.sync_write(ids, "Torque Enable", 0)
+        except PortError:
+            reopen(bus.port)  # it may be back; if not, this says so
+            bus.sync_write(ids, "Torque Enable", 0)
+        silent = []
+        for servo_id in ids:
+            try:
+                bus.write_verified(servo_id, "Torque Enable", 0)
+                bus.write(servo_id, "Bus Watchdog", 0)
+            except BusError:
+                silent.append(str(servo_id))
+        if silent:
+            raise BusError(f"servo {', '.join(silent)}: torque off is not confirmed")
+
+    def read(self) -> JointState:
+        """Read all joints once; in every ``slow_every``-th call voltages and temperatures too.
+
+        Raises:
+            BusError: a servo has lost its torque (it has rebooted), or its watchdog has stopped it.
+            PortError: the port is gone.
+
+        """
+        self._spoke_at_s = self._clock.now_s()
+        answer = self._cycle.read()
+        for joint in self._readings.take(answer, self._clock.now_s()):
+            self._read_alarm(int(joint))
+        turn = self._reads % self._slow_every
+        self._reads += 1
+        if turn == 0:
+            self._readings.take_slow(self._slow.read())
+        elif self._armed and turn == self._slow_every // 3:
+            self._alive.torque()
+        elif self._armed and turn == 2 * self._slow_every // 3:
+            self._alive.watchdog()
+        return self._readings.state(self._clock.now_s())
+
+    def write(self, command: JointCommand) -> None:
+        """Send goal positions, kept inside the joint limits.
+
+        Raises:
+            ValueError: a goal is not finite.
+            BusError: the pause since the last packet was long enough to stop the servos.
+            PortError: the port is gone.
+
+        """
+        pause_s = self._clock.now_s() - self._spoke_at_s
+        if self._armed and pause_s > self._watchdog_s:
+            raise BusError(
+                f"{pause_s:.2f} s without a packet: the bus watchdog ({self._watchdog_s:g} s) has "
+                "stopped the servos"
+            )
+        self._send_goals(command.goal_rad)
+        self._spoke_at_s = self._clock.now_s()
+
+    def _send_goals(self, goal_rad: Floats) -> NDArray[np.int32]:
+        goals = self._ticks.of(goal_rad)
+        self._cycle.write_goals(goals)
+        return goals
+
+    def _expect(self, servo_id: int, name: str, value: int) -> None:
+        got = self._bus.read(servo_id, name)
+        if got != value:
+            raise BusError(f"servo {servo_id}: {name} is {got} after {value} was written to all")
+
+    def _first_state(self) -> JointState:
+        for _ in range(_FIRST_READS):
+            state = self.read()
+            if state.valid.all() and np.isfinite(state.voltage_v).all():
+                return state
+            self._reads = 0  # so that the slow block is read again, too
+        silent = [str(i) for i, v in zip(self.robot.servo_ids, state.valid, strict=True) if not v]
+        raise BusError(f"servo {', '.join(silent) or 'group'}: group read fails, pings do not")
+
+    def _read_alarm(self, joint: int) -> None:
+        servo_id = self.robot.servo_ids[joint]
+        try:
+            self._readings.take_alarm(joint, self._bus.read(servo_id, "Hardware Error Status"))
+        except BusError:
+            return  # the error byte carries the alert already; asked again in the next cycle
+
+
+WATCHDOG_TRIPPED = 0xFF
+"""Bus Watchdog(98) reads -1 in its error state (e-manual)."""
+
+
+class AliveCheck:
+    """Two one-byte group reads, each a small part of a cycle's wire time."""
+
+    def __init__(self, bus: DynamixelBus, servo_ids: Sequence[int], *, fast: bool) -> None:
+        self._ids = tuple(servo_ids)
+        self._torque = bus.block(servo_ids, "Torque Enable", "Torque Enable", fast=fast)
+        self._watchdog = bus.block(servo_ids, "Bus Watchdog", "Bus Watchdog", fast=fast)
+
+    def torque(self) -> None:
+        """Check that torque is on; servos that do not answer are not judged.
+
+        Raises:
+            BusError: torque is off.
+            PortError: the port is gone.
+
+        """
+        answer = self._torque.read()
+        self._complain(answer.valid & (answer.data[:, 0] == 0), "torque is off: has it rebooted?")
+
+    def watchdog(self) -> None:
+        """Check that no watchdog has run out; servos that do not answer are not judged.
+
+        Raises:
+            BusError: one has.
+            PortError: the port is gone.
+
+        """
+        answer = self._watchdog.read()
+        tripped = answer.valid & (answer.data[:, 0] == WATCHDOG_TRIPPED)
+        self._complain(tripped, "its bus watchdog has stopped it")
+
+    def _complain(self, bad: Bools, what: str) -> None:
+        if bad.any():
+            which = ", ".join(str(i) for i, b in zip(self._ids, bad, strict=True) if b)
+            raise BusError(f"servo {which}: {what}")

@@ -1,0 +1,151 @@
+"""The byte port: the seam below the protocol, where metal and simulation are exchanged.
+
+It is the port that the DYNAMIXEL SDK's packet handlers are duck-typed on (its own method names,
+milliseconds), widened by what the cycle codec needs (seconds, deadlines). So one object carries
+both, and nothing above can tell what answers.
+"""
+
+# ruff: noqa: N802 - the SDK chose the names
+
+from typing import Protocol, runtime_checkable
+
+from snakewalk.drivers.clock import Clock
+from snakewalk.drivers.errors import PortError
+
+
+class SdkPort(Protocol):
+    """What ``dynamixel_sdk`` calls; names and units are its own."""
+
+    is_using: bool
+    """True between an instruction and its answer; whoever catches an exception clears it."""
+
+    def openPort(self) -> bool:
+        """Open (again) at the current baud rate; True on success."""
+        ...
+
+    def closePort(self) -> None:
+        """Close; safe to call twice."""
+        ...
+
+    def clearPort(self) -> None:
+        """Throw away what has arrived and was not read."""
+        ...
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Change the speed of the host's side; False if the port cannot."""
+        ...
+
+    def getBaudRate(self) -> int:
+        """Speed of the host's side, bit/s."""
+        ...
+
+    def getBytesAvailable(self) -> int:
+        """Bytes that have arrived and were not read."""
+        ...
+
+    def readPort(self, length: int) -> bytes:
+        """Up to ``length`` bytes that have arrived by now; never waits for more to come.
+
+        The SDK spins on this until ``isPacketTimeout``. On a simulated line, where only waiting
+        moves time, a call that returns nothing moves the clock to the next byte, or to the
+        time-out if none comes.
+        """
+        ...
+
+    def writePort(self, packet: bytes | list[int]) -> int:
+        """Send; the number of bytes taken."""
+        ...
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Start the time-out for an answer of so many bytes."""
+        ...
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        """Start a time-out, ms."""
+        ...
+
+    def isPacketTimeout(self) -> bool:
+        """Whether the time-out has passed."""
+        ...
+
+
+class BytePort(SdkPort, Protocol):
+    """A half-duplex line with a clock.
+
+    All methods raise ``PortError`` when the port is gone. Bytes arrive in order and each once; a
+    baud rate that differs from the servos' shows as noise or silence, never as an exception.
+    """
+
+    @property
+    def clock(self) -> Clock:
+        """The time that the deadlines below are in; a simulated line owns a simulated one."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """For messages: ``/dev/ttyUSB0``, ``simulated line``."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send all of ``data`` without waiting until it is on the wire.
+
+        What is written twice in a row goes out back to back, in order.
+        """
+        ...
+
+    def read_until(self, count: int, deadline_s: float) -> bytes:
+        """Wait for ``count`` bytes, at most until ``clock.now_s() >= deadline_s``.
+
+        Returns what has arrived, at most ``count`` bytes: fewer mean that the deadline has passed.
+        With a deadline in the past it returns at once with what is there.
+        """
+        ...
+
+    def drain_until_quiet(self, quiet_s: float) -> int:
+        """Throw bytes away until none has come for ``quiet_s``; the number thrown away.
+
+        Waits ``quiet_s`` at least, so that an answer still on its way cannot be taken for that to
+        the next question.
+        """
+        ...
+
+
+@runtime_checkable
+class AskingPort(Protocol):
+    """A byte port that asks and listens in one go, with nothing of ours in between."""
+
+    def ask(self, request: bytes, count: int, wait_s: float) -> bytes:
+        """Forget what has come, send ``request``, wait for ``count`` bytes.
+
+        Returns what has arrived, at most ``count`` bytes: fewer mean that ``wait_s`` have passed
+        since the request was taken.
+        """
+        ...
+
+
+@runtime_checkable
+class FilePort(Protocol):
+    """A byte port on a file that compiled code may write and read in its place."""
+
+    file: int | None
+    """Descriptor, does not block; None: there is no compiler, or it is closed: use the port."""
+
+    def getBaudRate(self) -> int:
+        """As ``SdkPort`` says."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """As ``BytePort`` says."""
+        ...
+
+
+def reopen(port: BytePort) -> None:
+    """Close and open again, after the port was gone.
+
+    Raises:
+        PortError: it is still not there.
+
+    """
+    port.closePort()
+    if not port.openPort():
+        raise PortError(f"{port.name}: cannot be opened again")

@@ -1,0 +1,271 @@
+"""The byte port on a serial device."""
+
+# ruff: noqa: N802, D102 - the SDK chose the names; `drivers.port.byte_port` describes them
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import sys
+import termios
+from contextlib import suppress
+from types import TracebackType
+
+import numpy as np
+import serial
+from serial.tools import list_ports
+
+from snakewalk.drivers.clock import Clock, WallClock
+from snakewalk.drivers.compiling import COMPILES
+from snakewalk.drivers.errors import PortError
+
+_LATENCY_MS = 16.0
+"""What an FTDI adapter may hold bytes back by default (its ``latency_timer``)."""
+_PROGRAM_S = 0.02
+"""How late a program at the other end of a pseudo-terminal may be: it has to be scheduled."""
+_NOISE_LIMIT_BYTES = 1 << 16
+_LONGEST = 1 << 13
+"""Bytes of an answer that one compiled exchange takes."""
+_STUCK_S = 1.0
+"""After so long a device that takes no more bytes is gone."""
+
+
+class SerialPort:
+    """A serial device, opened for this program alone; implements ``BytePort``.
+
+    Raises:
+        PortError: (when opened) missing, denied, busy, or a baud rate that it cannot; (later) gone.
+
+    """
+
+    def __init__(self, device: str, baud: int = 1_000_000, clock: Clock | None = None) -> None:
+        self.is_using = False
+        self._device = device
+        self._baud = baud
+        self._clock: Clock = clock if clock is not None else WallClock()
+        self._timeout_at_s = 0.0
+        self._serial: serial.Serial | None = None
+        self._readable, self._writable = select.poll(), select.poll()
+        self._answer = np.empty(_LONGEST, np.uint8)
+        self._exchange = None
+        self.file: int | None = None
+        """Descriptor for compiled code, while there is any and the port is open."""
+        if sys.platform == "linux" and COMPILES:
+            from snakewalk.drivers.port.serial_wait import exchange  # noqa: PLC0415  slow, optional
+
+            self._exchange = exchange
+        self._open()
+
+    def __enter__(self) -> SerialPort:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.closePort()
+
+    @property
+    def clock(self) -> Clock:
+        """Wall time."""
+        return self._clock
+
+    @property
+    def name(self) -> str:
+        """The device's path."""
+        return self._device
+
+    @property
+    def latency_timer_ms(self) -> int | None:
+        """How long the USB adapter's driver may hold bytes back; None where it does not say."""
+        tty = os.path.basename(os.path.realpath(self._device))
+        try:
+            with open(f"/sys/bus/usb-serial/devices/{tty}/latency_timer", encoding="ascii") as file:
+                return int(file.read())
+        except (OSError, ValueError):
+            return None  # not a USB adapter, or one without the setting: nothing to report
+
+    @property
+    def latency_s(self) -> float:
+        """How long bytes may be held back on this side, for ``DynamixelBus(latency_s=...)``."""
+        if os.path.realpath(self._device).startswith("/dev/pts/"):
+            return _PROGRAM_S
+        timer_ms = self.latency_timer_ms
+        return 0.003 + (timer_ms if timer_ms is not None else 1) * 1e-3
+
+    def write(self, data: bytes) -> None:
+        """Send all of ``data``."""
+        fd = self._descriptor
+        try:
+            sent = 0
+            while True:
+                # said to be writable, a full device may still take nothing
+                with suppress(BlockingIOError):
+                    sent += os.write(fd, data[sent:])
+                if sent == len(data):
+                    return
+                if not self._writable.poll(_STUCK_S * 1e3):
+                    raise PortError(f"{self._device}: takes no more bytes")
+        except OSError as error:
+            raise self._gone(error) from error
+
+    def read_until(self, count: int, deadline_s: float) -> bytes:
+        """Wait for ``count`` bytes, at most until ``deadline_s``."""
+        fd = self._descriptor
+        got = b""
+        try:
+            while len(got) < count:
+                left_s = max(0.0, deadline_s - self._clock.now_s())
+                if not self._readable.poll(left_s * 1e3):
+                    break
+                more = os.read(fd, count - len(got))
+                if not more:
+                    raise OSError(errno.EIO, "ready to be read, but empty")
+                got += more
+        except OSError as error:
+            raise self._gone(error) from error
+        return got
+
+    def ask(self, request: bytes, count: int, wait_s: float) -> bytes:
+        """Forget what has come, send ``request``, wait for ``count`` bytes.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        if self._exchange is None or count > _LONGEST:
+            self.clearPort()
+            self.write(request)
+            return self.read_until(count, self._clock.now_s() + wait_s)
+        question, answer = np.frombuffer(request, np.uint8), self._answer[:count]
+        begun_s = self._clock.now_s()
+        got = self._exchange(self._descriptor, question, answer, int(wait_s * 1e9))
+        if got == count:
+            return answer.tobytes()
+        if got < 0:
+            self.write(request[-1 - got :])
+            begun_s, got = self._clock.now_s(), 0
+        return answer[:got].tobytes() + self.read_until(count - got, begun_s + wait_s)
+
+    def drain_until_quiet(self, quiet_s: float) -> int:
+        """Throw bytes away until none has come for ``quiet_s``.
+
+        Raises:
+            PortError: the line never falls quiet.
+
+        """
+        thrown = 0
+        quiet_at_s = self._clock.now_s() + quiet_s
+        while self._clock.now_s() < quiet_at_s:
+            waiting = max(1, self.getBytesAvailable())
+            got = len(self.read_until(waiting, quiet_at_s))
+            if got:
+                thrown += got
+                quiet_at_s = self._clock.now_s() + quiet_s
+            if thrown > _NOISE_LIMIT_BYTES:
+                raise PortError(
+                    f"{self._device}: the line does not fall quiet; something else talks on it, "
+                    "or the baud rate is wrong"
+                )
+        return thrown
+
+    # what the SDK calls
+
+    def openPort(self) -> bool:
+        if self._serial is None:
+            self._open()
+        return True
+
+    def closePort(self) -> None:
+        if self._serial is not None:
+            self._serial.close()
+            self._serial = self.file = None
+        self.is_using = False
+
+    def clearPort(self) -> None:
+        try:
+            self._line.reset_input_buffer()
+        except (serial.SerialException, OSError, termios.error) as error:
+            raise self._gone(error) from error
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        try:
+            self._line.baudrate = baudrate
+        except (ValueError, serial.SerialException, OSError):
+            return False
+        self._baud = baudrate
+        return True
+
+    def getBaudRate(self) -> int:
+        return self._baud
+
+    def getBytesAvailable(self) -> int:
+        try:
+            return int(self._line.in_waiting)
+        except (serial.SerialException, OSError) as error:
+            raise self._gone(error) from error
+
+    def readPort(self, length: int) -> bytes:
+        """Up to ``length`` bytes; sleeps for the first one, so that the SDK does not spin."""
+        waiting = self.getBytesAvailable()
+        if waiting:
+            return self.read_until(min(length, waiting), self._clock.now_s())
+        return self.read_until(1, min(self._timeout_at_s, self._clock.now_s() + 0.01))
+
+    def writePort(self, packet: bytes | list[int]) -> int:
+        self.write(bytes(packet))
+        return len(packet)
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        wire_ms = packet_length * 10_000.0 / self._baud
+        self.setPacketTimeoutMillis(wire_ms + 2.0 * _LATENCY_MS + 2.0)
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        self._timeout_at_s = self._clock.now_s() + msec / 1000.0
+
+    def isPacketTimeout(self) -> bool:
+        return self._clock.now_s() > self._timeout_at_s
+
+    @property
+    def _line(self) -> serial.Serial:
+        if self._serial is None:
+            raise PortError(f"{self._device}: is closed")
+        return self._serial
+
+    @property
+    def _descriptor(self) -> int:
+        return int(self._line.fileno())
+
+    def _open(self) -> None:
+        try:
+            self._serial = serial.Serial(self._device, self._baud, timeout=0.0, exclusive=True)
+            self._serial.reset_input_buffer()
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise PortError(self._why(error)) from error
+        self.file = int(self._serial.fileno()) if self._exchange is not None else None
+        self._readable, self._writable = select.poll(), select.poll()
+        self._readable.register(self._serial.fileno(), select.POLLIN)
+        self._writable.register(self._serial.fileno(), select.POLLOUT)
+        # asks an FTDI driver for a latency timer of 1 ms instead of 16; others have none to set
+        with suppress(ValueError, NotImplementedError):
+            self._serial.set_low_latency_mode(True)
+
+    def _gone(self, error: Exception) -> PortError:
+        self.is_using = False
+        return PortError(f"{self._device}: the port is gone: {error}")
+
+    def _why(self, error: Exception) -> str:
+        number = getattr(error, "errno", None)
+        if number == errno.ENOENT:
+            there = ", ".join(sorted(port.device for port in list_ports.comports()))
+            return f"{self._device}: no such port; there is {there or 'none: is it plugged in?'}"
+        if number in (errno.EACCES, errno.EPERM):
+            return f"{self._device}: no permission; join the group that owns it (often 'dialout')"
+        if number in (errno.EBUSY, errno.EAGAIN):
+            return f"{self._device}: another program has it open"
+        if isinstance(error, ValueError):
+            return f"{self._device}: {self._baud} bit/s is not possible here: {error}"
+        return f"{self._device}: cannot be opened: {error}"

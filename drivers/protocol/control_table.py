@@ -1,0 +1,169 @@
+"""Control tables of the servo models, read from the files that the DYNAMIXEL SDK ships."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from types import MappingProxyType
+
+from snakewalk.drivers.errors import ControlTableError
+
+# The files name four signed registers; the e-manual's two's complement registers of the X, MX(2.0),
+# P and PRO series (columns "Range" with negative values) are these.
+_SIGNED = frozenset(
+    {
+        *("Homing Offset", "Goal PWM", "Goal Current", "Goal Velocity", "Goal Position"),
+        *("Present PWM", "Present Load", "Present Current", "Present Velocity", "Present Position"),
+        *("Velocity Trajectory", "Position Trajectory"),
+        *("Max Position Limit", "Min Position Limit"),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """Where one value lies."""
+
+    name: str
+    address: int
+    size: int
+    """Bytes, little-endian."""
+    signed: bool
+    """Two's complement."""
+
+    def decode(self, data: bytes) -> int:
+        """Value of ``size`` bytes."""
+        return int.from_bytes(data[: self.size], "little", signed=self.signed)
+
+    def encode(self, value: int) -> bytes:
+        """Bytes of a value.
+
+        Raises:
+            ControlTableError: it does not fit.
+
+        """
+        try:
+            return value.to_bytes(self.size, "little", signed=self.signed)
+        except OverflowError:
+            raise ControlTableError(
+                f"{self.name}: {value} does not fit in {self.size} byte(s)"
+            ) from None
+
+
+@dataclass(frozen=True, slots=True)
+class ControlTable:
+    """Registers of one model, and the scales that its file gives."""
+
+    model: str
+    """As printed on the servo: ``XM430-W350``."""
+    model_number: int
+    registers: Mapping[str, Register]
+    zero_position: int
+    """Raw position of 0 rad: straight."""
+    rad_per_position: float
+    rad_s_per_velocity: float | None
+    """None where the file has none."""
+
+    def register(self, name: str) -> Register:
+        """Look a register up by the SDK's name, ``Present Position``.
+
+        Raises:
+            ControlTableError: this model has none of that name.
+
+        """
+        try:
+            return self.registers[name]
+        except KeyError:
+            near = [n for n in self.registers if n.lower() == name.lower()]
+            hint = f"; you mean {near[0]}" if near else ""
+            raise ControlTableError(f"{self.model}: has no register {name!r}{hint}") from None
+
+    def __getitem__(self, name: str) -> Register:
+        return self.register(name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.registers
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.registers)
+
+
+@cache
+def model_numbers() -> Mapping[int, str]:
+    """Model number to name, of all servos that the SDK knows."""
+    lines = (_folder() / "dynamixel.model").read_text(encoding="utf-8").splitlines()[1:]
+    numbers = (line.split("\t") for line in lines if line.strip())
+    return MappingProxyType({int(n): _printed(file.strip()) for n, file in numbers})
+
+
+def model_of(model_number: int) -> str:
+    """Name of a model number (register 0).
+
+    Raises:
+        ControlTableError: the SDK does not know it.
+
+    """
+    try:
+        return model_numbers()[model_number]
+    except KeyError:
+        raise ControlTableError(f"model number {model_number} is none that the SDK knows") from None
+
+
+@cache
+def load_control_table(model: str) -> ControlTable:
+    """Control table of ``XM430-W350``; upper or lower case, ``_`` or ``-``.
+
+    Raises:
+        ControlTableError: the SDK has no table of that name, or is not installed.
+
+    """
+    wanted = _printed(model)
+    number = next((n for n, name in model_numbers().items() if name == wanted), None)
+    if number is None:
+        shown = ", ".join(sorted(model_numbers().values()))
+        raise ControlTableError(f"{model}: no such servo; the SDK has tables of {shown}")
+    path = _folder() / f"{wanted.lower().replace('-', '_')}.model"
+    sections = _sections(path.read_text(encoding="utf-8"))
+    info = {row[0]: float(row[1]) for row in sections["type info"]}
+    units = {row[0]: float(row[1]) for row in sections["unit info"]}
+    registers: dict[str, Register] = {}
+    for address, size, name, *_ in sections["control table"]:
+        registers.setdefault(name, Register(name, int(address), int(size), name in _SIGNED))
+    zero = int(info["value_of_zero_radian_position"])
+    # The lowest value is -pi exactly, in steps; the highest is one step short of +pi on some models
+    steps = zero - int(info["value_of_min_radian_position"])
+    return ControlTable(
+        model=wanted,
+        model_number=number,
+        registers=MappingProxyType(registers),
+        zero_position=zero,
+        rad_per_position=math.pi / steps,
+        rad_s_per_velocity=units.get("Present Velocity"),
+    )
+
+
+def _printed(name: str) -> str:
+    return name.removesuffix(".model").upper().replace("_", "-")
+
+
+def _sections(text: str) -> dict[str, list[list[str]]]:
+    """Rows of each ``[section]`` without its heading line."""
+    sections: dict[str, list[list[str]]] = {"type info": [], "unit info": [], "control table": []}
+    rows: list[list[str]] = []
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.split("\t")]
+        if line.startswith("["):
+            rows = sections.setdefault(line.strip().strip("[]"), [])
+        elif len(cells) > 1 and cells[0] not in ("name", "Data Name", "Address"):
+            rows.append(cells)
+    return sections
+
+
+@cache
+def _folder() -> Path:
+    package = find_spec("dynamixel_easy_sdk")  # finds the folder without importing it
+    if package is None or package.origin is None:
+        raise ControlTableError("the DYNAMIXEL SDK is not installed: pip install dynamixel-sdk")
+    return Path(package.origin).parent / "control_table"

@@ -1,0 +1,115 @@
+"""The frames of a control cycle: bytes of regular replies to values, goals to bytes.
+
+Loops over bytes, compiled when this is imported, never in a cycle. What is not exactly as expected
+is refused here and left to the careful reader.
+"""
+
+import numpy as np
+from numba import boolean, int32, int64, types, uint8, uint16
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Bytes
+from snakewalk.drivers.compiling import compiled
+from snakewalk.drivers.protocol.crc import TABLE
+
+IRREGULAR, FLAWLESS, WITH_ERRORS = 0, 1, 2
+"""What a reader found: not the expected bytes; all without an error byte; some with one."""
+HEAD = 8
+"""Bytes of a status packet in front of its error byte, and of a fast answer in front of all."""
+PARAMS_AT, VALUES_AT = 8, 12
+"""In a sync write: its parameters; behind address and length, the servos' shares."""
+SHARE_BYTES = 5
+"""In it, of each servo: ID and value."""
+
+
+_RAW = types.Array(uint8, 1, "C", readonly=True)
+_ROW, _ROWS = uint8[::1], uint8[:, ::1]
+
+
+@compiled(uint16(_RAW, int64, int64))
+def _crc(data: Bytes, start: int, stop: int) -> int:
+    crc = 0
+    for k in range(start, stop):
+        crc = ((crc << 8) & 0xFFFF) ^ int(TABLE[(crc >> 8) ^ int(data[k])])
+    return crc
+
+
+@compiled(boolean(_RAW, int64, int64))
+def _header_in(data: Bytes, start: int, stop: int) -> bool:
+    """Whether ``FF FF FD`` lies within ``start`` to ``stop``."""
+    for k in range(start + 2, stop):
+        if data[k] == 0xFD and data[k - 1] == 0xFF and data[k - 2] == 0xFF:
+            return True
+    return False
+
+
+@compiled(int64(_RAW, _ROWS, _ROWS, _ROW))
+def read_plain(raw: Bytes, heads: Bytes, data: Bytes, error: Bytes) -> int:
+    """Take N status packets apart, none of them stuffed.
+
+    Args:
+        raw: what has come.
+        heads: (N, 8) how each must begin.
+        data: (N, length) filled, unless irregular.
+        error: (N,) filled, unless irregular.
+
+    """
+    count, length = data.shape
+    size = length + HEAD + 3
+    if len(raw) != count * size:
+        return IRREGULAR
+    found = FLAWLESS
+    for servo in range(count):
+        at = servo * size
+        end = at + size
+        for k in range(HEAD):
+            if raw[at + k] != heads[servo, k]:
+                return IRREGULAR
+        if _crc(raw, at, end - 2) != int(raw[end - 2]) | int(raw[end - 1]) << 8:
+            return IRREGULAR
+        if _header_in(raw, at + HEAD, end):
+            return IRREGULAR
+        error[servo] = raw[at + HEAD]
+        if error[servo]:
+            found = WITH_ERRORS
+        for k in range(length):
+            data[servo, k] = raw[at + HEAD + 1 + k]
+    return found
+
+
+@compiled(int64(_RAW, _ROW, _ROW, _ROWS, _ROW))
+def read_fast(raw: Bytes, head: Bytes, ids: Bytes, data: Bytes, error: Bytes) -> int:
+    """Take the reply to a fast read apart: ``head`` (8,), then shares of ``ids`` (N,)."""
+    count, length = data.shape
+    end = HEAD + count * (length + 4)
+    if len(raw) != end:
+        return IRREGULAR
+    for k in range(HEAD):
+        if raw[k] != head[k]:
+            return IRREGULAR
+    if _crc(raw, 0, end - 2) != int(raw[end - 2]) | int(raw[end - 1]) << 8:
+        return IRREGULAR
+    found = FLAWLESS
+    for servo in range(count):
+        at = HEAD + servo * (length + 4)
+        if raw[at + 1] != ids[servo]:
+            return IRREGULAR
+        error[servo] = raw[at]
+        if error[servo]:
+            found = WITH_ERRORS
+        for k in range(length):
+            data[servo, k] = raw[at + 2 + k]
+    return found
+
+
+@compiled(boolean(_ROW, int32[::1]))
+def fill(frame: Bytes, values: NDArray[np.int32]) -> bool:
+    """Put ``values`` (N,) and the CRC into a sync write; False if it must be stuffed first."""
+    for servo in range(len(values)):
+        value = int(values[servo])
+        for k in range(4):
+            frame[VALUES_AT + SHARE_BYTES * servo + 1 + k] = (value >> (8 * k)) & 0xFF
+    end = len(frame) - 2
+    crc = int(_crc(frame, 0, end))
+    frame[end], frame[end + 1] = crc & 0xFF, crc >> 8
+    return not _header_in(frame, PARAMS_AT, end)

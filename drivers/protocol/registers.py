@@ -1,0 +1,144 @@
+"""Raw register values to SI units and back, per servo model.
+
+Positions and velocities are scaled as the SDK's control tables say. For the current these tables
+give "raw", or a torque, so its unit is here, from the e-manual's page of each model, Current
+Limit(38) and Present Current(126). A model that is not in the table is refused: a current of
+unknown scale must not look like zero, or safe.
+"""
+
+from dataclasses import dataclass
+from enum import IntFlag
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats, SignedInts
+from snakewalk.drivers.errors import ControlTableError
+from snakewalk.drivers.protocol.control_table import ControlTable
+
+_CURRENT_UNIT_A = {
+    **dict.fromkeys(("XM430-W210", "XM430-W350", "XM540-W150", "XM540-W270"), 2.69e-3),
+    **dict.fromkeys(("XH430-W210", "XH430-W350"), 2.69e-3),
+    **dict.fromkeys(("XH430-V210", "XH430-V350"), 1.34e-3),
+    **dict.fromkeys(("XL330-M077", "XL330-M288"), 1e-3),
+    **dict.fromkeys(("XC330-M181", "XC330-M288", "XC330-T181", "XC330-T288"), 1e-3),
+    **dict.fromkeys(("PH42-020-S300", "PH54-100-S500", "PH54-200-S500"), 1e-3),
+    **dict.fromkeys(("PM42-010-S260", "PM54-040-S250", "PM54-060-S250"), 1e-3),
+}
+VOLTAGE_UNIT_V = 0.1
+"""Present Input Voltage(144), all series of Protocol 2.0."""
+WATCHDOG_UNIT_S = 0.02
+"""Bus Watchdog(98)."""
+RETURN_DELAY_UNIT_S = 2e-6
+"""Return Delay Time(9)."""
+
+
+class Alarm(IntFlag):
+    """Bits of Hardware Error Status(70)."""
+
+    INPUT_VOLTAGE = 0x01
+    OVERHEATING = 0x04
+    MOTOR_ENCODER = 0x08
+    ELECTRICAL_SHOCK = 0x10
+    OVERLOAD = 0x20
+
+
+def alarm_names(hardware_error: int) -> str:
+    """Bits of register 70 in words; empty without an alarm."""
+    names = {alarm.value: (alarm.name or "").lower().replace("_", " ") for alarm in Alarm}
+    bits = (bit for bit in range(8) if hardware_error >> bit & 1)
+    return ", ".join(names.get(1 << bit, f"bit {bit}") for bit in bits)
+
+
+@dataclass(frozen=True, slots=True)
+class ServoUnits:
+    """Scales of one model; arrays in, arrays of the same shape out."""
+
+    zero_position: int
+    """Raw position of a straight joint."""
+    rad_per_position: float
+    rad_s_per_velocity: float
+    a_per_current: float
+
+    @staticmethod
+    def of(table: ControlTable) -> "ServoUnits":
+        """Scales for a control table.
+
+        Raises:
+            ControlTableError: the velocity's or the current's unit is not known.
+
+        """
+        faults = []
+        velocity, current = table.rad_s_per_velocity, _CURRENT_UNIT_A.get(table.model)
+        if velocity is None:
+            faults.append(f"{table.model}: the SDK's table gives no unit of velocity")
+        if current is None:
+            faults.append(
+                f"{table.model}: unit of current not known; known are "
+                f"{', '.join(sorted(_CURRENT_UNIT_A))}"
+            )
+        if velocity is None or current is None:
+            raise ControlTableError(faults)
+        return ServoUnits(table.zero_position, table.rad_per_position, velocity, current)
+
+    def position_rad(self, raw: SignedInts) -> Floats:
+        """Angles, rad; 0 is straight."""
+        return np.asarray((raw - float(self.zero_position)) * self.rad_per_position)
+
+    def position_raw(self, angle_rad: Floats) -> NDArray[np.int32]:
+        """Nearest raw positions.
+
+        Raises:
+            ValueError: an angle is not finite.
+
+        """
+        if np.count_nonzero(np.isfinite(angle_rad)) < angle_rad.size:
+            raise ValueError("an angle is not finite")
+        return np.rint(angle_rad / self.rad_per_position + self.zero_position).astype(np.int32)
+
+    def velocity_rad_s(self, raw: SignedInts) -> Floats:
+        """Velocities, rad/s."""
+        return np.asarray(raw * self.rad_s_per_velocity)
+
+    def current_a(self, raw: SignedInts) -> Floats:
+        """Currents, A."""
+        return np.asarray(raw * self.a_per_current)
+
+    def current_raw(self, current_a: float) -> int:
+        """Nearest raw current."""
+        return round(current_a / self.a_per_current)
+
+
+BAUDS = (9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
+"""By code."""
+FACTORY_BAUD = 57_600
+_UP_TO_4M = ("XL330", "XC330")
+_ALL = ("XL430", "XC430", "XM", "XH", "XD", "XW", "MX", "2X")
+
+
+def bauds_of(model: str) -> tuple[int, ...]:
+    """Baud rates of a model, by code.
+
+    Raises:
+        ControlTableError: its series is not known here.
+
+    """
+    if model.startswith(_UP_TO_4M):
+        return BAUDS[:-1]
+    if model.startswith(_ALL):
+        return BAUDS
+    raise ControlTableError(f"{model}: baud rate codes not known; known are the X and MX series")
+
+
+def baud_code(model: str, baud: int) -> int:
+    """Value of register 8.
+
+    Raises:
+        ControlTableError: the model does not have that rate.
+
+    """
+    rates = bauds_of(model)
+    if baud not in rates:
+        shown = ", ".join(map(str, rates))
+        raise ControlTableError(f"{baud} baud: a {model} has {shown}")
+    return rates.index(baud)

@@ -1,0 +1,220 @@
+"""The only joint link that is handed out: every command vetted, torque off whatever happens."""
+
+import signal
+import threading
+from types import FrameType, TracebackType
+
+from snakewalk.drivers.clock import Clock
+from snakewalk.drivers.errors import DriverError, SafetyTrippedError
+from snakewalk.drivers.link import JointLink
+from snakewalk.drivers.safety.recovery import Recovery
+from snakewalk.drivers.safety.vet import (
+    SafetyLimits,
+    SafetyMemory,
+    Verdict,
+    judge,
+    stale_fault,
+    vet,
+)
+from snakewalk.drivers.types import JointCommand, JointState
+
+_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+
+
+class SafeLink:
+    """A ``JointLink`` around another; use as a context manager, which switches torque off at exit.
+
+    On a veto, on an error of the link below, or on ``request_stop`` it latches: torque goes off,
+    ``tripped`` says why, ``write`` raises; ``read`` goes on, for the log. Only ``reset`` by an
+    operator and a new ``enable`` let it move again. Inside the context SIGTERM, SIGINT and SIGHUP
+    unwind the program through the exit; if it is killed, the servos' bus watchdog stops them.
+
+    With a ``recovery`` a line or servo that went away does not latch at once: the chain holds, and
+    goes on from where it stands if the recovery's policy lets it.
+    """
+
+    def __init__(
+        self,
+        link: JointLink,
+        limits: SafetyLimits,
+        clock: Clock,
+        recovery: Recovery | None = None,
+    ) -> None:
+        self.tripped: str | None = None
+        """Why it has latched; None while it lets commands pass."""
+        self.last_verdict: Verdict | None = None
+        """Of the last command."""
+        self.recoveries = 0
+        """Interruptions after which it went on."""
+        self._link = link
+        self._recovery = recovery
+        self._limits = limits
+        self._clock = clock
+        self._state: JointState | None = None
+        self._memory: SafetyMemory | None = None
+        self._stop_requested: str | None = None
+        self._touched = False
+        self._handlers: dict[signal.Signals, object] = {}
+
+    def __enter__(self) -> "SafeLink":
+        if threading.current_thread() is threading.main_thread():
+            for number in _SIGNALS:
+                self._handlers[number] = signal.signal(number, _unwind)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for number in self._handlers:
+            signal.signal(number, signal.SIG_IGN)  # nothing may interrupt switching torque off
+        try:
+            if self._touched:
+                self.disable()
+        except DriverError as fault:
+            if error is None:
+                raise
+            error.add_note(f"torque off failed: {fault}")
+        finally:
+            for number, handler in self._handlers.items():
+                signal.signal(number, handler)  # type: ignore[arg-type]
+            self._handlers.clear()
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints J."""
+        return self._link.joint_count
+
+    def enable(self) -> JointState:
+        """Check and set up the servos, torque on.
+
+        Raises:
+            SafetyTrippedError: latched, or the state found is a reason to latch.
+            DriverError: what the link below raises.
+
+        """
+        self._refuse_if_tripped()
+        self._touched = True
+        state = self._link.enable()
+        self._state, self._memory = state, SafetyMemory.at_rest(state)
+        self._judge(state, self._memory)
+        self._refuse_if_tripped()
+        return state
+
+    def disable(self) -> None:
+        """Torque off; safe to call at any time, more than once."""
+        self._memory = None
+        self._link.disable()
+
+    def read(self) -> JointState:
+        """Read all joints; latches if the state is a reason to, and returns it all the same.
+
+        Raises:
+            SafetyTrippedError: the link below failed just now, and was not brought back.
+
+        """
+        try:
+            state = self._link.read()
+        except DriverError as fault:
+            return self._bring_back(str(fault), fault)
+        if self._memory is None:
+            self._state = state
+            return state
+        if self._recovery is not None and self.tripped is None:
+            stale = stale_fault(state, self._limits, self._clock.now_s())
+            if stale is not None:
+                return self._bring_back(stale, None)
+        self._state = state
+        self._judge(state, self._memory)
+        return state
+
+    def write(self, command: JointCommand) -> None:
+        """Vet a command against the last state read and send what may pass.
+
+        After an interruption that was mended in this call, nothing is sent: the joints hold.
+
+        Raises:
+            SafetyTrippedError: latched, before or by this command.
+
+        """
+        self._refuse_if_tripped()
+        if self._memory is None or self._state is None:
+            raise SafetyTrippedError("torque is off: enable first")
+        if self._stop_requested is not None:
+            self._trip(self._stop_requested)
+            self._refuse_if_tripped()
+        verdict = vet(command, self._state, self._memory, self._limits, self._clock.now_s())
+        self.last_verdict, self._memory = verdict, verdict.memory
+        if verdict.veto is not None:
+            self._trip(verdict.veto)
+            self._refuse_if_tripped()
+        try:
+            self._link.write(JointCommand(command.time_s, verdict.goal_rad))
+        except DriverError as fault:
+            self._bring_back(str(fault), fault)
+        else:  # if the program stood still in between, the next step counts from here
+            memory = verdict.memory
+            self._memory = SafetyMemory(
+                self._clock.now_s(), memory.goal_rad, memory.over_current_since_s, memory.sound
+            )
+
+    def request_stop(self, reason: str) -> None:
+        """Latch at the next read or write; may be called from another thread (a stop button)."""
+        self._stop_requested = reason
+
+    def reset(self, operator: str) -> None:
+        """Unlatch, by a person who has looked at the robot; torque stays off until ``enable``.
+
+        Raises:
+            ValueError: nobody put a name to it.
+
+        """
+        if not operator.strip():
+            raise ValueError("a reset needs the name of the operator")
+        self.tripped = None
+        self._stop_requested = None
+
+    def _bring_back(self, reason: str, fault: DriverError | None) -> JointState:
+        """Let the recovery mend what broke; else latch and raise."""
+        state = None
+        if self._recovery is not None and self._memory is not None:
+            try:
+                state = self._recovery.bring_back(reason, lambda: self._stop_requested)
+            except DriverError as again:
+                fault = again
+                reason = f"{reason}; while going on: {again}"
+        if state is None:
+            self._trip(reason)
+            raise SafetyTrippedError(str(self.tripped)) from fault
+        self.recoveries += 1
+        self._state, self._memory = state, SafetyMemory.at_rest(state)
+        self._judge(state, self._memory)
+        return state
+
+    def _judge(self, state: JointState, memory: SafetyMemory) -> None:
+        fault, self._memory = judge(state, memory, self._limits, self._clock.now_s())
+        fault = self._stop_requested or fault
+        if fault is not None:
+            self._trip(fault)
+
+    def _trip(self, reason: str) -> None:
+        """Latch; the first reason stays."""
+        if self.tripped is None:
+            self.tripped = reason
+        try:
+            self.disable()
+        except DriverError as fault:
+            self.tripped += f" (torque off failed: {fault})"
+
+    def _refuse_if_tripped(self) -> None:
+        if self.tripped is not None:
+            raise SafetyTrippedError(self.tripped)
+
+
+def _unwind(number: int, frame: FrameType | None) -> None:
+    """Turn a signal into an exception, so that every ``with`` on the way is left properly."""
+    if number == signal.SIGINT:
+        raise KeyboardInterrupt
+    raise SystemExit(128 + number)

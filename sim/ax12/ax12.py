@@ -1,0 +1,238 @@
+"""AX-12A servos: what their control table does to the motors, and back (e-manual, AX-12A)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Indices
+from snakewalk.config.errors import InputError
+from snakewalk.sim.ax12.alarms import Ax12Alarms
+from snakewalk.sim.ax12.protocol1 import MAX_ID, Error1
+from snakewalk.sim.ax12.table import AT, CELLS, EEPROM_END, MODEL, TABLE_BYTES, Cell
+from snakewalk.sim.plant import Plant
+from snakewalk.sim.servo.blocked_shaft import Jam
+from snakewalk.sim.servo.event_queue import Agenda
+from snakewalk.sim.servo.motor import MotorModel, make_drive
+from snakewalk.sim.servo.profile import VELOCITY_UNIT_RAD_S, Trajectory
+
+CENTRE_TICKS, TICKS_PER_RAD = 512, 1023.0 / np.radians(300.0)
+SPEED_UNIT_RAD_S = 0.111 * 2.0 * np.pi / 60.0
+"""Moving Speed(32), Present Speed(38)."""
+SLICE_S = 2e-3
+FAINT = 1e-9
+CLOCKWISE = 0x400
+"""Bit 10: the direction of speeds and loads."""
+TURN_RAD = 2.0 * np.pi
+AX12_MOTOR = MotorModel(12.0, 1.5, 1.5, 59.0 * 2.0 * np.pi / 60.0, 1e-3, 1.0, 0.050, 12.0, 150.0)
+"""E-manual AX-12A: 1.5 N m at 12 V and 1.5 A, 59 rev/min; standby from the AX series; heat ours."""
+
+
+class Ax12Servos:
+    """S servos on the shafts of ``plant``.
+
+    Raises:
+        InputError: an ID is out of 0 to 253 or used twice.
+
+    """
+
+    def __init__(self, ids: tuple[int, ...], plant: Plant, supply_v: float = 12.0) -> None:
+        wrong = [
+            f"ID {each}: an {MODEL} has 0 to {MAX_ID}" for each in ids if not 0 <= each <= MAX_ID
+        ]
+        if len(set(ids)) != len(ids):
+            wrong.append(f"two servos share an ID: {', '.join(map(str, sorted(ids)))}")
+        if wrong:
+            raise InputError(wrong)
+        servos = len(ids)
+        self.plant = plant
+        self.table = np.zeros((servos, TABLE_BYTES), np.uint8)
+        self.drive = make_drive([AX12_MOTOR] * servos, supply_v)
+        self._views = {name: self._view(cell) for name, cell in CELLS.items()}
+        self.jam = Jam(self.drive)
+        self.protection = Ax12Alarms(
+            self._views.__getitem__, self.drive, AX12_MOTOR, self.jam, supply_v
+        )
+        self.agenda = Agenda()
+        """What happens to the servos at a time of its own, whoever talks."""
+        self.powered = np.ones(servos, bool)
+        """(S,) False while a servo has no supply: it hears nothing and lets go."""
+        self._path = Trajectory(servos)
+        self._turn_rad = np.zeros(servos)
+        self._registered: dict[int, tuple[int, bytes]] = {}
+        self._time_s = plant.time_s
+        for row, servo_id in enumerate(ids):
+            self.reset(row)
+            self["ID"][row] = servo_id
+
+    def __getitem__(self, name: str) -> NDArray[np.unsignedinteger]:
+        """(S,) live view of a register of all servos."""
+        return self._views[name]
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    # what a host asks for
+
+    def check(self, row: int, address: int, data: bytes) -> int:
+        """Error bits that a write of ``data`` would answer; nothing is written."""
+        at = address
+        while at < address + len(data):
+            name = AT.get(at)
+            if name is None:
+                return Error1.INSTRUCTION
+            cell = CELLS[name]
+            raw = data[at - address : at - address + cell.size]
+            locked = at < EEPROM_END and self["Lock"][row]
+            if len(raw) < cell.size or locked or cell.low is None or cell.high is None:
+                return Error1.INSTRUCTION
+            value = int.from_bytes(raw, "little")
+            if not cell.low <= value <= cell.high or (name == "Lock" and value < self[name][row]):
+                return Error1.RANGE
+            if name == "Goal Position" and not self._wheel()[row]:
+                low, high = int(self["CW Angle Limit"][row]), int(self["CCW Angle Limit"][row])
+                if not low <= value <= high:
+                    return Error1.ANGLE_LIMIT
+            at += cell.size
+        return 0
+
+    def write(self, row: int, address: int, data: bytes) -> int:
+        """Write whole registers or, with an error bit, nothing."""
+        error = self.check(row, address, data)
+        if error:
+            return error
+        self.table[row, address : address + len(data)] = np.frombuffer(data, np.uint8)
+        touched = range(address, address + len(data))
+        if CELLS["Torque Limit"].address in touched and self["Torque Limit"][row]:
+            self.protection.forget(row)
+        if CELLS["Goal Position"].address in touched:  # a goal switches the torque on
+            self["Torque Enable"][row] = 1
+        return 0
+
+    def register_write(self, row: int, address: int, data: bytes) -> int:
+        """Reg Write: check and keep for Action."""
+        error = self.check(row, address, data)
+        if not error:
+            self._registered[row] = (address, data)
+            self["Registered"][row] = 1
+        return error
+
+    def action(self, row: int) -> int:
+        """Carry out the registered write; without one it is an instruction error."""
+        kept = self._registered.pop(row, None)
+        self["Registered"][row] = 0
+        return self.write(row, *kept) if kept is not None else Error1.INSTRUCTION
+
+    def reset(self, row: int) -> None:
+        """Factory values, the ID too; then a start."""
+        for name, cell in CELLS.items():
+            self[name][row] = cell.initial
+        self.reboot(row)
+
+    # what happens to them
+
+    def reboot(self, row: int) -> None:
+        """Start anew: RAM as it was made, Torque Limit(34) = Max Torque(14), goal = present."""
+        for name, cell in CELLS.items():
+            if cell.address >= EEPROM_END:
+                self[name][row] = cell.initial
+        self["Torque Limit"][row] = self["Max Torque"][row]
+        self._registered.pop(row, None)
+        self.protection.forget(row)
+        self.refresh()
+        self["Goal Position"][row] = self["Present Position"][row]
+
+    def cut_power(self, rows: Indices) -> None:
+        """Take the supply away: shafts go limp, and all that is not EEPROM is lost."""
+        self.powered[rows] = False
+
+    def give_power(self, rows: Indices) -> None:
+        """Give the supply back."""
+        self.powered[rows] = True
+        for row in rows:
+            self.reboot(int(row))
+
+    def seize(self, rows: Indices) -> None:
+        """Jam shafts where they are."""
+        for row in rows:
+            self.jam.seize(int(row), float(self.plant.position_rad[row]))
+
+    def release(self, rows: Indices) -> None:
+        """Free jammed shafts."""
+        for row in rows:
+            self.jam.free(int(row))
+
+    def advance(self, until_s: float) -> None:
+        """Step physics, trajectories and alarms to ``until_s``."""
+        while self._time_s < until_s:
+            stop_s = min(until_s, self._time_s + SLICE_S, self.agenda.next_s)
+            if stop_s > self._time_s:
+                self._steer(stop_s - self._time_s)
+                self.plant.advance(stop_s, self.drive)
+                self.protection.look(stop_s - self._time_s, self.plant.velocity_rad_s)
+                self._time_s = stop_s
+            if stop_s >= self.agenda.next_s:
+                self.agenda.carry_out(stop_s)
+
+    # registers and shafts
+
+    def refresh(self) -> None:
+        """All present values."""
+        self._follow_turns()
+        ticks = (self.plant.position_rad - self._turn_rad) * TICKS_PER_RAD + CENTRE_TICKS
+        self["Present Position"][:] = np.clip(np.rint(ticks), 0, 1023)
+        self["Present Speed"][:] = _signed(self.plant.velocity_rad_s / SPEED_UNIT_RAD_S)
+        self["Present Load"][:] = _signed(self.jam.pwm() * 1023.0)
+        self["Present Voltage"][:] = np.clip(np.rint(self.drive.supply_v * 10.0), 0, 255)
+        celsius = np.rint(self.protection.temperature_c)
+        self["Present Temperature"][:] = np.clip(celsius, 0, 255)
+        self["Moving"][:] = self._path.ongoing & self._on() & ~self._wheel()
+
+    def _on(self) -> NDArray[np.bool_]:
+        return np.asarray((self["Torque Enable"] == 1) & self.powered)
+
+    def _wheel(self) -> NDArray[np.bool_]:
+        return np.asarray((self["CW Angle Limit"] == 0) & (self["CCW Angle Limit"] == 0))
+
+    def _follow_turns(self) -> None:
+        """The sensor knows no turns: a shaft that is not held may be in another than it was."""
+        free = ~self._on() | self._wheel()
+        turn_rad = TURN_RAD * np.rint(self.plant.position_rad / TURN_RAD)
+        self._turn_rad = np.where(free, turn_rad, self._turn_rad)
+
+    def _steer(self, seconds: float) -> None:
+        drive, wheel = self.drive, self._wheel()
+        on, speed = self._on(), self["Moving Speed"].astype(int)
+        shaft = self.plant.position_rad
+        self._path.place(~on | wheel, shaft)
+        self._follow_turns()
+        goal = (self["Goal Position"].astype(float) - CENTRE_TICKS) / TICKS_PER_RAD
+        goal += self._turn_rad
+        units = (speed & 1023).astype(np.float64) * (SPEED_UNIT_RAD_S / VELOCITY_UNIT_RAD_S)
+        still = np.where(on & ~wheel, goal, self._path.goal).astype(np.float64)
+        self._path.aim(still, units, np.zeros(len(self)), np.zeros(len(self), bool))
+        self._path.advance(seconds)
+        error = self._path.position - shaft
+        right = error < 0.0
+        margin = np.where(right, self["CW Compliance Margin"], self["CCW Compliance Margin"])
+        slope = np.where(right, self["CW Compliance Slope"], self["CCW Compliance Slope"])
+        inside = np.abs(error) * TICKS_PER_RAD <= margin
+        push = np.where(speed & CLOCKWISE, -1.0, 1.0) * (speed & 1023) / 1023.0
+        gain = np.where(wheel | inside, FAINT, TICKS_PER_RAD / slope)
+        drive.torque_on[:] = on
+        drive.p_gain_per_rad[:] = gain
+        aim = np.where(inside, shaft, self._path.position - np.sign(error) * margin / TICKS_PER_RAD)
+        drive.goal_rad[:] = np.where(wheel, push / FAINT, aim)
+        drive.pwm_limit[:] = np.minimum(self["Torque Limit"], self["Max Torque"]) / 1023.0
+        drive.current_limit_a[:] = np.inf
+        self.jam.hold()
+
+    def _view(self, cell: Cell) -> NDArray[np.unsignedinteger]:
+        block = self.table[:, cell.address : cell.address + cell.size]
+        return block.view(f"<u{cell.size}")[:, 0]
+
+
+def _signed(
+    values: NDArray[np.float64],
+) -> NDArray[np.int_]:
+    """Magnitude up to 1023 and the direction in bit 10."""
+    size = np.clip(np.rint(np.abs(values)), 0, 1023).astype(int)
+    return np.where((values < 0.0) & (size > 0), size | CLOCKWISE, size)

@@ -1,0 +1,91 @@
+"""An exchange of Protocol 1.0 in words, packet by packet, with the registers of an AX-12A.
+
+A status packet looks like an instruction packet. What comes from the servo that was asked last, as
+long as its answer has to be, is taken for the answer; a servo that is told to keep silent and asked
+again at once cannot be told from one that answers.
+"""
+
+from collections.abc import Iterator
+
+from snakewalk.sim.ax12.protocol1 import BROADCAST_ID, Error1, Instruction1, Packet1, Reader1, frame
+from snakewalk.sim.ax12.table import CELLS
+from snakewalk.sim.sniff.decode import Line
+
+GAP_S = 5e-3
+"""After such a silence what has begun will not go on, as servos take it."""
+PATIENCE_S = 0.1
+"""No answer comes later than that."""
+
+
+class Decoder1:
+    """Bytes of a bus in, lines out."""
+
+    def __init__(self) -> None:
+        self._reader = Reader1()
+        self._asked: Packet1 | None = None
+        self._asked_s = self._last_s = 0.0
+
+    def feed(self, time_s: float, data: bytes) -> Iterator[Line]:
+        """Lines of the packets that ``data`` completes."""
+        if time_s > self._last_s + GAP_S:
+            self._reader.reset()
+        self._last_s = time_s
+        for packet in self._reader.feed(data):
+            raw = frame(packet.servo_id, packet.instruction, packet.params).hex(" ")
+            if not packet.intact:
+                yield Line(time_s, "noise", -1, "wrong checksum", {}, data.hex(" "))
+            elif self._answers(packet, time_s):
+                yield self._answer(time_s, packet, raw)
+            else:
+                yield self._question(time_s, packet, raw)
+
+    def _answers(self, packet: Packet1, time_s: float) -> bool:
+        asked = self._asked
+        if asked is None or time_s > self._asked_s + PATIENCE_S:
+            return False
+        if asked.servo_id == BROADCAST_ID:
+            pinged = asked.instruction == Instruction1.PING and packet.servo_id != BROADCAST_ID
+            return pinged and not packet.params
+        if asked.servo_id != packet.servo_id:
+            return False
+        read = asked.instruction == Instruction1.READ and len(asked.params) == 2
+        return not packet.params or (read and len(packet.params) == asked.params[1])
+
+    def _question(self, time_s: float, packet: Packet1, raw: str) -> Line:
+        self._asked, self._asked_s = packet, time_s
+        code, params = packet.instruction, packet.params
+        known = code in Instruction1.__members__.values()
+        name = Instruction1(code).name.lower().replace("_", " ") if known else f"0x{code:02X}"
+        values: dict[str, object] = {}
+        if code == Instruction1.READ and len(params) == 2:
+            values = dict.fromkeys(_values(params[0], bytes(params[1])), "?")
+        elif code in (Instruction1.WRITE, Instruction1.REG_WRITE) and len(params) > 1:
+            values = _values(params[0], params[1:])
+        elif code == Instruction1.SYNC_WRITE and len(params) > 1:
+            address, size = params[0], params[1]
+            for at in range(2, len(params) - size, size + 1):
+                part = _values(address, params[at + 1 : at + 1 + size])
+                values |= {f"{params[at]}: {key}": value for key, value in part.items()}
+        return Line(time_s, "question", packet.servo_id, name, values, raw)
+
+    def _answer(self, time_s: float, packet: Packet1, raw: str) -> Line:
+        asked, values = self._asked, {}
+        if asked is not None and asked.servo_id != BROADCAST_ID:
+            self._asked = None
+            if packet.params:
+                values = _values(asked.params[0], packet.params)
+        alarms = [
+            each.name.lower().replace("_", " ") for each in Error1 if packet.instruction & each
+        ]
+        return Line(time_s, "answer", packet.servo_id, ", ".join(alarms) or "ok", values, raw)
+
+
+def _values(address: int, data: bytes) -> dict[str, object]:
+    """Registers that lie in a block."""
+    end = address + len(data)
+    found: dict[str, object] = {
+        name: int.from_bytes(data[cell.address - address :][: cell.size], "little")
+        for name, cell in CELLS.items()
+        if address <= cell.address and cell.address + cell.size <= end
+    }
+    return found or {f"{address}+{len(data)}": data.hex(" ")}

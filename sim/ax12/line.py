@@ -1,0 +1,175 @@
+"""AX-12A servos on the wire: Protocol 1.0."""
+
+from collections.abc import Collection, Sequence
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.sim.ax12.ax12 import Ax12Servos
+from snakewalk.sim.ax12.protocol1 import (
+    BROADCAST_ID,
+    HEADER,
+    Error1,
+    Instruction1,
+    Packet1,
+    Reader1,
+    frame,
+)
+from snakewalk.sim.ax12.table import TABLE_BYTES
+from snakewalk.sim.line.bus_contention import overlay
+from snakewalk.sim.line.clock import SimClock
+from snakewalk.sim.line.instruction_handler import BITS_PER_BYTE, RETURN_DELAY_UNIT_S, Answer
+from snakewalk.sim.line.wire import Wire
+
+BAUD_CLOCK = 2_000_000
+"""Baud Rate(4): 2 000 000 / (value + 1), e-manual."""
+BAUD_TOLERANCE = 0.03
+"""The manual's own: 3 % off is still heard."""
+ANSWERED_FROM: dict[int, int] = {Instruction1.PING: 0, Instruction1.READ: 1}
+"""Least Status Return Level(16) at which an instruction is answered; 2 for all others."""
+_ID_AT = 2
+
+
+class Ax12Line(Wire):
+    """``servos`` behind a serial line of ``baud``."""
+
+    def __init__(
+        self,
+        servos: Ax12Servos,
+        clock: SimClock | None = None,
+        baud: int = 1_000_000,
+        *,
+        usb_latency_s: float = 0.0,
+    ) -> None:
+        super().__init__(
+            clock if clock is not None else SimClock(servos.plant.time_s), usb_latency_s
+        )
+        self.servos = servos
+        self._reader = Reader1()
+        self._muted = np.zeros(len(servos), bool)
+        self.setBaudRate(baud)
+
+    # what a fault file needs
+
+    def ids(self) -> list[int]:
+        """The ID of each row."""
+        return [int(each) for each in self.servos["ID"]]
+
+    def speakers(self, answer: bytes) -> Collection[int]:
+        """Who has written an answer."""
+        return (answer[_ID_AT],)
+
+    def rename(self, row: int, servo_id: int) -> None:
+        """Give a servo another ID."""
+        self.servos["ID"][row] = servo_id
+
+    def mute(self, rows: NDArray[np.intp], on: bool) -> None:
+        """Let servos fall silent, or speak again; they hear and obey."""
+        self._muted[rows] = on
+
+    def look_again(self) -> None:
+        """Nothing is remembered: who is there is asked anew for every packet."""
+
+    def shown(self, register: str) -> NDArray[np.unsignedinteger]:
+        """(S,) values of a register as a read now would show them; a copy."""
+        self.servos.refresh()
+        return self.servos[register].copy()
+
+    # the wire
+
+    def _advance(self, until_s: float) -> None:
+        self.servos.advance(until_s)
+
+    def _forget(self) -> None:
+        self._reader.reset()
+
+    def _retune(self, baud: int) -> None:
+        del baud  # asked anew for every packet
+
+    def _frames(self, data: bytes) -> Sequence[bytes]:
+        frames, at = [], 0
+        while data.startswith(HEADER, at) and at + 4 <= len(data):
+            end = at + 4 + data[at + 3]
+            if end >= len(data):
+                break
+            frames.append(data[at:end])
+            at = end
+        return [*frames, data[at:]]
+
+    def _obey(self, data: bytes, end_s: float) -> list[Answer]:
+        return [
+            answer
+            for piece in self._heard(data, end_s)
+            for packet in self._reader.feed(piece)
+            for answer in self._execute(packet)
+        ]
+
+    def _hearing(self, servo_id: int) -> list[int]:
+        servos, rate = self.servos, self.getBaudRate()
+        return [
+            row
+            for row in range(len(servos))
+            if servos.powered[row]
+            and servo_id in (BROADCAST_ID, servos["ID"][row])
+            and abs(BAUD_CLOCK / (int(servos["Baud Rate"][row]) + 1) / rate - 1.0) <= BAUD_TOLERANCE
+        ]
+
+    def _execute(self, packet: Packet1) -> list[Answer]:
+        code, params = packet.instruction, packet.params
+        if code == Instruction1.SYNC_WRITE:
+            return self._sync_write(packet)
+        voices = []
+        for row in self._hearing(packet.servo_id):
+            own = int(self.servos["ID"][row])
+            delay_s = int(self.servos["Return Delay Time"][row]) * RETURN_DELAY_UNIT_S
+            level = int(self.servos["Status Return Level"][row])
+            error, data = Error1.CHECKSUM.value, b""
+            if packet.intact:
+                error, data = self._one(row, code, params)
+            asked = ANSWERED_FROM.get(code, 2)
+            if packet.servo_id == BROADCAST_ID and code != Instruction1.PING:
+                continue
+            if level >= asked and not self._muted[row]:
+                shown = error | int(self.servos.protection.shown[row])
+                voices.append((own, delay_s, frame(own, shown, data)))
+        voices.sort(key=lambda voice: voice[0])  # to a broadcast ping, IDs answer in turn
+        return [self._say(list(each)) for _, each in groupby(voices, lambda voice: voice[0])]
+
+    def _say(self, voices: list[tuple[int, float, bytes]]) -> Answer:
+        """What is heard of the servos with one ID."""
+        spoken = [(delay_s, data) for _, delay_s, data in voices]
+        delay_s, data, garbled = overlay(spoken, BITS_PER_BYTE / self.getBaudRate())
+        self.collisions += garbled
+        return Answer(delay_s, data)
+
+    def _one(self, row: int, code: int, params: bytes) -> tuple[int, bytes]:
+        """Error bits and parameters of the answer."""
+        servos = self.servos
+        if code == Instruction1.PING and not params:
+            return 0, b""
+        if code == Instruction1.READ and len(params) == 2:
+            address, length = params
+            if not 0 < length <= TABLE_BYTES - address:
+                return Error1.RANGE, b""
+            servos.refresh()
+            return 0, servos.table[row, address : address + length].tobytes()
+        if code == Instruction1.WRITE and len(params) >= 2:
+            return servos.write(row, params[0], params[1:]), b""
+        if code == Instruction1.REG_WRITE and len(params) >= 2:
+            return servos.register_write(row, params[0], params[1:]), b""
+        if code == Instruction1.ACTION and not params:
+            return servos.action(row), b""
+        if code == Instruction1.FACTORY_RESET and not params:
+            servos.reset(row)
+            return 0, b""
+        return Error1.INSTRUCTION, b""
+
+    def _sync_write(self, packet: Packet1) -> list[Answer]:
+        params = packet.params
+        if packet.intact and packet.servo_id == BROADCAST_ID and len(params) >= 2:
+            address, size = params[0], params[1]
+            for at in range(2, len(params) - size, size + 1):
+                for row in self._hearing(params[at]):
+                    self.servos.write(row, address, params[at + 1 : at + 1 + size])
+        return []

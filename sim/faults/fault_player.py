@@ -1,0 +1,139 @@
+"""Plays a fault file on a simulated line: same file, same seed, same run, same bytes."""
+
+import random
+from collections.abc import Callable
+
+import numpy as np
+
+from snakewalk.config import faults as plan
+from snakewalk.config.arrays import Indices
+from snakewalk.config.errors import ConfigError
+from snakewalk.sim.faults.fault_target import FaultTarget
+from snakewalk.sim.line.noise import Noise
+
+_NAMES = ("id", "takes", "behind")
+"""Keys of a fault that name one servo."""
+
+
+class FaultPlayer:
+    """Faults of a plan on ``line``, from its present time on.
+
+    Raises:
+        ConfigError: the plan names an ID that no servo of the line has, or an error that its servos
+            cannot detect.
+
+    """
+
+    def __init__(self, line: FaultTarget, faults: plan.FaultPlan, source: str = "faults") -> None:
+        self._line = line
+        self._servos = line.servos
+        self._start_s = line.clock.now_s()
+        self._rows = {servo: row for row, servo in enumerate(line.ids())}
+        self._check(faults, source)
+        self.noise = Noise(random.Random(faults.seed), self._start_s, line.speakers)
+        self.stalls: list[tuple[float, float]] = []
+        """When the host stands still, and for how long; times of the line's clock."""
+        for fault in faults.fault:
+            if isinstance(fault, plan.Noise):
+                self.noise.add(fault)
+            elif isinstance(fault, plan.Stall):
+                self.stalls.append((self._start_s + fault.at_s, fault.for_s))
+            else:
+                self._plan(fault)
+        self.stalls.sort()
+        line.attach(self)
+
+    def host_wakes_s(self, now_s: float) -> float:
+        """When a host that wants to go on at ``now_s`` does."""
+        while self.stalls and self.stalls[0][0] <= now_s:
+            begin_s, for_s = self.stalls.pop(0)
+            now_s = max(now_s, begin_s + for_s)
+        return now_s
+
+    # planning
+
+    def _check(self, faults: plan.FaultPlan, source: str) -> None:
+        wrong: list[str] = []
+        there = ", ".join(map(str, sorted(self._rows)))
+        for k, fault in enumerate(faults.fault):
+            where = f"{source}: fault.{k}.{fault.kind}"
+            named = list(getattr(fault, "ids", ()))
+            named += [getattr(fault, key) for key in _NAMES if hasattr(fault, key)]
+            wrong += [
+                f"{where}: no servo has ID {each}; the bus has {there}"
+                for each in named
+                if each not in self._rows
+            ]
+            if isinstance(fault, plan.Trip) and fault.kind != "reboot":
+                wrong += self._blind(fault, where)
+        if wrong:
+            raise ConfigError(wrong)
+
+    def _blind(self, fault: plan.Trip, where: str) -> list[str]:
+        """What is wrong with an error that a servo named cannot detect."""
+        known = {
+            each: self._servos.protection.alarms(self._rows[each])
+            for each in fault.ids
+            if each in self._rows
+        }
+        return [
+            f"{where}: servo {each} detects {', '.join(alarms)} only"
+            for each, alarms in known.items()
+            if fault.kind not in alarms
+        ]
+
+    def _plan(self, fault: plan.Fault) -> None:
+        begin, end = self._deeds(fault)
+        self._servos.agenda.plan(self._start_s + fault.at_s, self._known(begin))
+        for_s = getattr(fault, "for_s", None)
+        if end is not None and for_s is not None:
+            self._servos.agenda.plan(self._start_s + fault.at_s + for_s, self._known(end))
+
+    def _known(self, deed: Callable[[], None]) -> Callable[[], None]:
+        """A deed after which the line looks again at who is there."""
+
+        def act() -> None:
+            deed()
+            self._line.look_again()
+
+        return act
+
+    def _deeds(self, fault: plan.Fault) -> tuple[Callable[[], None], Callable[[], None] | None]:
+        """What to do at the beginning and at the end."""
+        line, servos = self._line, self._servos
+        guard = servos.protection
+        rows = np.array([self._rows[each] for each in getattr(fault, "ids", ())], np.intp)
+        if isinstance(fault, plan.Port):
+            return line.vanish, line.come_back
+        if isinstance(fault, plan.Supply):
+            some = rows if len(rows) else None
+            return lambda: guard.supply(fault.volts, some), lambda: guard.supply(None, some)
+        if isinstance(fault, plan.Unplug):
+            behind = np.arange(self._rows[fault.behind] + 1, len(line.ids()))
+            return lambda: servos.cut_power(behind), lambda: servos.give_power(behind)
+        if isinstance(fault, plan.Clash):
+            row = self._rows[fault.id]
+            return lambda: line.rename(row, fault.takes), lambda: line.rename(row, fault.id)
+        if isinstance(fault, plan.Heat):
+            return lambda: guard.heat(rows, fault.celsius), None
+        if isinstance(fault, plan.Trip):
+            return lambda: self._trip(rows, fault.kind), None
+        return self._servo_deeds(fault, rows)
+
+    def _servo_deeds(
+        self, fault: plan.Fault, rows: Indices
+    ) -> tuple[Callable[[], None], Callable[[], None]]:
+        line, servos = self._line, self._servos
+        if fault.kind == "mute":
+            return lambda: line.mute(rows, True), lambda: line.mute(rows, False)
+        if fault.kind == "stuck":
+            return lambda: servos.seize(rows), lambda: servos.release(rows)
+        return lambda: servos.cut_power(rows), lambda: servos.give_power(rows)
+
+    def _trip(self, rows: Indices, kind: str) -> None:
+        if kind == "reboot":
+            for row in rows:
+                self._servos.reboot(int(row))
+        else:
+            guard = self._servos.protection
+            guard.detect(rows, guard.alarms(int(rows[0]))[kind])

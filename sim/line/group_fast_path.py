@@ -1,0 +1,182 @@
+"""The two packets of a control cycle for all servos at once: a slice and one CRC pass.
+
+Same bytes as ``sim.line.instruction_handler`` gives servo by servo (a test holds them together), at
+a cost that hardly grows with the number of servos. What is not plain, such as stuffing, a missing
+ID or a silent servo, goes the general way.
+"""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Bytes
+from snakewalk.drivers.protocol.crc import TABLE, crc16
+from snakewalk.drivers.protocol.packet import HEADER, STATUS, Instruction, fast_head, stuff
+from snakewalk.sim.line.instruction_handler import RETURN_DELAY_UNIT_S, Answer, Service
+from snakewalk.sim.servo.servo_loops import compose, crc_of
+
+MOTION = range(126, 136)
+"""Present Current, Velocity and Position: refreshed alone where nothing else is read."""
+
+
+class GroupRead(ABC):
+    """One kind of group read: a template of its answer, and how to fill in the rest.
+
+    ``status`` is the address of Hardware Error Status, which the alert in the error byte follows.
+    """
+
+    def __init__(
+        self,
+        address: int,
+        length: int,
+        ids: Bytes,
+        rows: NDArray[np.intp],
+        status: int,
+        delays_s: tuple[float, ...],
+    ) -> None:
+        self.address, self.length = address, length
+        self.motion = address in MOTION and address + length <= MOTION.stop
+        self._rows = rows
+        self._block = np.array([address, length, status])
+        self._delays_s = delays_s
+        self._gapless = not any(delays_s[1:])
+        head, frames, error_at, data_at = self._template(ids, length)
+        self._packet = np.frombuffer(head + frames.tobytes(), np.uint8).copy()
+        self._share = frames.shape[1]
+        self._shape = np.array([len(head), self._share, error_at, data_at])
+
+    def answers(self, table: Bytes, whole: bool) -> list[Answer]:
+        """Packets with the table's present bytes."""
+        compose(self._packet, self._shape, table, self._rows, self._block, TABLE)
+        return self._cut(self._packet.tobytes(), whole)
+
+    @abstractmethod
+    def _cut(self, raw: bytes, whole: bool) -> list[Answer]:
+        """Cut the answer into the packets that it is."""
+
+    @abstractmethod
+    def _template(self, ids: Bytes, length: int) -> tuple[bytes, Bytes, int, int]:
+        """Head; shares (N, bytes); where in them the error byte stands, and where the data."""
+
+
+class PlainRead(GroupRead):
+    """Sync read: one status packet a servo."""
+
+    def _template(self, ids: Bytes, length: int) -> tuple[bytes, Bytes, int, int]:
+        head = HEADER + b"\x00" + (length + 4).to_bytes(2, "little") + bytes((STATUS, 0))
+        frames = np.zeros((len(ids), length + 11), np.uint8)
+        frames[:, :9] = np.frombuffer(head, np.uint8)
+        frames[:, 4] = ids
+        return b"", frames, 8, 9
+
+    def _cut(self, raw: bytes, whole: bool) -> list[Answer]:
+        size = self._share
+        frames = [raw[at : at + size] for at in range(0, len(raw), size)]
+        if raw.count(HEADER[:3]) > len(frames):  # some data look like a header
+            frames = [self._stuffed(frame) for frame in frames]
+        elif whole and self._gapless:
+            return [Answer(self._delays_s[0], raw)]
+        return [Answer(*each) for each in zip(self._delays_s, frames, strict=True)]
+
+    @staticmethod
+    def _stuffed(frame: bytes) -> bytes:
+        payload = stuff(frame[8:-2])
+        body = frame[:5] + (len(payload) + 3).to_bytes(2, "little") + bytes((STATUS,)) + payload
+        return body + crc16(body).to_bytes(2, "little")
+
+
+class FastRead(GroupRead):
+    """Fast sync read: one packet that all write; each CRC goes over all before, CRCs included."""
+
+    def _template(self, ids: Bytes, length: int) -> tuple[bytes, Bytes, int, int]:
+        frames = np.zeros((len(ids), length + 4), np.uint8)
+        frames[:, 1] = ids
+        return fast_head(frames.size), frames, 0, 2
+
+    def _cut(self, raw: bytes, whole: bool) -> list[Answer]:
+        return [Answer(self._delays_s[0], raw)]
+
+
+_PREFIX = HEADER + b"\xfe"
+_GOALS = b"\x74\x00\x04\x00"
+"""Address 116 and length 4, as a sync write begins."""
+
+
+class GroupPath:
+    """Vectorised sync write of goal positions and (fast) sync read of any block."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        self._firmware = service.firmware
+        self._bank = service.bank
+        self._status_address = self._bank.register("Hardware Error Status").address
+        self._version = -1
+        self._reads: dict[bytes, GroupRead] = {}
+        self._goals: tuple[bytes, bytes, NDArray[np.intp]] | None = None
+
+    def execute(self, raw: bytes, now_s: float, whole: bool) -> list[Answer] | None:
+        """Carry out ``raw`` if it is plain, else return None and leave all as it was.
+
+        ``whole`` joins packets that follow each other without a gap into one piece.
+        """
+        if self._version != self._service.version:
+            self._version = self._service.version
+            self._reads.clear()
+            self._goals = None
+        read = self._reads.get(raw)
+        if read is None:
+            if raw[:5] != _PREFIX or len(raw) < 15:
+                return None
+            if raw[7] == Instruction.SYNC_WRITE and raw[8:12] == _GOALS:
+                return self._write_goals(raw, now_s)
+            read = self._plan(raw)
+            if read is None:
+                return None
+            self._reads[raw] = read
+        self._firmware.heard(now_s)
+        if read.motion:
+            self._firmware.refresh_motion()
+        else:
+            self._firmware.refresh(read.address, read.length)
+        return read.answers(self._bank.table, whole)
+
+    def _write_goals(self, raw: bytes, now_s: float) -> list[Answer] | None:
+        head, ids = raw[:12], raw[12:-2:5]
+        known = self._goals
+        if known is None or known[0] != head or known[1] != ids:
+            rows = self._service.roll.rows[np.frombuffer(ids, np.uint8)]
+            if (len(raw) - 14) % 5 or (rows < 0).any() or len(np.unique(rows)) != len(rows):
+                return None
+            known = self._goals = (head, ids, rows)
+        if not _intact(raw):
+            return None
+        self._firmware.heard(now_s)
+        self._firmware.write_goals(known[2], np.frombuffer(raw, np.uint8), 12)
+        return []
+
+    def _plan(self, raw: bytes) -> GroupRead | None:
+        if raw[7] not in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ) or not _intact(raw):
+            return None
+        address, length = int.from_bytes(raw[8:10], "little"), int.from_bytes(raw[10:12], "little")
+        ids = np.frombuffer(raw, np.uint8, len(raw) - 14, 12)
+        rows = self._service.roll.rows[ids]
+        if (rows < 0).any() or not self._bank.readable(address, length):
+            return None
+        if (self._bank["Status Return Level"][rows] < 1).any():
+            return None
+        delays_s = tuple(
+            float(d) * RETURN_DELAY_UNIT_S for d in self._bank["Return Delay Time"][rows]
+        )
+        fast = raw[7] == Instruction.FAST_SYNC_READ
+        kind = FastRead if fast else PlainRead
+        return kind(address, length, ids, rows, self._status_address, delays_s)
+
+
+def _intact(raw: bytes) -> bool:
+    return (
+        raw[5] | raw[6] << 8 == len(raw) - 7
+        and raw.find(HEADER[:3], 8, -2) < 0
+        and crc_of(np.frombuffer(raw, np.uint8), 0, len(raw) - 2, 0, TABLE)
+        == raw[-2] | raw[-1] << 8
+    )

@@ -1,0 +1,65 @@
+"""Who on the bus hears which ID, and who of them will answer."""
+
+from collections import defaultdict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.sim.servo.bank import ServoBank
+
+NOBODY, SPECIAL = -1, -2
+"""Entries of ``Roll.rows`` that are no row."""
+_SECONDARY_OFF = 253
+"""Secondary(Shadow) ID(12) from here on means none (e-manual)."""
+
+
+class Roll:
+    """The servos with power at the line's baud rate, by primary and by secondary ID."""
+
+    def __init__(self, bank: ServoBank) -> None:
+        self._bank = bank
+        self.mute = np.zeros(len(bank), bool)
+        """(S,) servos that hear and obey but cannot be heard."""
+        self.rows = np.full(256, NOBODY, np.intp)
+        """(256,) row of each ID in the plain case: one servo, which answers."""
+        self._first: dict[int, list[int]] = {}
+        self._second: dict[int, list[int]] = {}
+
+    def call(self, baud: int, powered: NDArray[np.bool_]) -> None:
+        """Look up who is there after IDs, baud rates or power have changed."""
+        bank = self._bank
+        first, second = defaultdict(list), defaultdict(list)
+        for row in bank.listeners(baud):
+            if not powered[row]:
+                continue
+            own, shared = int(bank["ID"][row]), int(bank["Secondary(Shadow) ID"][row])
+            first[own].append(int(row))
+            if shared < _SECONDARY_OFF and shared != own:
+                second[shared].append(int(row))
+        self._first, self._second = dict(first), dict(second)
+        self.rows[:] = NOBODY
+        for each, rows in first.items():
+            plain = len(rows) == 1 and each not in second and not self.mute[rows[0]]
+            self.rows[each] = rows[0] if plain else SPECIAL
+        for each in second:
+            self.rows[each] = SPECIAL
+
+    def present(self) -> list[int]:
+        """Rows of all servos that hear."""
+        return sorted(row for rows in self._first.values() for row in rows)
+
+    def ids(self) -> list[int]:
+        """Primary IDs that somebody has, ascending."""
+        return sorted(self._first)
+
+    def primary(self, servo_id: int) -> list[int]:
+        """Rows of the servos with this ID; more than one where IDs clash."""
+        return self._first.get(servo_id, [])
+
+    def secondary(self, servo_id: int) -> list[int]:
+        """Rows of the servos that share this secondary ID: they obey, and never answer."""
+        return self._second.get(servo_id, [])
+
+    def speaking(self, servo_id: int) -> list[int]:
+        """Rows that answer to this ID."""
+        return [row for row in self.primary(servo_id) if not self.mute[row]]

@@ -1,0 +1,217 @@
+"""How the servos of a bus answer one instruction packet, any of them, one servo at a time.
+
+The two packets of a control cycle have a vectorised way in ``sim.line.group_fast_path`` with the
+same result.
+"""
+
+from typing import NamedTuple
+
+from snakewalk.drivers.protocol.packet import (
+    BROADCAST_ID,
+    Instruction,
+    InstructionPacket,
+    ResultError,
+    StatusPacket,
+    encode_fast,
+    encode_status,
+)
+from snakewalk.sim.line.bus_contention import overlay
+from snakewalk.sim.line.id_directory import Roll
+from snakewalk.sim.line.instructions import Orders, word
+from snakewalk.sim.servo.firmware import Firmware
+
+LONGEST = 0xFFFF
+"""What the length field of a packet ends at."""
+RETURN_DELAY_UNIT_S = 2e-6
+"""Return Delay Time(9), e-manual."""
+BITS_PER_BYTE = 10
+"""Start bit, eight data bits, stop bit."""
+
+
+class Answer(NamedTuple):
+    """Bytes on the wire after a silence."""
+
+    delay_s: float
+    data: bytes
+
+
+class Service:
+    """Executes instruction packets on a firmware and composes the answers."""
+
+    def __init__(self, firmware: Firmware, baud: int) -> None:
+        self.firmware = firmware
+        self.bank = firmware.bank
+        self.baud = baud
+        self.roll = Roll(self.bank)
+        self.version = 0
+        """Grows whenever registers were written, so that others know what to look up again."""
+        self.collisions = 0
+        """Answers that were garbled because servos spoke at once."""
+        self.retune()
+        self._orders = Orders(firmware)
+
+    def retune(self) -> None:
+        """Look up again who listens at the line's baud rate, under which ID."""
+        self.roll.call(self.baud, self.firmware.powered)
+        self.version += 1
+
+    def delay_s(self, row: int) -> float:
+        """Silence that a servo keeps before it answers."""
+        return int(self.bank["Return Delay Time"][row]) * RETURN_DELAY_UNIT_S
+
+    def execute(self, packet: InstructionPacket, now_s: float) -> list[Answer]:
+        """Carry out a valid packet that ended at ``now_s``; the firmware is already there."""
+        if not self.roll.present():
+            return []
+        self.firmware.heard(now_s)
+        code, params, servo_id = packet.instruction, packet.params, packet.servo_id
+        if code == Instruction.PING:
+            return self._ping(servo_id)
+        if code in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
+            return self._sync_read(params, fast=code == Instruction.FAST_SYNC_READ)
+        if code in (Instruction.BULK_READ, Instruction.FAST_BULK_READ):
+            return self._bulk_read(params, fast=code == Instruction.FAST_BULK_READ)
+        if code == Instruction.SYNC_WRITE:
+            return self._sync_write(params)
+        if code == Instruction.BULK_WRITE:
+            return self._bulk_write(params)
+        if servo_id == BROADCAST_ID:
+            whole = code == Instruction.FACTORY_RESET and params == b"\xff"
+            for row in [] if whole else self.roll.present():  # refused since firmware 42
+                self._one(row, code, params)
+            return []
+        if code == Instruction.READ:
+            return self._read(servo_id, params)
+        voices = []
+        for row in self.roll.primary(servo_id):
+            level, delay_s = int(self.bank["Status Return Level"][row]), self.delay_s(row)
+            error = self._one(row, code, params)
+            if level == 2 and not self.roll.mute[row]:
+                voices.append((delay_s, self._status(row, servo_id, error, b"")))
+        for row in self.roll.secondary(servo_id):
+            self._one(row, code, params, ram_only=True)
+        return self._speak(voices)
+
+    def _speak(self, voices: list[tuple[float, bytes]]) -> list[Answer]:
+        if not voices:
+            return []
+        delay_s, data, garbled = overlay(voices, BITS_PER_BYTE / self.baud)
+        self.collisions += garbled
+        return [Answer(delay_s, data)]
+
+    def _status(self, row: int, servo_id: int, error: int, data: bytes) -> bytes:
+        return encode_status(StatusPacket(servo_id, error | int(self.bank.alert(row)), data))
+
+    def _ping(self, servo_id: int) -> list[Answer]:
+        answers = []
+        for each in self.roll.ids() if servo_id == BROADCAST_ID else (servo_id,):
+            voices = []
+            for row in self.roll.speaking(each):
+                model, firmware = self.bank["Model Number"][row], self.bank["Firmware Version"][row]
+                data = int(model).to_bytes(2, "little") + bytes((int(firmware),))
+                voices.append((self.delay_s(row), self._status(row, each, 0, data)))
+            answers += self._speak(voices)
+        return answers
+
+    def _block(self, row: int, address: int, length: int) -> tuple[int, bytes]:
+        if not self.bank.readable(address, length):
+            return ResultError.ACCESS, b""
+        return 0, self.bank.table[row, address : address + length].tobytes()
+
+    def _read(self, servo_id: int, params: bytes) -> list[Answer]:
+        self.firmware.refresh()
+        voices = []
+        for row in self.roll.speaking(servo_id):
+            if self.bank["Status Return Level"][row] < 1:
+                continue
+            error, data = ResultError.DATA_LENGTH.value, b""
+            if len(params) == 4:
+                error, data = self._block(row, word(params, 0), word(params, 2))
+            voices.append((self.delay_s(row), self._status(row, servo_id, error, data)))
+        return self._speak(voices)
+
+    def _sync_read(self, params: bytes, *, fast: bool) -> list[Answer]:
+        asked = [(each, word(params, 0), word(params, 2)) for each in params[4:]]
+        return self._group_read(asked, fast)
+
+    def _bulk_read(self, params: bytes, *, fast: bool) -> list[Answer]:
+        asked = [
+            (params[at], word(params, at + 1), word(params, at + 3))
+            for at in range(0, len(params) - 4, 5)
+        ]
+        return self._group_read(asked, fast)
+
+    def _group_read(self, asked: list[tuple[int, int, int]], fast: bool) -> list[Answer]:
+        """Servos answer in the order asked; each waits for the one before.
+
+        So after one that is silent, the rest is silent too (ROBOTIS on the SDK's issue tracker).
+        """
+        if fast and sum(length + 4 for _, _, length in asked) + 1 > LONGEST:
+            return []  # no length field could announce the common answer
+        self.firmware.refresh()
+        answers: list[Answer] = []
+        parts: list[tuple[int, int, bytes]] = []
+        first_s, garbled = 0.0, False
+        for servo_id, address, length in asked:
+            rows = [
+                row
+                for row in self.roll.speaking(servo_id)
+                if self.bank["Status Return Level"][row] >= 1
+            ]
+            if not rows:
+                break
+            blocks = [self._block(row, address, length) for row in rows]
+            if fast:
+                first_s = first_s if parts else min(self.delay_s(row) for row in rows)
+                said = [
+                    (error | int(self.bank.alert(row)), servo_id, data.ljust(length, b"\0"))
+                    for row, (error, data) in zip(rows, blocks, strict=True)
+                ]
+                garbled |= any(part != said[0] for part in said)
+                parts.append(said[0])
+            else:
+                answers += self._speak(
+                    [
+                        (self.delay_s(row), self._status(row, servo_id, error, data))
+                        for row, (error, data) in zip(rows, blocks, strict=True)
+                    ]
+                )
+        if parts:
+            whole = sum(length + 4 for _, _, length in asked)
+            data = encode_fast(parts, whole)
+            self.collisions += garbled
+            answers.append(Answer(first_s, data[:-2] + b"\0\0" if garbled else data))
+        return answers
+
+    def _sync_write(self, params: bytes) -> list[Answer]:
+        address, length = word(params, 0), word(params, 2)
+        for at in range(4, len(params) - length, length + 1):
+            self._write(params[at], address, params[at + 1 : at + 1 + length])
+        self._written()
+        return []
+
+    def _bulk_write(self, params: bytes) -> list[Answer]:
+        at = 0
+        while at + 5 <= len(params):
+            length = word(params, at + 3)
+            data = params[at + 5 : at + 5 + length]
+            if len(data) == length:
+                self._write(params[at], word(params, at + 1), data)
+            at += 5 + length
+        self._written()
+        return []
+
+    def _write(self, servo_id: int, address: int, data: bytes) -> None:
+        for row in self.roll.primary(servo_id):
+            self._orders.write(row, address, data)
+        for row in self.roll.secondary(servo_id):
+            self._orders.write(row, address, data, ram_only=True)
+
+    def _one(self, row: int, code: int, params: bytes, *, ram_only: bool = False) -> int:
+        error = self._orders.carry_out(row, code, params, ram_only=ram_only)
+        self._written()
+        return int(error)
+
+    def _written(self) -> None:
+        self.firmware.changed()
+        self.retune()

@@ -1,0 +1,87 @@
+"""Packets that do not arrive as they were sent, by the script of a fault file."""
+
+import random
+from collections.abc import Callable, Collection
+from typing import Protocol
+
+from snakewalk.config import faults as plan
+
+DELAY_S, LATE_S = 1e-3, 0.05
+"""By how much an answer is slow where the file does not say: late is past any time-out."""
+
+
+class Noise:
+    """The noise faults of a plan; ``chance`` draws and wrong bits come from one seeded source.
+
+    ``speakers`` says who has written an answer.
+    """
+
+    def __init__(
+        self, source: random.Random, start_s: float, speakers: Callable[[bytes], Collection[int]]
+    ) -> None:
+        self._random = source
+        self._start_s = start_s
+        self._speakers = speakers
+        self._faults: list[plan.Noise] = []
+        self.counts: dict[str, int] = {}
+        """Packets changed so far, by kind."""
+
+    def add(self, fault: plan.Noise) -> None:
+        """One more fault; those of a file act in its order."""
+        self._faults.append(fault)
+
+    @property
+    def any(self) -> bool:
+        """Whether there is anything to do at all."""
+        return bool(self._faults)
+
+    def answer(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
+        """What arrives of an answer: packets, each with the time by which it is slow."""
+        return self._change(data, now_s, "answers")
+
+    def question(self, data: bytes, now_s: float) -> list[bytes]:
+        """What the servos hear of an instruction packet."""
+        return [heard for _, heard in self._change(data, now_s, "questions")]
+
+    def _change(self, data: bytes, now_s: float, of: str) -> list[tuple[float, bytes]]:
+        packets = [(0.0, data)]
+        for fault in self._faults:
+            if not self._acts(fault, data, now_s, of):
+                continue
+            self.counts[fault.kind] = self.counts.get(fault.kind, 0) + 1
+            packets = [new for packet in packets for new in self._one(fault, *packet)]
+        return packets
+
+    def _acts(self, fault: plan.Noise, data: bytes, now_s: float, of: str) -> bool:
+        since_s = now_s - self._start_s - fault.at_s
+        if fault.of not in (of, "both") or since_s < 0.0:
+            return False
+        if fault.for_s is not None and since_s >= fault.for_s:
+            return False
+        if fault.ids and not set(fault.ids).intersection(self._speakers(data)):
+            return False
+        return fault.chance >= 1.0 or self._random.random() < fault.chance
+
+    def _one(self, fault: plan.Noise, slow_s: float, data: bytes) -> list[tuple[float, bytes]]:
+        if fault.kind == "drop" or not data:
+            return []
+        if fault.kind == "corrupt":
+            at, bit = self._random.randrange(len(data)), self._random.randrange(8)
+            data = data[:at] + bytes((data[at] ^ 1 << bit,)) + data[at + 1 :]
+        if fault.kind == "truncate":
+            data = data[: self._random.randrange(1, max(2, len(data)))]
+        if fault.kind == "duplicate":
+            return [(slow_s, data), (slow_s, data)]
+        if fault.kind in ("delay", "late"):
+            slow_s += fault.by_s or (DELAY_S if fault.kind == "delay" else LATE_S)
+        return [(slow_s, data)]
+
+
+class Script(Protocol):
+    """What a fault file does to packets and to the host."""
+
+    noise: Noise
+
+    def host_wakes_s(self, now_s: float) -> float:
+        """When a host that wants to go on at ``now_s`` does."""
+        ...

@@ -1,0 +1,146 @@
+"""Servos of Protocol 2.0 on the wire: ``sim.line.wire`` with a bank of servos behind it."""
+
+from collections.abc import Callable, Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.drivers.protocol.packet import BROADCAST_ID, HEADER, Instruction, InstructionPacket
+from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.sim.line.clock import SimClock
+from snakewalk.sim.line.group_fast_path import GroupPath
+from snakewalk.sim.line.id_directory import Roll
+from snakewalk.sim.line.instruction_handler import Answer, Service
+from snakewalk.sim.line.wire import Wire
+from snakewalk.sim.plant import Plant
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.firmware import Firmware
+from snakewalk.sim.servo.protection import Surroundings
+
+Tamper = Callable[[bytes], Sequence[bytes]]
+"""What becomes of one answer on the wire: itself, nothing, or other packets, in order."""
+_ID_AT, _CODE_AT = 4, 7
+
+
+class SimLine(Wire):
+    """Servos of ``bank`` on the shafts of ``plant`` behind a serial line of ``baud``.
+
+    Reading and writing a closed port raise ``PortError``.
+    """
+
+    def __init__(
+        self,
+        bank: ServoBank,
+        plant: Plant,
+        clock: SimClock | None = None,
+        baud: int = 1_000_000,
+        *,
+        surroundings: Surroundings | None = None,
+        tamper: Tamper | None = None,
+        usb_latency_s: float = 0.0,
+    ) -> None:
+        super().__init__(clock if clock is not None else SimClock(plant.time_s), usb_latency_s)
+        self.firmware = self._firmware(bank, plant, surroundings)
+        self.bank = bank
+        self.tamper = tamper
+        self._service = Service(self.firmware, baud)
+        self._group = GroupPath(self._service)
+        self._reader = PacketReader()
+        self._asked = b""
+        self.setBaudRate(baud)
+
+    @property
+    def roll(self) -> Roll:
+        """Who hears which ID."""
+        return self._service.roll
+
+    # what a fault file needs
+
+    @property
+    def servos(self) -> Firmware:
+        """Those on the line, by row."""
+        return self.firmware
+
+    def ids(self) -> list[int]:
+        """The ID of each row."""
+        return [int(each) for each in self.bank["ID"]]
+
+    def speakers(self, answer: bytes) -> Collection[int]:
+        """Who has written an answer: one servo, or all that a fast read has asked."""
+        if answer[_ID_AT] != BROADCAST_ID:
+            return (answer[_ID_AT],)
+        fast_bulk = self._asked[_CODE_AT] == Instruction.FAST_BULK_READ
+        return self._asked[8:-2:5] if fast_bulk else self._asked[12:-2]
+
+    def rename(self, row: int, servo_id: int) -> None:
+        """Give a servo another ID."""
+        self.bank["ID"][row] = servo_id
+
+    def mute(self, rows: NDArray[np.intp], on: bool) -> None:
+        """Let servos fall silent, or speak again; they hear and obey."""
+        self.roll.mute[rows] = on
+
+    def look_again(self) -> None:
+        """Take note that IDs, power or voices have changed by other means than a packet."""
+        self._service.retune()
+
+    def shown(self, register: str) -> NDArray[np.signedinteger]:
+        """(S,) values of a register as a read now would show them; a copy."""
+        self.firmware.refresh()
+        return self.bank[register].copy()
+
+    # the wire
+
+    def _firmware(
+        self, bank: ServoBank, plant: Plant, surroundings: Surroundings | None
+    ) -> Firmware:
+        return Firmware(bank, plant, surroundings)
+
+    def _advance(self, until_s: float) -> None:
+        self.firmware.advance(until_s)
+
+    def _forget(self) -> None:
+        self._reader.reset()
+
+    def _retune(self, baud: int) -> None:
+        self._service.baud = baud
+        self._service.retune()
+
+    def _obey(self, data: bytes, end_s: float) -> list[Answer]:
+        """Let the servos hear what the host has sent."""
+        self._asked = data
+        if self._script is None:
+            apart = self.tamper is not None or bool(self.taps)
+            quick = self._group.execute(data, end_s, whole=not apart)
+            return self._one_by_one(data, end_s) if quick is None else quick
+        answers: list[Answer] = []
+        for piece in self._heard(data, end_s):
+            quick = self._group.execute(piece, end_s, whole=False)
+            answers += self._one_by_one(piece, end_s) if quick is None else quick
+        return answers
+
+    def _one_by_one(self, data: bytes, end_s: float) -> list[Answer]:
+        return [
+            answer
+            for packet in self._reader.feed(data)
+            if isinstance(packet, InstructionPacket)
+            for answer in self._service.execute(packet, end_s)
+        ]
+
+    def _fate(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:
+        if self.tamper is not None:
+            return [(0.0, packet) for packet in self.tamper(data)]
+        return ((0.0, data),) if self._script is None else super()._fate(data, now_s)
+
+    def _frames(self, data: bytes) -> Sequence[bytes]:
+        if len(data) >= 7 and data[5] | data[6] << 8 == len(data) - 7:
+            return (data,)
+        frames, at = [], 0
+        while data.startswith(HEADER, at) and at + 7 <= len(data):
+            end = at + 7 + int.from_bytes(data[at + 5 : at + 7], "little")
+            if end >= len(data):
+                break
+            frames.append(data[at:end])
+            at = end
+        frames.append(data[at:])
+        return frames

@@ -1,0 +1,285 @@
+"""The wire: a half-duplex bus as a byte port that owns simulated time.
+
+Bytes take ten bit times each; an instruction counts when its last byte has arrived; answers come
+after the servos' return delays. Nothing happens by itself: what was written is carried out when
+the host reads, waits, or writes again, and only reads and time-outs move the clock, as far as
+needed. So a run needs no thread and no sleep, and repeats bit for bit.
+
+The names of the public methods are those of the SDK's ``PortHandler``, on which the SDK is
+duck-typed, widened to ``drivers.port.byte_port.BytePort``.
+"""
+
+# ruff: noqa: N802, D102 - the SDK chose the names; `drivers.port.byte_port` describes them
+
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+
+from snakewalk.drivers.errors import PortError
+from snakewalk.sim.line.clock import SimClock
+from snakewalk.sim.line.instruction_handler import BITS_PER_BYTE, Answer
+from snakewalk.sim.line.noise import Script
+from snakewalk.sim.line.rx_queue import Arrivals
+
+LATENCY_S = 0.016
+"""The SDK's allowance for the adapter's latency timer; a packet may take two of them and 2 ms."""
+GAP_S = 5e-3
+"""After such a silence the servos take what follows for a new packet (ours)."""
+INSTANT_S = 1e-9
+"""Times closer than this are the same."""
+PATIENT_S = 0.01
+"""An answer that is slower than this does not hold up the servos behind it (ours)."""
+Tap = Callable[[float, bool, bytes], None]
+"""A listener on the wire: time of a packet's end, whether the host sent it, its bytes."""
+
+
+class Wire(ABC):
+    """A line of ``baud`` without anybody on it: subclasses say who hears and what they answer.
+
+    Reading and writing a closed port raise ``PortError``.
+    """
+
+    def __init__(self, clock: SimClock, usb_latency_s: float = 0.0) -> None:
+        self.clock = clock
+        self.usb_latency_s = usb_latency_s
+        """By how much the host's adapter hands on bytes later than they are on the wire."""
+        self.taps: list[Tap] = []
+        """Told of every packet on the wire: time of its end, from the host or not, bytes."""
+        self._script: Script | None = None
+        self._gone = False
+        self.is_using = False
+        self.is_open = True
+        self.busy_s = 0.0
+        """Time during which bytes were on the wire."""
+        self.collisions = 0
+        """Packets that the host began while servos were still answering."""
+        self._sent: deque[tuple[float, bytes]] = deque()
+        self._arriving = Arrivals()
+        self._sent_until_s = self._quiet_s = self.clock.now_s()
+        self._deadline_s = self._heard_until_s = self.clock.now_s()
+
+    # who is on it
+
+    @abstractmethod
+    def _advance(self, until_s: float) -> None:
+        """Bring servos and physics to a time."""
+
+    @abstractmethod
+    def _obey(self, data: bytes, end_s: float) -> list[Answer]:
+        """Let the servos hear what the host has sent."""
+
+    @abstractmethod
+    def _forget(self) -> None:
+        """The line was quiet: a packet that has begun will not go on."""
+
+    @abstractmethod
+    def _retune(self, baud: int) -> None:
+        """The host's side has another baud rate."""
+
+    @abstractmethod
+    def _frames(self, data: bytes) -> Sequence[bytes]:
+        """Cut what is sent at once into packets, each of which counts when its own end arrives."""
+
+    # what goes wrong on it
+
+    def attach(self, script: Script) -> None:
+        """Let a fault file act on this line."""
+        self._script = script
+
+    def _heard(self, data: bytes, now_s: float) -> Sequence[bytes]:
+        """What the servos hear of one packet that ends at ``now_s``."""
+        if self._script is None or not self._script.noise.any:
+            return (data,)
+        return self._script.noise.question(data, now_s)
+
+    def _fate(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:
+        """What becomes of one answer that begins at ``now_s``, and by how much it is slow."""
+        if self._script is None or not self._script.noise.any:
+            return ((0.0, data),)
+        return self._script.noise.answer(data, now_s)
+
+    # the byte port
+
+    def openPort(self) -> bool:
+        self.settle()
+        self.is_open = not self._gone
+        return self.is_open
+
+    def closePort(self) -> None:
+        self.is_open = False
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Retune the host's side; servos at another rate no longer hear it."""
+        self._baud = baudrate
+        self._byte_s = self._arriving.byte_s = BITS_PER_BYTE / baudrate
+        self.tx_time_per_byte = self._byte_s * 1e3
+        self._retune(baudrate)
+        return True
+
+    def getBaudRate(self) -> int:
+        return self._baud
+
+    def clearPort(self) -> None:
+        """Drop what has arrived by now; bytes still under way will arrive all the same."""
+        now_s = self.clock.now_s()
+        self._carry_out(now_s)
+        if self._arriving:
+            self._arriving.take(1 << 30, now_s)
+
+    def getBytesAvailable(self) -> int:
+        """Bytes that have arrived by now."""
+        self._carry_out(self.clock.now_s())
+        return self._arriving.count(self.clock.now_s())
+
+    def writePort(self, packet: bytes | list[int]) -> int:
+        """As ``write``; the number of bytes taken."""
+        data = bytes(packet)
+        self.write(data)
+        return len(data)
+
+    def readPort(self, length: int) -> bytes:
+        """Up to ``length`` bytes: waits, in simulated time, for them or the packet time-out."""
+        return self.read_until(length, self._deadline_s)
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """As the SDK: time on the wire, two latency timers, 2 ms."""
+        wait_s = packet_length * self._byte_s + 2.0 * LATENCY_S + 2e-3
+        self.setPacketTimeoutMillis(wait_s * 1e3)
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        """Time-out from now, milliseconds."""
+        self._deadline_s = self.clock.now_s() + msec * 1e-3
+
+    def isPacketTimeout(self) -> bool:
+        """Whether the time-out has passed."""
+        return self.clock.now_s() >= self._deadline_s
+
+    # the same, in seconds
+
+    @property
+    def name(self) -> str:
+        """For messages."""
+        return "simulated line"
+
+    def write(self, data: bytes) -> None:
+        """Put bytes on the wire behind those already there; returns at once."""
+        self._wake_host()
+        start_s = max(self.clock.now_s(), self._sent_until_s)
+        if self._sent:
+            self._carry_out(start_s)
+        clear = self._quiet_s <= start_s + INSTANT_S
+        if not clear:
+            self._collide(start_s)
+        end_s = start_s
+        for frame in self._frames(data):
+            end_s += len(frame) * self._byte_s
+            if clear:
+                self._sent.append((end_s, frame))
+        self.busy_s += end_s - start_s
+        self._sent_until_s = end_s
+
+    def read_until(self, count: int, deadline_s: float) -> bytes:
+        """Up to ``count`` bytes; the clock moves to the last of them, or to ``deadline_s``."""
+        clock, arriving, sent = self.clock, self._arriving, self._sent
+        self._wake_host()
+        limit_s = max(deadline_s, clock.now_s())
+        while count > 0:
+            due_s = arriving.due_s(count) if arriving else None
+            if due_s is not None:
+                clock.sleep_until_s(min(due_s, limit_s))
+                break
+            if not sent or sent[0][0] > limit_s:
+                clock.sleep_until_s(limit_s)
+                break
+            self._carry_out(sent[0][0])
+        self._must_be_open()
+        return arriving.take(count, clock.now_s())
+
+    def drain_until_quiet(self, quiet_s: float) -> int:
+        """Throw bytes away until none has come for ``quiet_s``; the number thrown away."""
+        thrown, seen_s = 0, self.clock.now_s()
+        while True:
+            byte = self.read_until(1, seen_s + quiet_s)
+            if not byte:
+                return thrown
+            seen_s = self.clock.now_s()
+            thrown += 1 + len(self._arriving.take(1 << 30, self.clock.now_s()))
+
+    # the wire
+
+    def vanish(self) -> None:
+        """Take the port away: reading and writing fail until it is back and opened again."""
+        self._gone, self.is_open = True, False
+        self._arriving.clear()
+
+    def come_back(self) -> None:
+        """Give the port back; the host has to open it."""
+        self._gone = False
+
+    @property
+    def gone(self) -> bool:
+        """Whether the port has vanished."""
+        return self._gone
+
+    def _wake_host(self) -> None:
+        """Let a host go on that wants to use the port, when and if it can."""
+        if self._script is not None:
+            self.clock.sleep_until_s(self._script.host_wakes_s(self.clock.now_s()))
+            self._must_be_open()
+        elif not self.is_open:
+            self._must_be_open()
+
+    def _must_be_open(self) -> None:
+        if self._script is not None:
+            self.settle()
+        if self._gone:
+            raise PortError(f"{self.name}: the port has vanished")
+        if not self.is_open:
+            raise PortError(f"{self.name}: the port is closed")
+
+    def settle(self) -> None:
+        """Bring servos and physics to the clock's present time."""
+        now_s = self.clock.now_s()
+        self._carry_out(now_s)
+        self._advance(now_s)
+
+    def next_event_s(self) -> float | None:
+        """When the next packet ends or the next byte arrives; None while nothing is under way."""
+        times = [self._arriving.due_s(1), self._sent[0][0] if self._sent else None]
+        return min((time_s for time_s in times if time_s is not None), default=None)
+
+    def _carry_out(self, until_s: float) -> None:
+        """Deliver the packets whose last byte has arrived by ``until_s``."""
+        while self._sent and self._sent[0][0] <= until_s + INSTANT_S:
+            end_s, data = self._sent.popleft()
+            self._advance(end_s)
+            if end_s - len(data) * self._byte_s > self._heard_until_s + GAP_S:
+                self._forget()
+            self._heard_until_s = end_s
+            for tap in self.taps:
+                tap(end_s, True, data)
+            answers = self._obey(data, end_s)
+            if not answers:
+                continue
+            if self._sent and end_s + answers[0].delay_s < self._sent_until_s:
+                self.collisions += 1  # the host has already begun its next packet
+                self._sent.clear()
+                continue
+            self._answer(end_s, answers)
+
+    def _answer(self, time_s: float, answers: Iterable[Answer]) -> None:
+        for answer in answers:
+            time_s += answer.delay_s
+            for slow_s, data in self._fate(answer.data, time_s):
+                end_s = self._arriving.add(time_s + slow_s + self.usb_latency_s, data)
+                time_s = max(time_s, end_s - self.usb_latency_s - slow_s * (slow_s > PATIENT_S))
+                self.busy_s += len(data) * self._byte_s
+                for tap in self.taps:
+                    tap(end_s - self.usb_latency_s, False, data)
+            self._quiet_s = time_s
+
+    def _collide(self, start_s: float) -> None:
+        """Two talk at once: what the servos had not said by then is lost, and so is the packet."""
+        self.collisions += 1
+        self._arriving.cut(start_s)
+        self._quiet_s = start_s

@@ -1,0 +1,355 @@
+"""The steps of a plant without Python between them: drive, friction and MuJoCo's step, compiled.
+
+``mj_step1`` and ``mj_step2`` are called by address; drive and friction enter between the two as
+generalised forces. ``sim.physics.interpreted`` does the same in numpy and says why so.
+"""
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import carray, njit, types
+from numba.core.cgutils import voidptr_t
+from numba.extending import intrinsic, register_jitable
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats
+from snakewalk.sim.physics.friction import ellipse_force, stop_drag
+from snakewalk.sim.physics.layout import StepLayout
+from snakewalk.sim.physics.mechanics import LEAST_DEPTH_M, Mechanics
+from snakewalk.sim.physics.servo_drive import shaft_torque
+from snakewalk.sim.physics.water import add_water, immersed
+from snakewalk.sim.plant import ServoDrive
+
+register_jitable(ellipse_force)
+
+register_jitable(stop_drag)
+
+register_jitable(shaft_torque)
+
+register_jitable(immersed)
+
+register_jitable(add_water)
+
+
+def _pointer(typing: Any, address: Any) -> Any:
+    """Turn an integer into a pointer."""
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], voidptr_t)
+
+    return types.voidptr(types.int64), build
+
+
+def _call(typing: Any, function: Any, model: Any, data: Any) -> Any:
+    """Call ``void function(void*, void*)`` by its address: the caller stays cacheable."""
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.FunctionType(ir.VoidType(), [voidptr_t, voidptr_t])
+        function = builder.inttoptr(args[0], kind.as_pointer())
+        builder.call(function, [builder.inttoptr(each, voidptr_t) for each in args[1:]])
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64, types.int64), build
+
+
+pointer = intrinsic(_pointer)
+call = intrinsic(_call)
+
+
+def _move(
+    v: Floats,
+    w: Floats,
+    before: Floats,
+    qvel: Floats,
+    chain: tuple[Floats, ...],
+    step_s: float,
+) -> None:
+    """Rate at which each link's centre moved in the last step, and its spin, head to tail."""
+    centre, rotation, _, axis = chain
+    for k in range(3):
+        w[0, k] = 0.0
+        for i in range(3):
+            w[0, k] += rotation[1, 3 * k + i] * qvel[3 + i]
+    for i in range(len(v)):
+        for k in range(3):
+            v[i, k] = (centre[i + 1, k] - before[i, k]) / step_s
+            before[i, k] = centre[i + 1, k]
+            if i > 0:
+                w[i, k] = w[i - 1, k] + axis[i, k] * qvel[5 + i]
+
+
+def _collect(wrench: Floats, qfrc: Floats, chain: tuple[Floats, ...]) -> None:
+    """Add the links' wrenches (force, torque about the world's origin) to ``qfrc``, tail first."""
+    centre, rotation, anchor, axis = chain
+    for i in range(len(wrench) - 1, 0, -1):
+        f, t, a, e = wrench[i, :3], wrench[i, 3:], anchor[i], axis[i]
+        qfrc[5 + i] += (
+            e[0] * (t[0] - a[1] * f[2] + a[2] * f[1])
+            + e[1] * (t[1] - a[2] * f[0] + a[0] * f[2])
+            + e[2] * (t[2] - a[0] * f[1] + a[1] * f[0])
+        )
+        for k in range(6):
+            wrench[i - 1, k] += wrench[i, k]
+    f, t, a = wrench[0, :3], wrench[0, 3:], centre[1]
+    m0 = t[0] - a[1] * f[2] + a[2] * f[1]
+    m1 = t[1] - a[2] * f[0] + a[0] * f[2]
+    m2 = t[2] - a[0] * f[1] + a[1] * f[0]
+    for k in range(3):
+        qfrc[k] += f[k]
+        qfrc[3 + k] += rotation[1, k] * m0 + rotation[1, 3 + k] * m1 + rotation[1, 6 + k] * m2
+
+
+def _add_friction(
+    contacts: tuple[Any, ...],
+    qfrc: Floats,
+    qvel: Floats,
+    chain: tuple[Floats, ...],
+    work: tuple[Floats, ...],
+    geom_body: NDArray[np.int32],
+    law: tuple[float, ...],
+    load: Floats,
+    totals: Floats,
+    water: Floats,
+) -> None:
+    """Ellipse at every contact of now under the load of the last step, collected into ``qfrc``."""
+    reals, integers, count, at = contacts
+    size, at_dist, at_place, at_up, at_geom, _ = at
+    v, w, wrench, depth, before = work
+    mu_along, mu_across, mass_kg, radius_m, step_s = law
+    centre, rotation = chain[0], chain[1]
+    still = stop_drag(centre[1:], mass_kg, radius_m, step_s)
+    depth[:] = 0.0
+    for c in range(count):
+        i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
+        if i < 0:  # an obstacle's: it has MuJoCo's own friction
+            continue
+        depth[i] += max(-reals[size * c + at_dist], LEAST_DEPTH_M)
+    _move(v, w, before, qvel, chain, step_s)
+    wrench[:] = 0.0
+    for c in range(count):
+        i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
+        if i < 0:
+            continue
+        share = max(-reals[size * c + at_dist], LEAST_DEPTH_M) / depth[i]
+        p = reals[size * c + at_place : size * c + at_place + 3]
+        n = reals[size * c + at_up : size * c + at_up + 3]
+        r0, r1, r2 = p[0] - centre[i + 1, 0], p[1] - centre[i + 1, 1], p[2] - centre[i + 1, 2]
+        s0 = v[i, 0] + w[i, 1] * r2 - w[i, 2] * r1
+        s1 = v[i, 1] + w[i, 2] * r0 - w[i, 0] * r2
+        s2 = v[i, 2] + w[i, 0] * r1 - w[i, 1] * r0
+        e0, e1, e2 = rotation[i + 1, 0], rotation[i + 1, 3], rotation[i + 1, 6]
+        lift = e0 * n[0] + e1 * n[1] + e2 * n[2]
+        e0, e1, e2 = e0 - lift * n[0], e1 - lift * n[1], e2 - lift * n[2]
+        norm = max(np.sqrt(e0 * e0 + e1 * e1 + e2 * e2), 1e-9)
+        e0, e1, e2 = e0 / norm, e1 / norm, e2 / norm
+        g0, g1, g2 = n[1] * e2 - n[2] * e1, n[2] * e0 - n[0] * e2, n[0] * e1 - n[1] * e0
+        v_along = s0 * e0 + s1 * e1 + s2 * e2
+        v_across = s0 * g0 + s1 * g1 + s2 * g2
+        f_along, f_across = ellipse_force(
+            share * load[i], v_along, v_across, mu_along, mu_across, still, load[i]
+        )
+        totals[0] -= (f_along * v_along + f_across * v_across) * step_s
+        totals[1] += abs(v_across) * share * step_s / len(v)
+        f0 = f_along * e0 + f_across * g0
+        f1 = f_along * e1 + f_across * g1
+        f2 = f_along * e2 + f_across * g2
+        wrench[i, 0] += f0
+        wrench[i, 1] += f1
+        wrench[i, 2] += f2
+        wrench[i, 3] += p[1] * f2 - p[2] * f1
+        wrench[i, 4] += p[2] * f0 - p[0] * f2
+        wrench[i, 5] += p[0] * f1 - p[1] * f0
+    if water[3] > 0.0:
+        totals[0] += add_water(wrench, centre[1:], rotation[1:], v, w, water, step_s)
+    _collect(wrench, qfrc, chain)
+
+
+def _weigh(
+    load: Floats, contacts: tuple[Any, ...], force_n: Floats, geom_body: NDArray[np.int32]
+) -> None:
+    """Sum the contact forces of each link."""
+    _, integers, count, at = contacts
+    for c in range(count):
+        row = integers[2 * at[0] * c + at[5]]
+        i = geom_body[integers[2 * at[0] * c + at[4] + 1]] - 1
+        if row >= 0 and i >= 0:
+            load[i] += force_n[row]
+
+
+def _steps(
+    steps: int,
+    where: NDArray[np.int64],
+    state: tuple[Floats, Floats, Floats],
+    chain: tuple[Floats, ...],
+    work: tuple[Floats, ...],
+    geom_body: NDArray[np.int32],
+    law: tuple[float, ...],
+    gear_drag: float,
+    drive: tuple[Floats, ...],
+    load: Floats,
+    totals: Floats,
+    water: Floats,
+) -> None:
+    """Advance: ``mj_step1``, drive, friction, ``mj_step2``, so often."""
+    qpos, qvel, qfrc = state
+    on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit, current, torque, pwm = drive
+    joints = len(goal)
+    step1, step2, model, data = where[0], where[1], where[2], where[3]
+    at = (
+        where[7] // 8,
+        where[8] // 8,
+        where[9] // 8,
+        where[10] // 8,
+        where[11] // 4,
+        where[12] // 4,
+    )
+    ncon = carray(pointer(where[4]), (1,), np.int32)
+    contact_list = carray(pointer(where[5]), (1,), np.int64)
+    force_list = carray(pointer(where[6]), (1,), np.int64)
+    for _ in range(steps):
+        call(step1, model, data)
+        qfrc[:] = 0.0
+        for j in range(joints):
+            pwm[j], current[j], torque[j] = shaft_torque(
+                qpos[7 + j],
+                qvel[6 + j],
+                on[j],
+                goal[j],
+                gain[j],
+                pwm_limit[j],
+                supply[j],
+                ohm[j],
+                k_t[j],
+                k_e[j],
+                current_limit[j],
+            )
+            qfrc[6 + j] = torque[j] - gear_drag * qvel[6 + j]
+        count = ncon[0]
+        address = pointer(contact_list[0])
+        contacts = (
+            carray(address, (count * at[0],), np.float64),
+            carray(address, (count * at[0] * 2,), np.int32),
+            count,
+            at,
+        )
+        _add_friction(contacts, qfrc, qvel, chain, work, geom_body, law, load, totals, water)
+        call(step2, model, data)
+        load[:] = 0.0
+        force_n = carray(pointer(force_list[0]), (1 << 30,), np.float64)
+        _weigh(load, contacts, force_n, geom_body)
+
+
+def _run(
+    steps: int,
+    where: NDArray[np.int64],
+    arrays: NDArray[np.int64],
+    sizes: NDArray[np.int64],
+    constants: Floats,
+) -> None:
+    """Advance, with all arrays by their addresses: handing over forty would take 7 us a call."""
+    joints, bodies, geoms = sizes[0], sizes[1], sizes[2]
+    links = joints + 1
+    at = carray(pointer(arrays[0]), (joints + 7,), np.float64)
+    rate = carray(pointer(arrays[1]), (joints + 6,), np.float64)
+    force = carray(pointer(arrays[2]), (joints + 6,), np.float64)
+    chain = (
+        carray(pointer(arrays[3]), (bodies, 3), np.float64),
+        carray(pointer(arrays[4]), (bodies, 9), np.float64),
+        carray(pointer(arrays[5]), (links, 3), np.float64),
+        carray(pointer(arrays[6]), (links, 3), np.float64),
+    )
+    work = (
+        carray(pointer(arrays[7]), (links, 3), np.float64),
+        carray(pointer(arrays[8]), (links, 3), np.float64),
+        carray(pointer(arrays[9]), (links, 6), np.float64),
+        carray(pointer(arrays[10]), (links,), np.float64),
+        carray(pointer(arrays[11]), (links, 3), np.float64),
+    )
+    load = carray(pointer(arrays[12]), (links,), np.float64)
+    totals = carray(pointer(arrays[13]), (2,), np.float64)
+    geom_body = carray(pointer(arrays[14]), (geoms,), np.int32)
+    drive = (
+        carray(pointer(arrays[15]), (joints,), np.float64),
+        carray(pointer(arrays[16]), (joints,), np.float64),
+        carray(pointer(arrays[17]), (joints,), np.float64),
+        carray(pointer(arrays[18]), (joints,), np.float64),
+        carray(pointer(arrays[19]), (joints,), np.float64),
+        carray(pointer(arrays[20]), (joints,), np.float64),
+        carray(pointer(arrays[21]), (joints,), np.float64),
+        carray(pointer(arrays[22]), (joints,), np.float64),
+        carray(pointer(arrays[23]), (joints,), np.float64),
+        carray(pointer(arrays[24]), (joints,), np.float64),
+        carray(pointer(arrays[25]), (joints,), np.float64),
+        carray(pointer(arrays[26]), (joints,), np.float64),
+    )
+    law = (constants[0], constants[1], constants[2], constants[3], constants[4])
+    state = (at, rate, force)
+    _steps(
+        *(steps, where, state, chain, work, geom_body, law, constants[5], drive, load, totals),
+        constants[6:12],
+    )
+
+
+register_jitable(_move)
+
+register_jitable(_collect)
+
+register_jitable(_add_friction)
+
+register_jitable(_weigh)
+
+register_jitable(_steps)
+
+run_steps = njit(cache=True)(_run)
+
+
+class CompiledSteps:
+    """Drive, friction and MuJoCo's step in one compiled loop."""
+
+    def __init__(self, mechanics: Mechanics, layout: StepLayout) -> None:
+        m = self._m = mechanics
+        d = m.data
+        base = d._address
+        self._where = np.array(
+            [
+                layout.step1_address,
+                layout.step2_address,
+                m.model._address,
+                base,
+                base + layout.ncon,
+                base + layout.contact,
+                base + layout.efc_force,
+                layout.contact_size,
+                layout.contact_dist,
+                layout.contact_pos,
+                layout.contact_normal,
+                layout.contact_geom,
+                layout.contact_row,
+            ],
+            dtype=np.int64,
+        )
+        links = m.joint_count + 1
+        self._arrays = (
+            *(d.qpos, d.qvel, d.qfrc_applied),
+            *(d.xipos, d.xmat, d.xanchor, d.xaxis),
+            *(np.zeros((links, 3)), np.zeros((links, 3)), np.zeros((links, 6)), np.zeros(links)),
+            *(m.before_m, m.load_n, m.totals, m.model.geom_bodyid),
+        )
+        self._sizes = np.array([m.joint_count, m.model.nbody, m.model.ngeom], dtype=np.int64)
+        self._constants = np.array(
+            [
+                *(m.mu_along, m.mu_across, m.link_mass_kg, m.radius_m, m.step_s),
+                *(m.gear_drag_n_m_s, *m.water),
+            ]
+        )
+        self._drive: ServoDrive | None = None
+        self._addresses = np.zeros(0, dtype=np.int64)
+
+    def run(self, steps: int, drive: ServoDrive) -> None:
+        """Advance ``steps`` steps."""
+        if drive is not self._drive:
+            self._drive = drive
+            arrays = (*self._arrays, *drive.columns())
+            self._addresses = np.array([each.ctypes.data for each in arrays], dtype=np.int64)
+        run_steps(steps, self._where, self._addresses, self._sizes, self._constants)

@@ -1,0 +1,186 @@
+"""Recorded poses as a film: a chase camera, the ground, the waypoints, the planned path."""
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.sim.rendering.looks import dressed_model, mark_reached
+from snakewalk.sim.rendering.offscreen import Offscreen
+from snakewalk.sim.rendering.shade import add_shade
+
+if TYPE_CHECKING:
+    import av
+
+CALM_S = 1.2
+"""The camera's smoothing, in seconds of film."""
+TURN_CALM_S = 4.0
+
+
+def render_film(
+    robot: RobotConfig,
+    world: WorldConfig,
+    ground: HeightField | None,
+    time_s: ArrayLike,
+    qpos: ArrayLike,
+    path: Path,
+    *,
+    fps: int = 25,
+    speed_up: float = 1.0,
+    size: tuple[int, int] = (960, 540),
+    waypoints_m: Sequence[tuple[float, float]] = (),
+    waypoint_radius_m: float = 0.3,
+    path_m: Floats | None = None,
+    title: str = "",
+    fine: bool = False,
+    on_frame: Callable[[int, int], None] | None = None,
+) -> int:
+    """Write an MP4 (H.264 where PyAV has it) of ``qpos`` (T, 7 + J) at ``time_s`` (T,).
+
+    Args:
+        robot: what was recorded.
+        world: where.
+        ground: its height field, None if flat.
+        time_s: increasing, s.
+        qpos: ``MujocoPlant.qpos`` at these times.
+        path: of the film; its folder exists.
+        fps: frames a second of film.
+        speed_up: seconds of run a second of film.
+        size: even width and height, pixels.
+        waypoints_m: drawn as rings that turn green when the body's centre is inside, in order.
+        waypoint_radius_m: of these rings.
+        path_m: (P, 2) planned path, drawn as dots.
+        title: shown in the caption.
+        fine: smooth edges, at three times the cost.
+        on_frame: told (frames done, of) after each.
+
+    Returns:
+        Number of frames.
+
+    Raises:
+        InputError: fewer than two poses, odd size, or PyAV missing.
+        OffscreenError: nothing here draws without a screen.
+
+    """
+    times, poses = np.asarray(time_s, float), np.asarray(qpos, float)
+    faults = []
+    if poses.ndim != 2 or len(poses) < 2 or times.shape != poses.shape[:1]:
+        faults.append(f"film: needs two poses or more, each with its time; has {len(times)}")
+    if size[0] % 2 or size[1] % 2:
+        faults.append(f"film: width and height must be even, not {size[0]} x {size[1]}")
+    if faults:
+        raise InputError(faults)
+    shots = poses_at(times, poses, np.arange(times[0], times[-1], speed_up / fps))
+    model = dressed_model(robot, world, ground, waypoints_m, waypoint_radius_m, path_m, fine=fine)
+    data = mujoco.MjData(model)
+    camera = _camera(model, data, shots, fps, robot.length_m)
+    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + robot.joint_count + 11)
+    scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
+    scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+    view, option = mujoco.MjvCamera(), mujoco.MjvOption()
+    reached = 0
+    with Offscreen(model, *size) as screen, _Film(path, fps, size) as film:
+        for k, shot in enumerate(shots):
+            data.qpos[:] = shot
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_camlight(model, data)
+            centre_m = data.xipos[1:, :2].mean(axis=0)
+            reached = _colour(model, centre_m, waypoints_m, waypoint_radius_m, reached)
+            view.lookat[:], view.azimuth = camera[k, :3], camera[k, 3]
+            view.distance, view.elevation = camera[k, 4], -33.0
+            mujoco.mjv_updateScene(
+                model, data, option, None, view, mujoco.mjtCatBit.mjCAT_ALL, scene
+            )
+            add_shade(scene, np.array(data.xipos[1:]), np.array(data.xmat[1:, ::3]), robot, ground)
+            now = times[0] + k * speed_up / fps
+            film.add(screen.draw(scene, f"{title}  {now:6.1f} s   {speed_up:g}x".strip()))
+            if on_frame is not None:
+                on_frame(k + 1, len(shots))
+    return len(shots)
+
+
+def poses_at(time_s: Floats, qpos: Floats, at_s: Floats) -> Floats:
+    """Poses (F, 7 + J) at ``at_s``, linear between the recorded ones; quaternions stay unit."""
+    q = qpos.copy()
+    flips = np.where((q[1:, 3:7] * q[:-1, 3:7]).sum(axis=1) < 0.0, -1.0, 1.0)
+    q[1:, 3:7] *= flips.cumprod()[:, None]
+    out = np.column_stack([np.interp(at_s, time_s, column) for column in q.T])
+    out[:, 3:7] /= np.linalg.norm(out[:, 3:7], axis=1, keepdims=True)
+    return out
+
+
+def _camera(
+    model: mujoco.MjModel, data: mujoco.MjData, shots: Floats, fps: int, length_m: float
+) -> Floats:
+    """Look-at point, azimuth in degrees, and distance of each frame (F, 5), smoothed both ways."""
+    centre, body = np.empty((len(shots), 3)), np.empty((len(shots), 2))
+    for k, shot in enumerate(shots):
+        data.qpos[:] = shot
+        mujoco.mj_kinematics(model, data)
+        links = data.xipos[1:]
+        centre[k] = (links.min(axis=0) + links.max(axis=0)) / 2
+        body[k] = links[0, :2] - links[-1, :2]
+    calm = gaussian_filter1d(centre, CALM_S * fps, axis=0, mode="nearest")
+    heading = gaussian_filter1d(body, TURN_CALM_S * fps, axis=0, mode="nearest")
+    azimuth = np.degrees(np.unwrap(np.arctan2(heading[:, 1], heading[:, 0]))) + 28.0
+    stray = np.abs(centre - calm).max()
+    distance = np.full(len(shots), 1.55 * length_m + stray)
+    return np.column_stack([calm, azimuth, distance])
+
+
+def _colour(
+    model: mujoco.MjModel,
+    centre_m: Floats,
+    waypoints_m: Sequence[tuple[float, float]],
+    radius_m: float,
+    reached: int,
+) -> int:
+    """Turn the next waypoint green if the body's centre is there; returns how many are."""
+    if reached < len(waypoints_m):
+        x, y = waypoints_m[reached]
+        if np.hypot(centre_m[0] - x, centre_m[1] - y) <= radius_m:
+            mark_reached(model, reached)
+            return reached + 1
+    return reached
+
+
+class _Film:
+    """An MP4 file that takes frames."""
+
+    def __init__(self, path: Path, fps: int, size: tuple[int, int]) -> None:
+        try:
+            import av  # noqa: PLC0415  an extra
+        except ImportError:
+            raise InputError("films need PyAV: pip install 'snakewalk[view]'") from None
+        self._frame = av.VideoFrame.from_ndarray
+        self._file = av.open(str(path), "w")
+        codec = "libx264" if "libx264" in av.codecs_available else "mpeg4"
+        self._stream = cast("av.VideoStream", self._file.add_stream(codec, rate=Fraction(fps)))
+        self._stream.width, self._stream.height = size
+        self._stream.pix_fmt = "yuv420p"
+        self._stream.options = (
+            {"crf": "23", "preset": "veryfast"} if codec == "libx264" else {"qscale": "4"}
+        )
+
+    def add(self, pixels: NDArray[np.uint8]) -> None:
+        """Append one frame (height, width, 3)."""
+        frame = self._frame(np.ascontiguousarray(pixels), format="rgb24")
+        self._file.mux(self._stream.encode(frame))
+
+    def __enter__(self) -> "_Film":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.mux(self._stream.encode())
+        self._file.close()

@@ -1,0 +1,244 @@
+"""How the body and its ground look in a film; nothing here takes part in the physics."""
+
+import itertools
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WaterGround, WorldConfig
+from snakewalk.sim.physics.body import finish, mjcf
+from snakewalk.sim.rendering.shade import SUN_DIRECTION
+
+Rgba = tuple[float, float, float, float]
+BACK: tuple[Rgba, Rgba] = ((0.80, 0.56, 0.20, 1), (0.36, 0.22, 0.11, 1))
+HEAD: Rgba = (0.25, 0.15, 0.08, 1)
+EYE: Rgba = (0.95, 0.80, 0.25, 1)
+PUPIL: Rgba = (0.02, 0.02, 0.02, 1)
+TONGUE: Rgba = (0.75, 0.10, 0.15, 1)
+AHEAD: Rgba = (0.93, 0.33, 0.12, 1)
+REACHED: Rgba = (0.10, 0.62, 0.38, 1)
+WAY: Rgba = (0.98, 0.98, 0.95, 1)
+RING_PARTS = 32
+LOWLAND, HIGHLAND = np.array([96.0, 112, 70]), np.array([214.0, 192, 152])
+SHALLOW = [0.30, 0.56, 0.66], [0.26, 0.51, 0.62]
+SURFACE: Rgba = (0.55, 0.80, 0.92, 0.13)
+CONTOURS = 12
+TEXELS = 1024
+_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
+_ELLIPSOID = mujoco.mjtGeom.mjGEOM_ELLIPSOID
+_SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
+_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
+
+
+def dressed_model(
+    robot: RobotConfig,
+    world: WorldConfig,
+    ground: HeightField | None,
+    waypoints_m: Sequence[tuple[float, float]] = (),
+    waypoint_radius_m: float = 0.3,
+    path_m: Floats | None = None,
+    *,
+    fine: bool = False,
+) -> mujoco.MjModel:
+    """Build the model with skin, floor, sky, waypoints (poles and rings) and path (P, 2).
+
+    ``fine`` smooths edges: three times the work of a software renderer.
+    """
+    spec = mujoco.MjSpec.from_string(mjcf(robot, world, ground, 0.002))
+    for geom in spec.geoms:
+        geom.group = 4 if geom.name.startswith("belly") else 0  # bellies are not drawn
+    _light(spec, robot, fine)
+    _floor(spec, ground)
+    _skin(spec, robot)
+    _water(spec, world)
+    for k, (x, y) in enumerate(waypoints_m):
+        z = 0.0 if ground is None else float(ground.elevation_m(x, y))
+        _add(
+            spec.worldbody, _CYLINDER, (0.008, 0.15, 0), (x, y, z + 0.15), AHEAD
+        ).name = f"waypoint{k}"
+        ring = _ring(ground, x, y, waypoint_radius_m)
+        for part, (one, other) in enumerate(itertools.pairwise(ring)):
+            _add(
+                spec.worldbody, _CAPSULE, (0.007, 0, 0), (), AHEAD, (*one, *other)
+            ).name = f"waypoint{k}ring{part}"
+    for x, y in _dots(path_m):
+        z = 0.0 if ground is None else float(ground.elevation_m(x, y))
+        _add(spec.worldbody, _SPHERE, (0.012, 0, 0), (float(x), float(y), z + 0.004), WAY)
+    model = finish(spec.compile(), ground)
+    if ground is not None:
+        _paint(model, ground)
+    return model
+
+
+def mark_reached(model: mujoco.MjModel, waypoint: int) -> None:
+    """Turn a waypoint green."""
+    for name in (f"waypoint{waypoint}", *(f"waypoint{waypoint}ring{n}" for n in range(RING_PARTS))):
+        model.geom(name).rgba = REACHED
+
+
+def _ring(ground: HeightField | None, x: float, y: float, radius_m: float) -> Floats:
+    """Corners (RING_PARTS + 1, 3) of a circle that lies on the ground."""
+    turn = np.linspace(0.0, 2.0 * np.pi, RING_PARTS + 1)
+    east, north = x + radius_m * np.cos(turn), y + radius_m * np.sin(turn)
+    z = np.zeros_like(turn) if ground is None else ground.elevation_m(east, north)
+    return np.stack([east, north, z + 0.004], axis=1)
+
+
+def _add(
+    body: mujoco.MjsBody,
+    kind: mujoco.mjtGeom,
+    size: Sequence[float],
+    pos: Sequence[float],
+    rgba: Rgba,
+    ends: Sequence[float] | None = None,
+) -> mujoco.MjsGeom:
+    place = {"pos": pos} if ends is None else {"fromto": ends}
+    return body.add_geom(
+        type=kind, size=size, rgba=rgba, contype=0, conaffinity=0, mass=0, group=1, **place
+    )
+
+
+def _light(spec: mujoco.MjSpec, robot: RobotConfig, fine: bool) -> None:
+    spec.visual.quality.offsamples = 4 if fine else 0
+    spec.visual.quality.numslices, spec.visual.quality.numstacks = (28, 16) if fine else (20, 10)
+    spec.visual.headlight.ambient = [0.32, 0.32, 0.34]
+    spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
+    spec.visual.headlight.specular = [0.0, 0.0, 0.0]
+    spec.visual.map.znear = 0.02
+    spec.stat.extent = robot.length_m
+    spec.worldbody.add_light(
+        name="sun",
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=list(-3.0 * SUN_DIRECTION),
+        dir=list(SUN_DIRECTION),
+        diffuse=[0.75, 0.73, 0.68],
+        specular=[0.25, 0.25, 0.25],
+        castshadow=False,
+    )
+
+
+def _floor(spec: mujoco.MjSpec, ground: HeightField | None) -> None:
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.78, 0.86, 0.93],
+        rgb2=[0.42, 0.58, 0.76],
+        width=256,
+        height=256,
+    )
+    if ground is None:
+        spec.add_texture(
+            name="ground",
+            type=mujoco.mjtTexture.mjTEXTURE_2D,
+            builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+            mark=mujoco.mjtMark.mjMARK_EDGE,
+            rgb1=[0.66, 0.68, 0.70],
+            rgb2=[0.60, 0.62, 0.645],
+            markrgb=[0.72, 0.74, 0.76],
+            width=512,
+            height=512,
+        )
+        repeat = [1.0, 1.0]
+    else:
+        spec.add_texture(
+            name="ground",
+            type=mujoco.mjtTexture.mjTEXTURE_2D,
+            builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+            rgb1=[0.5, 0.5, 0.5],
+            width=TEXELS,
+            height=TEXELS,
+        )
+        repeat = [1.0, 1.0]
+    material = spec.add_material(name="ground", texrepeat=repeat, texuniform=ground is None)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "ground"
+    material.specular, material.shininess, material.reflectance = 0.05, 0.1, 0.0
+    floor = spec.geom("ground")
+    floor.material = "ground"
+    if ground is None:
+        floor.size = [0.0, 0.0, 0.1]
+
+
+def _water(spec: mujoco.MjSpec, world: WorldConfig) -> None:
+    """Tint the floor by the water above it and draw its surface, which is seen through."""
+    if not isinstance(world.ground, WaterGround):
+        return
+    spec.texture("ground").rgb1, spec.texture("ground").rgb2 = SHALLOW
+    surface = 0.5 * world.ground.size_m, 0.5 * world.ground.size_m, 0.001
+    _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_BOX, surface, (0, 0, world.ground.depth_m), SURFACE)
+
+
+def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
+    """Colour by elevation, with contour lines and a little of the slope's shade."""
+    w, h = ground.size_m
+    x = ground.x0_m + (np.arange(TEXELS) + 0.5) / TEXELS * w
+    y = ground.y0_m + (np.arange(TEXELS) + 0.5) / TEXELS * h
+    z = ground.elevation_m(*np.meshgrid(x, y))
+    level = (z - z.min()) / max(float(np.ptp(z)), 1e-9)
+    colour = LOWLAND + (HIGHLAND - LOWLAND) * level[..., None]
+    steps = np.floor(level * CONTOURS)
+    line = (np.diff(steps, axis=0, append=steps[-1:]) != 0) | (
+        np.diff(steps, axis=1, append=steps[:, -1:]) != 0
+    )
+    colour[line] *= 0.72
+    texture = model.tex("ground")
+    size = TEXELS * TEXELS * 3
+    start = int(texture.adr[0])
+    model.tex_data[start : start + size] = colour.astype(np.uint8).ravel()
+
+
+def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
+    """A capsule a link; a broad head with eyes and a forked tongue."""
+    r, length = robot.body_radius_m, robot.link_length_m
+    links = robot.joint_count + 1
+    thickness = _thickness_m(robot)
+    for i in range(1, links):
+        body = spec.body(f"link{i}")
+        thick = thickness[i]
+        low = thick - r  # the belly stays on the ground
+        ends = (0.0, 0.0, low, -length, 0.0, low)
+        _add(body, _CAPSULE, (thick, 0, 0), (), BACK[i % 2], ends)
+    head = spec.body("link0")
+    half = length / 2
+    _add(head, _ELLIPSOID, (half * 1.25, r * 1.02, r * 0.78), (half * 0.2, 0, -0.2 * r), HEAD)
+    neck = (-0.6 * half, 0, -0.2 * r, -half, 0, -0.2 * r)
+    _add(head, _CAPSULE, (r * 0.8, 0, 0), (), HEAD, neck)
+    for side in (-1.0, 1.0):
+        eye = (half * 0.62, side * r * 0.62, r * 0.30)
+        _add(head, _SPHERE, (r * 0.24, 0, 0), eye, EYE)
+        pupil = (half * 0.72, side * r * 0.74, r * 0.36)
+        _add(head, _SPHERE, (r * 0.14, 0, 0), pupil, PUPIL)
+        fork = (half * 1.9, 0, -0.35 * r, half * 2.2, side * r * 0.3, -0.3 * r)
+        _add(head, _CAPSULE, (r * 0.05, 0, 0), (), TONGUE, fork)
+    _add(
+        head,
+        _CAPSULE,
+        (r * 0.06, 0, 0),
+        (),
+        TONGUE,
+        (half * 1.3, 0, -0.35 * r, half * 1.9, 0, -0.35 * r),
+    )
+
+
+def _thickness_m(robot: RobotConfig) -> Floats:
+    """Skin radius (L,) of each link: the robot's profile, or one thinner at neck and tail."""
+    links = robot.joint_count + 1
+    if robot.body_profile is not None:
+        return np.array(robot.radii_m(2 * links + 1))[1::2]  # at the links' middles
+    along = np.arange(links) / (links - 1)
+    thick = 0.80 + 0.20 * np.sin(np.pi * np.minimum(along / 0.55, 1.0) / 2)
+    thick *= 1.0 - 0.55 * np.maximum(0.0, (along - 0.55) / 0.45) ** 1.5
+    return np.asarray(robot.body_radius_m * thick)
+
+
+def _dots(path_m: Floats | None, spacing_m: float = 0.12) -> Floats:
+    """Points of the path at equal arc length (D, 2)."""
+    if path_m is None or len(path_m) < 2:
+        return np.zeros((0, 2))
+    arc = np.concatenate([[0.0], np.linalg.norm(np.diff(path_m[:, :2], axis=0), axis=1).cumsum()])
+    at = np.arange(0.0, arc[-1], max(spacing_m, arc[-1] / 400))
+    return np.column_stack([np.interp(at, arc, path_m[:, k]) for k in range(2)])

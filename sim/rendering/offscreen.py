@@ -1,0 +1,76 @@
+"""Pictures without a screen: OSMesa where it is installed, else EGL."""
+
+import ctypes
+from typing import Any, Self
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.errors import InputError
+
+REMEDY = "apt-get install libosmesa6 (draws on the CPU), or libegl1 with a driver"
+
+
+class OffscreenError(InputError):
+    """No OpenGL here can draw without a screen."""
+
+
+class Offscreen:
+    """A frame buffer of one model; use it as a context manager.
+
+    Raises:
+        OffscreenError: neither OSMesa nor EGL works.
+
+    """
+
+    def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        self._gl = _context(width, height)
+        self._gl.make_current()
+        self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
+        self._view = mujoco.MjrRect(0, 0, width, height)
+        self._pixels = np.zeros((height, width, 3), np.uint8)
+
+    def draw(self, scene: mujoco.MjvScene, caption: str = "") -> NDArray[np.uint8]:
+        """Draw one frame, (height, width, 3), top row first; valid until the next one."""
+        mujoco.mjr_render(self._view, scene, self._mjr)
+        if caption:
+            mujoco.mjr_overlay(
+                mujoco.mjtFont.mjFONT_NORMAL,
+                mujoco.mjtGridPos.mjGRID_TOPLEFT,
+                self._view,
+                caption,
+                "",
+                self._mjr,
+            )
+        mujoco.mjr_readPixels(self._pixels, None, self._view, self._mjr)
+        return self._pixels[::-1]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._mjr.free()
+        self._gl.free()
+
+
+def _context(width: int, height: int) -> Any:
+    """Make an OpenGL context: MuJoCo's own choice by MUJOCO_GL falls at its import, too early."""
+    try:
+        ctypes.CDLL("libOSMesa.so.8")
+        from mujoco.osmesa import GLContext as OsMesa  # noqa: PLC0415  loads OpenGL
+
+        return OsMesa(width, height)
+    except (OSError, ImportError, AttributeError, RuntimeError) as error:
+        osmesa = error
+    try:
+        from mujoco.egl import GLContext as Egl  # noqa: PLC0415  loads OpenGL
+
+        return Egl(width, height)
+    except (OSError, ImportError, AttributeError, RuntimeError) as error:
+        raise OffscreenError(
+            f"films need an OpenGL that draws without a screen: OSMesa: {osmesa}; EGL: {error}. "
+            f"Remedy: {REMEDY}"
+        ) from None

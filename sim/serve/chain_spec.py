@@ -1,0 +1,68 @@
+"""Servos on a command line: ``1-16``, ``1,2,5-8:XL330-M288``, ``1-2:XL430-W250,3:XM540-W270``.
+
+A model holds for the IDs before it, back to the model before; IDs behind the last are of it, too.
+"""
+
+from dataclasses import dataclass
+
+from snakewalk.config.errors import InputError
+
+DEFAULT_MODEL = "XM430-W350"
+_LAST = 252
+_EXAMPLE = "write 1-16, 1,2,5-8:XL330-M288 or 1-2:XL430-W250,3-6:XL330-M288"
+
+
+@dataclass(frozen=True, slots=True)
+class ChainSpec:
+    """Servos along the chain."""
+
+    ids: tuple[int, ...]
+    """In the order of the chain."""
+    models: tuple[str, ...]
+    """Of each."""
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The models there are, in the order of the chain."""
+        return tuple(dict.fromkeys(self.models))
+
+    @property
+    def model(self) -> str:
+        """The model of all, or the models, joined by a comma."""
+        return ", ".join(self.kinds)
+
+
+def parse_chain(text: str) -> ChainSpec:
+    """Read ``IDS[:MODEL]``, several of them joined by commas.
+
+    Raises:
+        InputError: no numbers, a range that runs backwards, an ID out of 0 to 252, or a colon
+            without a model behind it.
+
+    """
+    ids: list[int] = []
+    models: list[str] = []
+    for piece in text.split(","):
+        numbers, colon, model = (part.strip() for part in piece.partition(":"))
+        if colon and not model:
+            raise InputError(f"--servos {text}: {piece.strip()!r} names no model; {_EXAMPLE}")
+        ids += _range(numbers, text)
+        if colon:
+            models += [model.upper().replace("_", "-")] * (len(ids) - len(models))
+    rest = models[-1] if models else DEFAULT_MODEL
+    return ChainSpec(tuple(ids), (*models, *[rest] * (len(ids) - len(models))))
+
+
+def _range(piece: str, text: str) -> range:
+    first, dash, last = piece.partition("-")
+    try:
+        low = int(first)
+        high = int(last) if dash else low
+    except ValueError:
+        raise InputError(f"--servos {text}: {piece!r} is no ID; {_EXAMPLE}") from None
+    if high < low:
+        raise InputError(f"--servos {text}: {piece} runs backwards")
+    wrong = [each for each in (low, high) if not 0 <= each <= _LAST]
+    if wrong:
+        raise InputError(f"--servos {text}: ID {wrong[0]}: a servo has 0 to {_LAST}")
+    return range(low, high + 1)

@@ -1,0 +1,154 @@
+"""The same servos behind a pseudo-terminal, in real time: a serial port for any client.
+
+The clock handed in is real time; ``pace`` times that is mirrored on the line's simulated clock
+whenever the server looks. What a client writes to ``path`` goes onto the line, and answers are
+handed out when their bytes have arrived. Time that the server itself missed (a busy machine, or
+physics slower than real time) is left out rather than caught up, so that a client never finds
+servos that have aged by a second between two bytes. A client that sets a baud rate retunes the line
+to it, so servos at another are silent; one that sets none is taken to have the line's.
+"""
+
+import os
+import select
+import termios
+import tty
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+
+from snakewalk.config.errors import InputError
+from snakewalk.drivers.clock import Clock
+from snakewalk.sim.line.wire import Wire
+from snakewalk.sim.servo.register_rules import BAUDS
+
+IDLE_S = 0.02
+"""How often physics catches up while no client talks."""
+LATE_S = 0.1
+"""Real time that one look may make up for; what is beyond it is left out."""
+CHUNK_BYTES = 4096
+_SPEEDS = {getattr(termios, f"B{baud}"): baud for baud in BAUDS if hasattr(termios, f"B{baud}")}
+_OUTPUT_SPEED = 5
+"""Index of the output speed in the attributes of a terminal."""
+
+
+class PtyServer:
+    """Serves ``line`` at ``path`` from construction until ``close``; use it in a ``with``.
+
+    ``link`` is a symbolic link that always leads to the device, also after it has vanished and come
+    back under another name.
+
+    Raises:
+        InputError: ``link`` is taken by something that is no link, or ``pace`` is not positive.
+
+    """
+
+    def __init__(
+        self, line: Wire, clock: Clock, *, pace: float = 1.0, link: Path | None = None
+    ) -> None:
+        if not pace > 0.0:
+            raise InputError(f"pace {pace:g}: must be above 0; 1 is real time, 0.5 half as fast")
+        self._line = line
+        self._clock = clock
+        self._pace = pace
+        self._link = link
+        self._offset_s = line.clock.now_s() - clock.now_s() * pace
+        self.missed_s = 0.0
+        """Time on the line that was left out because the server came late."""
+        self._master = self._slave = -1
+        self._speed = 0
+        self.overrun_bytes = 0
+        """Bytes lost because the client did not read them."""
+        self.path = ""
+        """The device to open as a serial port; empty while the port has vanished."""
+        self._open()
+
+    def __enter__(self) -> "PtyServer":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Take the device away; safe to call twice."""
+        for end in (self._master, self._slave):
+            if end >= 0:
+                os.close(end)
+        self._master = self._slave = -1
+        self.path = ""
+        if self._link is not None and self._link.is_symlink():
+            self._link.unlink()
+
+    def serve(self, stopped: Callable[[], bool]) -> None:
+        """Serve until ``stopped()``, which is asked at least every ``IDLE_S``."""
+        while not stopped():
+            self.step(IDLE_S)
+
+    def step(self, wait_s: float) -> None:
+        """Wait up to ``wait_s`` (of real time) for a client or an answer; hand on what is due."""
+        line = self._line
+        if not self.path:
+            select.select([], [], [], wait_s)
+            self._catch_up()
+            if not line.gone:
+                line.openPort()
+                self._open()
+            return
+        due_s = line.next_event_s()
+        if due_s is not None:
+            wait_s = min(wait_s, max(0.0, due_s - self._now_s()) / self._pace)
+        ready, _, _ = select.select([self._master], [], [], wait_s)
+        self._catch_up()
+        if line.gone:
+            self.close()
+            return
+        if ready:
+            self._listen()
+            line.write(os.read(self._master, CHUNK_BYTES))
+            line.settle()
+        arrived = line.read_until(CHUNK_BYTES, line.clock.now_s())
+        if arrived:
+            try:
+                os.write(self._master, arrived)
+            except BlockingIOError:  # nobody reads: a UART's buffer would overrun, too
+                self.overrun_bytes += len(arrived)
+
+    def _open(self) -> None:
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)  # no echo; held open so that clients may come and go
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+        self._speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
+        if self._link is None:
+            return
+        if self._link.is_symlink():
+            self._link.unlink()
+        elif self._link.exists():
+            raise InputError(f"{self._link}: is there already, and is no link")
+        self._link.symlink_to(self.path)
+
+    def _listen(self) -> None:
+        """Follow the client's baud rate, once it has set one."""
+        speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
+        if speed != self._speed:
+            self._speed = speed
+            baud = _SPEEDS.get(speed)
+            if baud is not None and baud != self._line.getBaudRate():
+                self._line.setBaudRate(baud)
+
+    def _catch_up(self) -> None:
+        """Bring the line to the present."""
+        line = self._line
+        late_s = self._now_s() - line.clock.now_s() - LATE_S * self._pace
+        if late_s > 0.0:
+            self._offset_s -= late_s
+            self.missed_s += late_s
+        line.clock.sleep_until_s(self._now_s())
+        line.settle()
+
+    def _now_s(self) -> float:
+        return self._clock.now_s() * self._pace + self._offset_s

@@ -1,0 +1,34 @@
+"""A bus of simulated servos for other people's test suites, loaded by pytest by itself.
+
+    def test_my_robot(servo_bus):
+        bus = servo_bus("1-6:XL330-M288")      # or servo_bus() for four XM430-W350
+        my_driver.open(bus.path)               # a real serial device, in real time
+
+``bus.line`` is the same bus as a port object for the DYNAMIXEL SDK in simulated time: no thread, no
+sleep, the same every time. Registers by name: ``bus["Goal Position"]``.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from snakewalk.sim.serve.servo_bus import ServoBus
+
+
+@pytest.fixture
+def servo_bus() -> "Iterator[Callable[..., ServoBus]]":
+    """Make simulated buses: ``servo_bus("1-6:XL330-M288", baud=..., faults=...)``."""
+    # pytest loads this in every suite of the environment: what is heavy waits for its first use
+    from snakewalk.sim.serve.servo_bus import ServoBus  # noqa: PLC0415
+
+    made: list[ServoBus] = []
+
+    def make(servos: str = "1-4", **options: object) -> ServoBus:
+        made.append(ServoBus(servos, **options))  # type: ignore[arg-type]
+        return made[-1]
+
+    yield make
+    for bus in made:
+        bus.close()

@@ -1,0 +1,81 @@
+"""Shafts that something holds: a jammed gear, or a body in the way.
+
+Plants know no jam, so a jammed servo's drive becomes a stiff brake at the place, and what its
+registers show is what the real one would: the output its error asks for, and the stall current.
+"""
+
+import numpy as np
+
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.sim.plant import ServoDrive
+
+STIFF_PER_RAD = 20.0
+"""PWM fraction a radian of the brake: an order above the servos' own gains."""
+STRENGTH = 4.0
+"""Brake over stall torque."""
+
+
+class Jam:
+    """The jammed servos of a bus."""
+
+    def __init__(self, drive: ServoDrive) -> None:
+        self._drive = drive
+        servos = len(drive.torque_on)
+        self._rows = np.zeros(servos, bool)
+        self._at_rad = np.zeros(servos)
+        self._output = np.zeros(servos)
+        self._gain = np.zeros(servos)
+        self._on, self._limit = np.zeros(servos), np.ones(servos)
+        self._limit_a = np.full(servos, np.inf)
+        self.any = False
+        """Whether a servo is jammed."""
+
+    def seize(self, row: int, at_rad: float) -> None:
+        """Hold a shaft where it is; the firmware then takes over its registers again."""
+        self._rows[row], self._at_rad[row], self.any = True, at_rad, True
+
+    def free(self, row: int) -> None:
+        """Let go of a shaft."""
+        self._rows[row] = False
+        self.any = bool(self._rows.any())
+
+    def hold(self, fresh: Bools | None = None) -> None:
+        """Turn the jammed servos' drive, as registers or loops have just set it, into a brake.
+
+        ``fresh`` (S,) are the servos whose goal has just been set; None: all.
+        """
+        if not self.any:
+            return
+        drive, rows = self._drive, self._rows
+        told = rows & (drive.pwm_limit <= 1.0)  # else that is still the brake's
+        self._on = np.where(told, drive.torque_on, self._on)
+        self._limit = np.where(told, drive.pwm_limit, self._limit)
+        self._limit_a = np.where(told, drive.current_limit_a, self._limit_a)
+        regained = rows & (drive.p_gain_per_rad != STIFF_PER_RAD)
+        self._gain = np.where(regained, drive.p_gain_per_rad, self._gain)
+        wanted = self._gain * (drive.goal_rad - self._at_rad)
+        limited = np.clip(wanted, -self._limit, self._limit) * self._on
+        aimed = rows if fresh is None else rows & fresh
+        self._output = np.where(aimed, limited, self._output)
+        drive.torque_on[rows] = 1.0
+        drive.p_gain_per_rad[rows] = STIFF_PER_RAD
+        drive.goal_rad[rows] = self._at_rad[rows]
+        drive.pwm_limit[rows] = STRENGTH
+        drive.current_limit_a[rows] = np.inf
+
+    def pwm(self) -> Floats:
+        """(S,) output as the servos see it, fraction of the supply."""
+        return np.where(self._rows, self._output, self._drive.pwm) if self.any else self._drive.pwm
+
+    def current_a(self) -> Floats:
+        """(S,) current as the servos measure it."""
+        if not self.any:
+            return self._drive.current_a
+        stall = self._output * self._drive.supply_v / self._drive.resistance_ohm
+        stall = np.clip(stall, -self._limit_a, self._limit_a)
+        return np.where(self._rows, stall, self._drive.current_a)
+
+    def limit_a(self) -> Floats:
+        """(S,) limit of the current, as the registers have it."""
+        limit_a = self._drive.current_limit_a
+        return np.where(self._rows, self._limit_a, limit_a) if self.any else limit_a

@@ -1,0 +1,108 @@
+"""Motor constants by servo model, and what the registers make of them.
+
+Torque, current and speed figures are those of the e-manual's specification tables at the voltage
+that ROBOTIS recommends (``sim.servo.models``); everything else is derived from them here. Thermal
+figures are not published: ours are marked, and only shape when a hot servo shuts down, not how it
+moves.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.arrays import AnyInts, Floats
+from snakewalk.sim.plant import ServoDrive
+from snakewalk.sim.servo.models import MODELS, ModelFacts
+
+TICKS_PER_REV = 4096
+TICKS_PER_RAD = TICKS_PER_REV / math.tau
+PWM_FULL = 885.0
+"""Goal PWM(100): 885 is 100 %, e-manual."""
+_RPM = math.tau / 60.0
+_DIVISOR = 128.0
+"""K_P = Position P Gain(84) / 128, e-manual, in PWM units a tick of position error."""
+_DIVISOR_330 = 256.0
+"""The 330 models: the e-manual says 128 here too, but in recordings of a real XL330-M288 (Rhoban,
+bam) the output follows the position error at gain / 256, r > 0.998 at three gains, up to 885."""
+_HEAVY_A = 1.6
+"""Models that stall at less heat up quicker (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotorModel:
+    """What the specification table says of one servo model."""
+
+    nominal_v: float
+    stall_torque_n_m: float
+    stall_current_a: float
+    no_load_rad_s: float
+    current_unit_a: float
+    """Ampere of one unit of Present Current(126)."""
+    p_gain_divisor: float
+    standby_a: float
+    winding_k_per_w: float
+    """Heating of the housing sensor in the long run, kelvin per watt of I^2 R (ours)."""
+    thermal_time_s: float
+    """Time constant of that heating (ours)."""
+
+    @property
+    def resistance_ohm(self) -> float:
+        """All the supply drops over the winding at stall."""
+        return self.nominal_v / self.stall_current_a
+
+    @property
+    def torque_constant_n_m_a(self) -> float:
+        """k_t at the output shaft, gear losses included."""
+        return self.stall_torque_n_m / self.stall_current_a
+
+    @property
+    def back_emf_v_s(self) -> float:
+        """k_e in V s/rad: at no-load speed the back-EMF is the supply."""
+        return self.nominal_v / self.no_load_rad_s
+
+
+def _motor(facts: ModelFacts) -> MotorModel:
+    small = facts.pwm_slope is not None
+    light = small or facts.stall_current_a < _HEAVY_A
+    return MotorModel(
+        facts.nominal_v,
+        facts.stall_torque_n_m,
+        facts.stall_current_a,
+        facts.no_load_rpm * _RPM,
+        facts.current_unit_a,
+        _DIVISOR_330 if small else _DIVISOR,
+        facts.standby_a,
+        12.0 if light else 6.0,
+        150.0 if light else 300.0,
+    )
+
+
+MOTORS: Mapping[str, MotorModel] = {model: _motor(facts) for model, facts in MODELS.items()}
+
+
+def p_gain_per_rad(register: int | AnyInts, motor: MotorModel) -> Floats:
+    """PWM fraction per radian of position error for Position P Gain(84)."""
+    gain = np.asarray(register, dtype=np.float64)
+    return np.asarray(gain / motor.p_gain_divisor * TICKS_PER_RAD / PWM_FULL)
+
+
+def make_drive(motors: list[MotorModel], supply_v: float) -> ServoDrive:
+    """Make a drive of J servos at rest: torque off, goals 0, gains 0; registers set the rest."""
+
+    def column(name: str) -> Floats:
+        return np.array([getattr(motor, name) for motor in motors], dtype=np.float64)
+
+    joints = len(motors)
+    return ServoDrive(
+        torque_on=np.zeros(joints),
+        goal_rad=np.zeros(joints),
+        p_gain_per_rad=np.zeros(joints),
+        pwm_limit=np.ones(joints),
+        supply_v=np.full(joints, supply_v),
+        resistance_ohm=column("resistance_ohm"),
+        torque_constant_n_m_a=column("torque_constant_n_m_a"),
+        back_emf_v_s=column("back_emf_v_s"),
+        current_limit_a=np.full(joints, np.inf),
+    )

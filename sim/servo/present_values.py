@@ -1,0 +1,99 @@
+"""What shafts and time show in the registers: present values, trajectories, flags of motion."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats
+from snakewalk.sim.plant import Plant, ServoDrive
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.control_loops import Loops
+from snakewalk.sim.servo.motor import PWM_FULL, TICKS_PER_RAD, MotorModel
+from snakewalk.sim.servo.motor_output import Effort
+from snakewalk.sim.servo.profile import VELOCITY_UNIT_RAD_S
+from snakewalk.sim.servo.protection import Protection
+from snakewalk.sim.servo.register_rules import CURRENT_MODE, PWM_MODE, VELOCITY_MODE
+from snakewalk.sim.servo.servo_loops import show_motion
+
+IN_POSITION_TICKS, FOLLOWING_TICKS = 20, 100
+"""Deviations behind the flags of Moving Status(123), "predefined" in the e-manual: ours."""
+PRESENT, SUPPLY = range(120, 144), range(144, 147)
+"""Addresses of what time and shafts show, and of voltage and temperature; e-manual."""
+IN_POSITION, PROFILE_ONGOING, FOLLOWING_ERROR = 0x01, 0x02, 0x08
+
+
+class Readout:
+    """The present values of all servos of a bank.
+
+    A ``frame`` (2, S) is how registers count: sign of the shaft, and ticks where it is straight.
+    """
+
+    def __init__(
+        self,
+        bank: ServoBank,
+        plant: Plant,
+        drive: ServoDrive,
+        motor: MotorModel,
+        effort: Effort,
+        loops: Loops,
+        protection: Protection,
+    ) -> None:
+        self._start_s = plant.time_s
+        self._bank, self._plant, self._drive = bank, plant, drive
+        self._effort, self._loops, self._protection = effort, loops, protection
+        # Without a sensor load is "inferred from the internal output": in tenths of a per cent
+        shown = "Present Current" if bank.measures_current else "Present Load"
+        names = (shown, "Present Velocity", "Present Position")
+        self._shown_at = np.array([bank.register(name).address for name in names])
+        ampere, most = motor.current_unit_a, math.inf
+        if not bank.measures_current:
+            ampere, most = motor.stall_current_a / 1e3, 1e3
+        self._shown_units = np.array([ampere, most, VELOCITY_UNIT_RAD_S, TICKS_PER_RAD])
+
+    def motion(self, frame: Floats) -> None:
+        """Present Current (else Load), Velocity and Position(126, 128, 132)."""
+        plant = self._plant
+        show_motion(
+            self._bank.table,
+            self._shown_at,
+            self._effort.current_a(),
+            plant.velocity_rad_s,
+            plant.position_rad,
+            frame,
+            self._shown_units,
+        )
+
+    def path(self, frame: Floats, time_s: float) -> None:
+        """Bring up output, trajectories, flags of motion and clock (120 to 143) at ``time_s``."""
+        bank, loops, (sign, zero) = self._bank, self._loops, frame
+        path = loops.trajectory
+        output = self._effort.pwm(self._plant.velocity_rad_s) * sign
+        bank["Present PWM"][:] = np.rint(output * PWM_FULL)
+        bank["Realtime Tick"][:] = int((time_s - self._start_s) * 1e3) % 32_768
+        goal, present = bank["Goal Position"].astype(float), bank["Present Position"]
+        shown = np.where(loops.position, path.position * sign * TICKS_PER_RAD + zero, goal)
+        bank["Position Trajectory"][:] = np.rint(shown)
+        run = loops.position | loops.velocity
+        bank["Velocity Trajectory"][:] = np.rint(
+            np.where(run, path.velocity * sign / VELOCITY_UNIT_RAD_S, 0.0)
+        )
+        ongoing = loops.position & path.ongoing
+        bank["Moving"][:] = self.turning() | ongoing
+        placed = ~np.isin(bank["Operating Mode"], (CURRENT_MODE, VELOCITY_MODE, PWM_MODE))
+        status = IN_POSITION * (np.abs(goal - present) <= IN_POSITION_TICKS)
+        status |= FOLLOWING_ERROR * (np.abs(shown - present) > FOLLOWING_TICKS)
+        status = np.where(placed, status, 0) | PROFILE_ONGOING * ongoing
+        bank["Moving Status"][:] = status | np.where(loops.position, path.kind, 0)
+
+    def turning(self) -> NDArray[np.bool_]:
+        """(S,) faster than Moving Threshold(24)."""
+        threshold = self._bank["Moving Threshold"] * VELOCITY_UNIT_RAD_S
+        return np.asarray(np.abs(self._plant.velocity_rad_s) > threshold)
+
+    def supply(self) -> None:
+        """Present Input Voltage and Temperature(144, 146)."""
+        bank = self._bank
+        bank["Present Input Voltage"][:] = np.rint(self._drive.supply_v * 10.0)
+        celsius = np.rint(self._protection.temperature_c)
+        bank["Present Temperature"][:] = np.minimum(np.maximum(celsius, 0.0), 255.0)

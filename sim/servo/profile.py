@@ -1,0 +1,80 @@
+"""Profiles: how a servo turns a new goal into a trajectory (e-manual, What is the Profile).
+
+Velocity-based profiles limit speed and acceleration; time-based ones (Drive Mode(10), bit 2) say
+how long the whole move and its acceleration take, and become the former when the goal is set.
+Profile Velocity 0 is a step, Profile Acceleration 0 a rectangle, else a trapezoid or triangle.
+"""
+
+import numpy as np
+
+from snakewalk.config.arrays import Bools, Floats
+
+VELOCITY_UNIT_RAD_S = 0.229 * 2.0 * np.pi / 60.0
+"""Profile Velocity(112), Present Velocity(128): 0.229 rev/min a unit, e-manual."""
+ACCELERATION_UNIT_RAD_S2 = 214.577 * 2.0 * np.pi / 3600.0
+"""Profile Acceleration(108): 214.577 rev/min^2 a unit, e-manual."""
+STEP, RECTANGULAR, TRIANGULAR, TRAPEZOIDAL = 0x00, 0x10, 0x20, 0x30
+"""Moving Status(123), bits 4 and 5."""
+
+
+class Trajectory:
+    """Positions (S,) that run to goals under limits of speed and acceleration (inf: none)."""
+
+    def __init__(self, servos: int) -> None:
+        self.position = np.zeros(servos)
+        self.velocity = np.zeros(servos)
+        self.goal = np.zeros(servos)
+        self.acceleration = np.zeros(servos)
+        """What the last step did, for the feed-forward."""
+        self.kind = np.zeros(servos, np.uint8)
+        """Moving Status bits of the profile in use."""
+        self._speed = np.full(servos, np.inf)
+        self._ramp = np.full(servos, np.inf)
+
+    @property
+    def ongoing(self) -> Bools:
+        """(S,) goal not reached by the trajectory."""
+        return np.asarray((self.position != self.goal) | (self.velocity != 0.0))
+
+    def place(self, which: Bools, position: Floats) -> None:
+        """Start afresh at a place, at rest."""
+        self.position[which] = self.goal[which] = position[which]
+        self.velocity[which] = self.acceleration[which] = 0.0
+
+    def aim(self, goal: Floats, velocity: Floats, ramp: Floats, timed: Bools) -> None:
+        """Take new goals, rad, with the profile registers as they are now."""
+        new = goal != self.goal
+        if not new.any():
+            return
+        way = np.abs(goal - self.position)
+        total_s = velocity * 1e-3
+        ramp_s = np.minimum(ramp * 1e-3, 0.5 * total_s)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            timed_speed = np.where(total_s > 0.0, way / (total_s - ramp_s), np.inf)
+            timed_ramp = np.where(ramp_s > 0.0, timed_speed / ramp_s, np.inf)
+        speed = np.where(velocity > 0.0, velocity * VELOCITY_UNIT_RAD_S, np.inf)
+        slope = np.where(ramp > 0.0, ramp * ACCELERATION_UNIT_RAD_S2, np.inf)
+        self._speed[new] = np.where(timed, timed_speed, speed)[new]
+        self._ramp[new] = np.where(timed, timed_ramp, slope)[new]
+        self.goal[new] = goal[new]
+        step = ~np.isfinite(self._speed)
+        with np.errstate(invalid="ignore", over="ignore"):
+            short = way * self._ramp < self._speed**2
+        kind = np.where(np.isfinite(self._ramp), np.where(short, TRIANGULAR, TRAPEZOIDAL), 0x10)
+        self.kind[new] = np.where(step, STEP, kind)[new]
+
+    def advance(self, seconds: float) -> None:
+        """Move on by one step of the control loop."""
+        way = self.goal - self.position
+        step = ~np.isfinite(self._speed)
+        with np.errstate(invalid="ignore"):
+            brake = self._ramp * seconds
+            root = np.sqrt(1.0 + 8.0 * np.abs(way) / np.maximum(brake * seconds, 1e-300))
+            limit = np.where(np.isfinite(brake), 0.5 * brake * (root - 1.0), np.inf)
+        wanted = np.sign(way) * np.minimum.reduce([self._speed, limit, np.abs(way) / seconds])
+        change = np.clip(wanted - self.velocity, -brake, brake)
+        velocity = np.where(step, 0.0, self.velocity + np.where(np.isnan(change), 0.0, change))
+        arrived = step | (np.abs(way - velocity * seconds) < 1e-9)
+        self.acceleration[:] = np.where(step, 0.0, (velocity - self.velocity) / seconds)
+        self.position[:] = np.where(arrived, self.goal, self.position + velocity * seconds)
+        self.velocity[:] = np.where(arrived, 0.0, velocity)

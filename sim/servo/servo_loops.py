@@ -1,0 +1,224 @@
+"""What every control cycle asks of the servos, as loops over servos and bytes.
+
+Compiled where numba is installed, else run as they stand, to the same bytes. Arguments are arrays
+and plain numbers: numba takes five times longer to look at a tuple than at an array.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import AnyInts, Bytes, Floats, Indices, Ints
+from snakewalk.drivers.compiling import compiled, seen
+
+# as numba writes them; what is only read may be read-only, and a register's column has gaps
+_READ = seen("uint8", layout="C")
+_TABLE = "uint8[:, ::1]"
+_CRC = seen("uint16", layout="C")
+_PLACES = seen("int64", layout="C")
+_SEEN = seen(layout="C")
+_FRAME = seen(dimensions=2, layout="C")
+
+
+@compiled(f"int64({_READ}, int64, int64, int64, {_CRC})")
+def crc_of(data: Bytes, start: int, stop: int, crc: int, crc_table: NDArray[np.uint16]) -> int:
+    """CRC of a part of ``data``, going on from ``crc``; ``crc_table`` (256,) is that of a byte."""
+    for k in range(start, stop):
+        crc = ((crc << 8) & 0xFFFF) ^ int(crc_table[(crc >> 8) ^ int(data[k])])
+    return crc
+
+
+@compiled("void(uint8[::1], int64, int64, int64)")
+def put(data: Bytes, at: int, value: int, size: int) -> None:
+    """Write a signed number, little-endian."""
+    for k in range(size):
+        data[at + k] = (value >> (8 * k)) & 0xFF
+
+
+@compiled(f"void({_TABLE}, {_PLACES}, {_SEEN}, {_SEEN}, {_SEEN}, {_FRAME}, {_SEEN})")
+def show_motion(
+    table: Bytes,
+    places: Ints,
+    current_a: Floats,
+    velocity_rad_s: Floats,
+    position_rad: Floats,
+    frame: Floats,
+    units: Floats,
+) -> None:
+    """Present Current (or Load), Velocity and Position of all servos into their ``table``.
+
+    Args:
+        table: (S, bytes) control tables.
+        places: (3,) addresses of the registers.
+        current_a: (S,)
+        velocity_rad_s: (S,)
+        position_rad: (S,)
+        frame: (2, S) sign of a servo's direction, and ticks at the shaft's zero.
+        units: (4,) ampere, and its greatest reading; rad/s; ticks per rad.
+
+    """
+    at_current, at_velocity, at_position = places[0], places[1], places[2]
+    ampere, limit, rad_s, ticks_per_rad = units[0], units[1], units[2], units[3]
+    for row in range(len(table)):
+        sign, zero = frame[0, row], frame[1, row]
+        shown = np.rint(current_a[row] * (sign / ampere))
+        put(table[row], at_current, int(min(max(shown, -limit), limit)), 2)
+        put(table[row], at_velocity, int(np.rint(velocity_rad_s[row] * (sign / rad_s))), 4)
+        ticks = np.rint(position_rad[row] * (sign * ticks_per_rad) + zero)
+        put(table[row], at_position, int(ticks), 4)
+
+
+@compiled(f"void(uint8[::1], {_PLACES}, {_TABLE}, {_PLACES}, {_PLACES}, {_CRC})")
+def compose(
+    packet: Bytes,
+    shape: Ints,
+    table: Bytes,
+    rows: Indices,
+    block: Ints,
+    crc_table: NDArray[np.uint16],
+) -> None:
+    """Fill the answers of ``rows`` to one group read into the template ``packet``.
+
+    Args:
+        packet: the whole answer; IDs and all that is constant are there already.
+        shape: (4,) bytes before the first servo's share; bytes of a share; where in it the error
+            byte stands, and where the data. A packet with a head is one: its CRCs go on and on.
+        table: (S, bytes) control tables.
+        rows: servos, in the order of their shares.
+        block: (3,) address and length of the data, and address of Hardware Error Status.
+        crc_table: (256,) CRC of a byte.
+
+    """
+    head, share, error_at, data_at = shape[0], shape[1], shape[2], shape[3]
+    address, length, status = block[0], block[1], block[2]
+    crc = crc_of(packet, 0, head, 0, crc_table)
+    for k in range(len(rows)):
+        row, start = rows[k], head + k * share
+        packet[start + error_at] = 0x80 if table[row, status] else 0
+        for j in range(length):
+            packet[start + data_at + j] = table[row, address + j]
+        end = start + share
+        crc = crc_of(packet, start, end - 2, crc if head else 0, crc_table)
+        packet[end - 2] = crc & 0xFF
+        packet[end - 1] = crc >> 8
+        crc = crc_of(packet, end - 2, end, crc, crc_table)
+
+
+@compiled(
+    f"void({_READ}, {_PLACES}, {_TABLE}, int64, int64, {seen('int64', 2, 'C')},"
+    f" {_FRAME}, float64, float64[::1], boolean[::1])"
+)
+def take_goals(
+    raw: Bytes,
+    rows: Indices,
+    table: Bytes,
+    at: int,
+    address: int,
+    limits: Ints,
+    frame: Floats,
+    ticks_per_rad: float,
+    goal_rad: Floats,
+    taken: NDArray[np.bool_],
+) -> None:
+    """Goal Position of a sync write into the tables; values out of limits are refused.
+
+    Args:
+        raw: the packet.
+        rows: servos, in the order of the entries.
+        table: (S, bytes) control tables.
+        at: place of the first entry in ``raw``.
+        address: of the register.
+        limits: (2, S) least and greatest goal, ticks.
+        frame: as in ``show_motion``.
+        ticks_per_rad: its unit.
+        goal_rad: (S,) set to the goals in the shafts' frame, where taken.
+        taken: (S,) set to whether a servo has taken one.
+
+    """
+    taken[:] = False
+    for k in range(len(rows)):
+        row, entry = rows[k], at + 5 * k + 1
+        ticks = 0
+        for j in range(4):
+            ticks |= int(raw[entry + j]) << (8 * j)
+        if ticks >= 1 << 31:
+            ticks -= 1 << 32
+        if limits[0, row] <= ticks <= limits[1, row]:
+            put(table[row], address, ticks, 4)
+            goal_rad[row] = (ticks - frame[1, row]) * (frame[0, row] / ticks_per_rad)
+            taken[row] = True
+
+
+@compiled(f"void(float64[::1], {_SEEN}, float64)")
+def add_loss(heat_j: Floats, current_a: Floats, ohm_s: float) -> None:
+    """Add what the windings turned into heat."""
+    for row in range(len(heat_j)):
+        heat_j[row] += current_a[row] * current_a[row] * ohm_s
+
+
+@compiled(f"void(float64[::1], float64[::1], float64, {_SEEN})")
+def warm_up(temperature_c: Floats, heat_j: Floats, slice_s: float, thermal: Floats) -> None:
+    """Move each sensor towards where its heat would take it in the long run; heat is used up.
+
+    Args:
+        temperature_c: (S,)
+        heat_j: (S,) since the last call.
+        slice_s: time since then.
+        thermal: (3,) of the air, C; kelvin per watt; share of the way made in a slice.
+
+    """
+    for row in range(len(heat_j)):
+        target_c = thermal[0] + thermal[1] * (heat_j[row] / slice_s)
+        temperature_c[row] += (target_c - temperature_c[row]) * thermal[2]
+        heat_j[row] = 0.0
+
+
+@compiled(f"boolean({_SEEN}, {seen('uint8')}, int64, {seen('uint16')}, {seen('uint16')})")
+def out_of_range(
+    temperature_c: Floats,
+    hottest_c: AnyInts,
+    tenths: int,
+    least: AnyInts,
+    most: AnyInts,
+) -> bool:
+    """Whether a sensor is too hot, or the supply outside a servo's limits (tenths of a volt)."""
+    for row in range(len(temperature_c)):
+        if tenths < least[row] or tenths > most[row]:
+            return True
+        if np.rint(temperature_c[row]) > hottest_c[row]:
+            return True
+    return False
+
+
+@compiled(f"float64({_SEEN}, {_SEEN})")
+def drawn(pwm: Floats, current_a: Floats) -> float:
+    """Current that the bridges take from the supply, A."""
+    sum_a = 0.0
+    for row in range(len(pwm)):
+        sum_a += abs(pwm[row] * current_a[row])
+    return sum_a
+
+
+@compiled(f"float64(float64[::1], float64, {_SEEN}, {_SEEN}, {_SEEN}, {_SEEN}, float64)")
+def count_blocked(
+    blocked_s: Floats,
+    slice_s: float,
+    pwm: Floats,
+    pwm_limit: Floats,
+    torque_on: Floats,
+    velocity_rad_s: Floats,
+    slow_rad_s: float,
+) -> float:
+    """Add a slice to the time of each motor that pushes with all it may and does not turn.
+
+    Returns:
+        The longest such time, s.
+
+    """
+    longest_s = 0.0
+    for row in range(len(blocked_s)):
+        full = abs(pwm[row]) >= 0.98 * min(pwm_limit[row], 1.0)
+        along_rad_s = np.sign(pwm[row]) * velocity_rad_s[row]
+        held = full and along_rad_s < slow_rad_s and torque_on[row] > 0.0
+        blocked_s[row] = blocked_s[row] + slice_s if held else 0.0
+        longest_s = max(longest_s, blocked_s[row])
+    return longest_s

@@ -1,0 +1,44 @@
+"""Bus Watchdog(98): a servo that hears nothing for its time stops where it is.
+
+Any instruction packet feeds the watchdogs of all, whoever it is for, while torque is on; one that
+has run out reads -1 until 0 is written. (e-manual, Bus Watchdog.)
+"""
+
+import numpy as np
+
+from snakewalk.config.arrays import Bools
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.register_rules import WATCHDOG_TRIPPED
+
+UNIT_S = 0.02
+ROUNDING_S = 1e-9
+"""Times closer than this are the same."""
+
+
+class Watchdog:
+    """The watchdogs of all servos of a bank, fed until ``time_s``."""
+
+    def __init__(self, bank: ServoBank, time_s: float) -> None:
+        self._bank = bank
+        self.heard_s = time_s
+        """When they were last fed."""
+        self.patience_s = np.inf
+        """How long the most impatient of them waits."""
+        self._watched = np.zeros(len(bank), bool)
+        self.due_s = np.inf
+        """When the first of them runs out."""
+
+    def arm(self, on: Bools) -> None:
+        """Take over the register and which servos (S,) have torque on."""
+        dog = self._bank["Bus Watchdog"]
+        self._watched = (dog > 0) & (dog < WATCHDOG_TRIPPED) & on
+        watched = self._watched
+        self.patience_s = UNIT_S * float(dog[watched].min()) if watched.any() else np.inf
+        self.due_s = self.heard_s + self.patience_s
+
+    def trip(self, time_s: float) -> Bools:
+        """Put those that have run out by ``time_s`` into the error state; which (S,) they are."""
+        dog = self._bank["Bus Watchdog"]
+        late = self._watched & (self.heard_s + UNIT_S * dog <= time_s + ROUNDING_S)
+        dog[late] = WATCHDOG_TRIPPED
+        return late

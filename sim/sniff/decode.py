@@ -1,0 +1,207 @@
+"""An exchange on the bus, packet by packet, in words: who asked what, and who answered.
+
+It learns as it listens: pings tell the models, questions tell what an answer's bytes mean.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+
+from snakewalk.drivers.protocol.control_table import ControlTable, load_control_table, model_numbers
+from snakewalk.drivers.protocol.packet import (
+    ALERT,
+    BROADCAST_ID,
+    Instruction,
+    InstructionPacket,
+    ResultError,
+    StatusPacket,
+    encode_instruction,
+    encode_status,
+)
+from snakewalk.drivers.protocol.parser import PacketReader
+
+Span = tuple[int, int]
+"""Address and length of a block."""
+_GROUP_READS = (
+    *(Instruction.SYNC_READ, Instruction.FAST_SYNC_READ),
+    *(Instruction.BULK_READ, Instruction.FAST_BULK_READ),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One packet, or bytes that are none."""
+
+    time_s: float
+    kind: str
+    """"question", "answer" or "noise"."""
+    servo_id: int
+    """254: all; -1: not known."""
+    name: str
+    """Instruction, or what came of it."""
+    values: Mapping[str, object]
+    """Registers by servo and name, where they are known."""
+    raw: str
+    """Bytes in hexadecimal."""
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON."""
+        return asdict(self)
+
+    def text(self) -> str:
+        """For people."""
+        arrow = {"question": "->", "answer": "<-", "noise": "??"}[self.kind]
+        who = {BROADCAST_ID: "all", -1: "?"}.get(self.servo_id, str(self.servo_id))
+        said = ", ".join(f"{key} {value}" for key, value in self.values.items())
+        return f"{self.time_s:12.6f}  {arrow} {who:>3}  {self.name:<16} {said or self.raw}"
+
+
+class Decoder:
+    """Bytes of a bus in, lines out; ``model`` is taken for servos that no ping has told about.
+
+    ``models`` are those that are known beforehand, by ID.
+    """
+
+    def __init__(self, model: str = "XM430-W350", models: Mapping[int, str] | None = None) -> None:
+        self._usual = load_control_table(model)
+        self._tables: dict[int, ControlTable] = {
+            servo_id: load_control_table(each) for servo_id, each in (models or {}).items()
+        }
+        self._reader = PacketReader()
+        self._asked: dict[int, Span] = {}
+        self._fast: list[tuple[int, Span]] = []
+        self._crc = self._dropped = 0
+        self._last: int = Instruction.PING
+
+    def feed(self, time_s: float, data: bytes) -> Iterator[Line]:
+        """Lines of the packets that ``data`` completes."""
+        packets = self._reader.feed(data)
+        damaged = self._reader.crc_errors - self._crc
+        lost = self._reader.dropped_bytes - self._dropped
+        self._crc, self._dropped = self._reader.crc_errors, self._reader.dropped_bytes
+        if damaged or lost:
+            name = "wrong CRC" if damaged else "no packet"
+            yield Line(time_s, "noise", -1, name, {"bytes": lost}, data.hex(" "))
+        for packet in packets:
+            if isinstance(packet, InstructionPacket):
+                yield self._question(time_s, packet)
+            else:
+                yield self._answer(time_s, packet)
+
+    def _question(self, time_s: float, packet: InstructionPacket) -> Line:
+        code, params, servo_id = packet.instruction, packet.params, packet.servo_id
+        known = code in Instruction.__members__.values()
+        name = Instruction(code).name.lower().replace("_", " ") if known else f"0x{code:02X}"
+        self._last = code
+        self._asked.clear()
+        self._fast.clear()
+        values: dict[str, object] = {}
+        if code == Instruction.READ and len(params) == 4:
+            self._asked[servo_id] = (_word(params, 0), _word(params, 2))
+            values = self._names(servo_id, self._asked[servo_id])
+        elif code in (Instruction.WRITE, Instruction.REG_WRITE) and len(params) > 2:
+            values = self._values(servo_id, _word(params, 0), params[2:])
+        elif code in _GROUP_READS:
+            values = self._group_read(code, params)
+        elif code == Instruction.SYNC_WRITE and len(params) >= 4:
+            address, size = _word(params, 0), _word(params, 2)
+            for at in range(4, len(params) - size, size + 1):
+                part = self._values(params[at], address, params[at + 1 : at + 1 + size])
+                values |= {f"{params[at]}: {key}": value for key, value in part.items()}
+        elif code == Instruction.BULK_WRITE:
+            values = self._bulk_write(params)
+        raw = encode_instruction(packet).hex(" ")
+        return Line(time_s, "question", servo_id, name, values, raw)
+
+    def _group_read(self, code: int, params: bytes) -> dict[str, object]:
+        if code in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
+            span = (_word(params, 0), _word(params, 2))
+            asked = [(each, span) for each in params[4:]]
+        else:
+            asked = [
+                (params[at], (_word(params, at + 1), _word(params, at + 3)))
+                for at in range(0, len(params) - 4, 5)
+            ]
+        self._asked = dict(asked)
+        if code in (Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ):
+            self._fast = asked
+        return {
+            f"{each}": ", ".join(self._names(each, span)) or f"{span[0]}+{span[1]}"
+            for each, span in asked
+        }
+
+    def _bulk_write(self, params: bytes) -> dict[str, object]:
+        values: dict[str, object] = {}
+        at = 0
+        while at + 5 <= len(params):
+            size = _word(params, at + 3)
+            data = params[at + 5 : at + 5 + size]
+            part = self._values(params[at], _word(params, at + 1), data)
+            values |= {f"{params[at]}: {key}": value for key, value in part.items()}
+            at += 5 + size
+        return values
+
+    def _answer(self, time_s: float, packet: StatusPacket) -> Line:
+        raw = encode_status(packet).hex(" ")
+        if packet.servo_id == BROADCAST_ID:
+            return Line(time_s, "answer", BROADCAST_ID, "ok", self._fast_parts(packet), raw)
+        values: dict[str, object] = {}
+        if self._last == Instruction.PING and len(packet.params) == 3:
+            number = _word(packet.params, 0)
+            model = model_numbers().get(number, f"model {number}")
+            if number in model_numbers():
+                self._tables[packet.servo_id] = load_control_table(model)
+            values = {"model": model, "firmware": packet.params[2]}
+        elif packet.servo_id in self._asked and packet.params:
+            values = self._values(packet.servo_id, self._asked[packet.servo_id][0], packet.params)
+        return Line(time_s, "answer", packet.servo_id, _outcome(packet.error), values, raw)
+
+    def _fast_parts(self, packet: StatusPacket) -> dict[str, object]:
+        said = bytes((packet.error,)) + packet.params
+        values: dict[str, object] = {}
+        at = 0
+        for _, (address, size) in self._fast:
+            error, servo_id = said[at], said[at + 1] if at + 1 < len(said) else -1
+            data = said[at + 2 : at + 2 + size]
+            if len(data) < size:
+                break
+            part = self._values(servo_id, address, data)
+            values |= {f"{servo_id}: {key}": value for key, value in part.items()}
+            if error:
+                values[f"{servo_id}: error"] = _outcome(error)
+            at += size + 4
+            if at >= len(said):
+                break
+        return values
+
+    def _names(self, servo_id: int, span: Span) -> dict[str, object]:
+        inside = self._registers(servo_id, *span)
+        return dict.fromkeys(inside, "?")
+
+    def _values(self, servo_id: int, address: int, data: bytes) -> dict[str, object]:
+        table = self._tables.get(servo_id, self._usual)
+        found: dict[str, object] = {}
+        for name in self._registers(servo_id, address, len(data)):
+            register = table[name]
+            found[name] = register.decode(data[register.address - address :])
+        return found or {f"{address}+{len(data)}": data.hex(" ")}
+
+    def _registers(self, servo_id: int, address: int, length: int) -> list[str]:
+        table = self._tables.get(servo_id, self._usual)
+        return [
+            name
+            for name in table
+            if address <= table[name].address
+            and table[name].address + table[name].size <= address + length
+        ]
+
+
+def _outcome(error: int) -> str:
+    code = error & ~ALERT
+    known = code in ResultError.__members__.values()
+    name = ResultError(code).name.lower().replace("_", " ") if known else f"error {code}"
+    name = "ok" if code == 0 else name
+    return f"{name}, alert" if error & ALERT else name
+
+
+def _word(params: bytes, at: int) -> int:
+    return int.from_bytes(params[at : at + 2], "little")

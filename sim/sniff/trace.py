@@ -1,0 +1,54 @@
+"""Recorded exchanges: JSON lines that ``bus serve --record`` writes, hex text, or raw bytes."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TextIO
+
+from snakewalk.config.errors import InputError
+
+
+class TraceWriter:
+    """A ``Tap`` that writes one JSON line a packet: ``t`` in s, ``from``, ``hex``."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out = out
+
+    def __call__(self, time_s: float, from_host: bool, data: bytes) -> None:
+        """Write one packet."""
+        side = "host" if from_host else "servo"
+        self._out.write(
+            json.dumps({"t": round(time_s, 9), "from": side, "hex": data.hex(" ")}) + "\n"
+        )
+
+
+def read_trace(path: Path) -> Iterator[tuple[float, bytes]]:
+    """(time in s, bytes) of a recording; hex text and raw bytes have no times: 0.
+
+    Raises:
+        InputError: the file is missing, or is none of the three, with the line that is wrong.
+
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from None
+    try:
+        text = data.decode("ascii")
+    except UnicodeDecodeError:
+        yield 0.0, data
+        return
+    for number, line in enumerate(text.splitlines(), 1):
+        shown = line.split("#")[0].strip()
+        if not shown:
+            continue
+        try:
+            if shown.startswith("{"):
+                entry = json.loads(shown)
+                yield float(entry["t"]), bytes.fromhex(entry["hex"])
+            else:
+                yield 0.0, bytes.fromhex(shown)
+        except (ValueError, KeyError, TypeError):
+            raise InputError(
+                f"{path}: line {number}: neither hex bytes nor a recorded packet"
+            ) from None

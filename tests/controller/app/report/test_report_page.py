@@ -1,0 +1,123 @@
+"""The page: whole, self-contained, the same each time, and safe against what a log may say."""
+
+import base64
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.report import film_on_page as film_module
+from snakewalk.controller.app.report.build import build_report
+from snakewalk.controller.app.report.figures.path import body_outline_m
+from snakewalk.controller.app.report.figures.style import thin
+from snakewalk.controller.app.report.page import page
+from snakewalk.controller.metrics.summary import summary
+from snakewalk.controller.runlog.record import Event, RunRecord
+
+Make = Callable[..., Path]
+
+
+class Sources(HTMLParser):
+    """Collects what a page loads, and checks that tags are closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sources: list[str] = []
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.sources += [v or "" for k, v in attrs if k in {"src", "href"}]
+        if tag not in {"img", "meta", "br"}:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def parsed(html: str) -> Sources:
+    reader = Sources()
+    reader.feed(html)
+    assert reader.open == []
+    return reader
+
+
+def test_the_page_stands_alone(make: Make, tmp_path: Path) -> None:
+    log = make(tmp_path / "run.mcap", seconds=12.0, ground="hills")
+    first = build_report(log, tmp_path / "a")
+    log.rename(tmp_path / "b.mcap")
+    html = first.read_text(encoding="utf-8")
+    sources = parsed(html).sources
+    assert len(sources) == 7
+    for source in sources:
+        assert source.startswith("data:image/svg+xml;base64,")
+        svg = ElementTree.fromstring(base64.b64decode(source.split(",", 1)[1]))
+        assert svg.tag.endswith("svg")
+    assert "<script" not in html
+    assert "waypoint 1 reached" in html
+    assert (tmp_path / "a" / "summary.json").is_file()
+    again = build_report(tmp_path / "b.mcap", tmp_path / "c")
+    assert again.read_bytes() == first.read_bytes(), "no date, no path, no chance in it"
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.02, 0.1])
+def test_a_run_that_hardly_began_has_a_page(make: Make, tmp_path: Path, seconds: float) -> None:
+    page_path = build_report(make(tmp_path / "run.mcap", seconds=seconds), tmp_path)
+    assert "0 of 4" in page_path.read_text(encoding="utf-8")
+
+
+def test_what_the_log_says_is_text_not_markup(record: RunRecord) -> None:
+    evil = [Event(1.0, "info' onload='x", "<b>", "<script>alert(1)</script>")]
+    html = page(summary(record), [], film="", events=evil, config={"run": "</pre><script>"})
+    parsed(html)
+    assert "<script" not in html
+    assert "onload='x" not in html
+
+
+def test_film_inside_or_beside(make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    film = tmp_path / "out" / "my film.mp4"
+    film.parent.mkdir()
+    film.write_bytes(b"\0" * 1000)
+    small = film_module.film_html(film, tmp_path / "out")
+    assert re.search(r"src='data:video/mp4;base64,A{20}", small)
+    monkeypatch.setattr(film_module, "INLINE_BYTES", 999)
+    assert "src='my%20film.mp4'" in film_module.film_html(film, tmp_path / "out")
+    assert "src='../out/my%20film.mp4'" in film_module.film_html(film, tmp_path / "other")
+    with pytest.raises(InputError, match="no such film"):
+        film_module.film_html(tmp_path / "gone.mp4", tmp_path)
+    with pytest.raises(InputError, match=r"\.mp4, \.webm"):
+        film_module.film_html(tmp_path / "film.avi", tmp_path)
+
+
+def test_thinning_keeps_the_peaks_and_the_mean() -> None:
+    time = np.arange(100_000) * 0.01
+    values = np.sin(time)
+    values[[31_337, 77_777]] = 9.0, -7.0
+    values[500] = np.nan
+    t, low, mean, high = thin(time, values)
+    assert len(t) < 1000
+    assert (np.diff(t) > 0).all()
+    assert high.max() == 9.0
+    assert low.min() == -7.0
+    assert (low <= mean).all()
+    assert (mean <= high).all()
+    assert mean.mean() == pytest.approx(np.nanmean(values), abs=1e-3)
+    short = thin(time[:50], values[:50])
+    assert all(np.array_equal(part, values[:50]) for part in short[1:])
+
+
+def test_outline_of_a_straight_body() -> None:
+    """A straight body's outline is as long as the body, as wide, and symmetrical."""
+    links = np.column_stack([1.0 - 0.07 * np.arange(17), np.zeros(17)])
+    outline = body_outline_m(links, 0.07, 0.03)
+    assert outline[:, 0].max() == pytest.approx(1.0 + 0.035 + 0.03, abs=1e-3)
+    assert outline[:, 0].min() == pytest.approx(1.0 - 16 * 0.07 - 0.035)
+    assert np.abs(outline[:, 1]).max() == pytest.approx(0.03)
+    x, y = outline.T
+    area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
+    assert 0.85 * 0.06 * 1.19 < area < 0.06 * 1.25
+    assert sorted(np.round(y, 9)) == sorted(np.round(-y, 9))

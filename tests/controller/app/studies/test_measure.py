@@ -1,0 +1,68 @@
+"""What a point is measured for, on the physics; closed forms for slip and energy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.app.studies.sweep_measure import Row, measure
+from snakewalk.controller.app.studies.sweep_points import Point
+from snakewalk.controller.app.studies.tune import Task, loss
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.metrics.effort import link_rotations
+from snakewalk.drivers.types import BodyPose
+
+
+def test_link_frames_agree_with_the_chain() -> None:
+    robot = RobotConfig(name="r", joint_axes="ypypyyp")
+    rng = np.random.default_rng(0)
+    head, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+    head[:, 0] *= np.sign(np.linalg.det(head))
+    joints = rng.uniform(-1.0, 1.0, 7)
+    frames = link_rotations(robot.joint_axes, head[None], joints[None])[0]
+    view = body_in_world(robot, BodyPose(0.0, np.zeros(3), head), joints)
+    assert np.allclose(frames[:, :, 0], view.forward)
+    assert np.allclose(frames @ np.swapaxes(frames, -1, -2), np.eye(3))
+
+
+def test_undulation_advances_costs_and_slips_less_than_it_goes() -> None:
+    point = Point("lateral-undulation", "yaw16", "flat", 0, 0, 6.0)
+    row = measure(point)
+    assert row["ended"] == "ran to its end"
+    assert float(row["forward_bl_cycle"]) > 0.3  # type: ignore[arg-type]
+    assert 0.0 < float(row["slip"]) < 0.6  # type: ignore[arg-type]
+    assert 0.05 < float(row["cost_of_transport"]) < 2.0  # type: ignore[arg-type]
+    assert measure(point) == row  # the same point gives the same row
+    other = measure(point, vary=1)
+    assert other["speed_m_s"] != row["speed_m_s"]
+
+
+def test_a_gait_that_a_robot_refuses_is_a_row_and_no_crash() -> None:
+    point = Point("lateral-undulation", "yaw16", "flat", 0, 0, 4.0)
+    row = measure(replace(point, parameters={"winding_rad": 1.4, "turn_rad": 2.5, "waves": 3.0}))
+    assert str(row["ended"]).startswith("refused: ")
+
+
+@pytest.mark.parametrize("missing", ["ended", "speed_m_s"])
+def test_unmeasured_points_never_win(missing: str) -> None:
+    row = ahead(1.0, 0.0)
+    good = loss(row, SPEED)
+    assert good == -1.0
+    assert loss(row | {missing: None}, SPEED) > good
+    assert loss(row | {"least_rate": 0.9}, SPEED) > good
+
+
+def test_what_goes_elsewhere_is_another_gait() -> None:
+    assert loss(ahead(0.8, 0.6), SPEED) == pytest.approx(-0.8)
+    assert loss(ahead(-1.0, 0.0), SPEED) > 0.0
+    assert loss(ahead(0.0, 1.0), SPEED) > 0.0
+
+
+SPEED = Task("speed", "way", (1.0, 0.0), 0.5)
+
+
+def ahead(forward: float, left: float) -> Row:
+    """A run at 1 m/s in this direction."""
+    found: Row = {"ended": "ran to its end", "speed_m_s": 1.0, "climb_m_s": 0.0, "least_rate": 1.0}
+    return found | {"forward_bl_cycle": forward, "left_bl_cycle": left}

@@ -1,0 +1,55 @@
+"""Points of a sweep: in the ranges, allowed by the robot, the same for the same seed."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.app.studies.sweep_plan import plan_sweep
+from snakewalk.controller.app.studies.sweep_points import SLOWEST_HZ, Space, points_of
+from snakewalk.controller.gaits.gait import ranges
+from snakewalk.controller.gaits.registry import GAITS
+
+
+@pytest.mark.parametrize("name", list(GAITS))
+def test_points_are_in_range_and_within_the_joints(name: str) -> None:
+    gait = GAITS[name]
+    robot = load_robot("alternating16")
+    points, _ = points_of(gait, robot, 30, seed=3, seconds=10.0)
+    assert len(points) == 30
+    assert points[0].parameters == {}
+    spans = ranges(gait.model)
+    for point in points:
+        gait.of(dict(point.parameters)).check(robot)  # raises where a joint would not bend so far
+        for key, value in point.parameters.items():
+            assert spans[key].low - 1e-3 <= value <= spans[key].high + 1e-3
+    assert len({tuple(p.parameters.items()) for p in points}) == 30
+
+
+def test_the_seed_decides_the_points() -> None:
+    robot = load_robot("yaw16")
+    gait = GAITS["lateral-undulation"]
+    same = [points_of(gait, robot, 8, seed=5, seconds=10.0)[0] for _ in range(2)]
+    assert same[0] == same[1]
+    assert points_of(gait, robot, 8, seed=6, seconds=10.0)[0][1:] != same[0][1:]
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4))
+def test_unit_cube_and_parameters_are_inverse(unit: list[float]) -> None:
+    space = Space.of(GAITS["lateral-undulation"])
+    values = space.values(np.array(unit))
+    assert values["frequency_hz"] >= SLOWEST_HZ
+    assert np.allclose(space.unit(values), unit, atol=2e-3)
+
+
+def test_robots_that_a_gait_does_not_fit_are_left_out() -> None:
+    planned = plan_sweep(["sidewinding"], None, 4, seed=0, seconds=10.0)
+    assert {point.robot for point in planned.points} == {"alternating16"}
+    assert any("pitch" in line for line in planned.left_out)
+    with pytest.raises(InputError, match="pitch"):
+        plan_sweep(["sidewinding"], ["yaw16"], 4, seed=0, seconds=10.0)
+    with pytest.raises(InputError) as caught:
+        plan_sweep(["slither", "crawl"], None, 4, seed=0, seconds=10.0)
+    assert len(caught.value.faults) == 2

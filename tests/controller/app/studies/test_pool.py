@@ -1,0 +1,33 @@
+"""The same results from processes and from a cluster; a scheduler that is not there is one line."""
+
+import math
+from operator import attrgetter
+
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.app.studies.pool import each
+from snakewalk.controller.app.studies.sweep_points import points_of
+from snakewalk.controller.gaits.registry import GAITS
+
+distributed = pytest.importorskip("distributed")
+
+
+def test_a_cluster_by_its_address_gives_what_processes_give() -> None:
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        far = dict(each(math.factorial, range(7), workers=1, dask=cluster.scheduler_address))
+    assert far == {n: math.factorial(n) for n in range(7)}
+
+
+def test_points_travel_to_other_processes() -> None:
+    points, _ = points_of(GAITS["rolling"], load_robot("alternating16"), 2, seed=0, seconds=5.0)
+    found = {point.number: key for point, key in each(attrgetter("key"), points, workers=1)}
+    assert found == {point.number: point.key for point in points}
+
+
+def test_no_scheduler() -> None:
+    with pytest.raises(InputError, match="no scheduler"):
+        dict(each(math.factorial, [1], workers=1, dask="inproc://nowhere/1/1"))

@@ -1,0 +1,80 @@
+"""The table of a sweep survives a kill: no finished row is lost, none is run twice."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.studies.sweep_digest import digest
+from snakewalk.controller.app.studies.sweep_measure import MEASURED, Row
+from snakewalk.controller.app.studies.sweep_points import Point
+from snakewalk.controller.app.studies.sweep_table import COLUMNS, Table, read_table
+
+POINTS = [
+    Point("lateral-undulation", "yaw16", "flat", n, 0, 10.0, {"waves": 1.0 + 0.1 * n})
+    for n in range(6)
+]
+
+
+def row(way_bl: float) -> Row:
+    found: Row = dict.fromkeys(MEASURED, 1.0)
+    return found | {"ended": "ran to its end", "cycles": 5, "forward_bl_cycle": way_bl}
+
+
+def test_columns_are_unique() -> None:
+    assert len(set(COLUMNS)) == len(COLUMNS)
+
+
+@settings(max_examples=40, deadline=None)
+@given(finished=st.integers(0, 6), torn=st.integers(0, 400))
+def test_cut_off_anywhere_it_goes_on_where_it_was(
+    tmp_path_factory: pytest.TempPathFactory, finished: int, torn: int
+) -> None:
+    path = tmp_path_factory.mktemp("sweep") / "sweep.csv"
+    with Table(path) as table:
+        for k in range(finished):
+            table.add(POINTS[k], row(0.1 * k))
+    whole = path.read_bytes()
+    path.write_bytes(whole[: max(len(whole) - torn, 0)])
+    kept = path.read_bytes().count(b"\n") - 1
+    if kept < 0:  # not even the heads are whole
+        path.unlink()
+    again = Table(path)
+    missing = again.missing(POINTS)
+    assert [p.number for p in missing] == list(range(max(kept, 0), 6))
+    with again:
+        for point in missing:
+            again.add(point, row(0.1 * point.number))
+    rows = read_table(path)
+    assert [int(r["number"]) for r in rows] == list(range(6))
+    assert path.read_bytes().startswith(whole[: whole.find(b"\n")])
+
+
+def test_other_seeds_are_other_points(tmp_path: Path) -> None:
+    with Table(tmp_path / "t.csv") as table:
+        table.add(POINTS[0], row(0.1))
+    other = Point("lateral-undulation", "yaw16", "flat", 0, 1, 10.0)
+    assert Table(tmp_path / "t.csv").missing([POINTS[0], other]) == [other]
+
+
+def test_another_file_is_not_touched(tmp_path: Path) -> None:
+    path = tmp_path / "mine.csv"
+    path.write_text("a,b\n1,2\n")
+    with pytest.raises(InputError, match="no table"):
+        Table(path)
+    assert path.read_text() == "a,b\n1,2\n"
+
+
+def test_digest_takes_the_defaults_and_the_best(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    with Table(path) as table:
+        for point in POINTS:
+            table.add(point, row(0.3 - 0.1 * abs(point.number - 3)))
+        tripped = Point("lateral-undulation", "yaw16", "flat", 6, 0, 10.0)
+        table.add(tripped, {"ended": "refused: no"})
+    (one,) = digest(read_table(path))
+    assert one["points"] == 7
+    assert one["tripped"] == 1
+    assert one["most_bl_cycle"] == pytest.approx(1.044, abs=1e-3)  # hypot(0.3, left 1.0)

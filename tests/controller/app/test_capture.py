@@ -1,0 +1,170 @@
+"""``snakewalk capture``: films in, a track out; bad input in one line; nothing overwritten."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.recordings.capturing import Wanted, capture_file
+from snakewalk.controller.capture.image.video import open_footage
+from snakewalk.controller.capture.readers.load import load_track
+from snakewalk.controller.capture.scale import scale_of_marker
+from tests.oracles.rendered_snake import Scene, empty, film, true_midlines
+
+SCENE = Scene(rows=160, columns=200, length_px=70.0, frames=24, wave_hz=1.0)
+
+
+def snakewalk(*words: str) -> subprocess.CompletedProcess[str]:
+    code = "from snakewalk.controller.app.cli.main import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, "capture", *words], capture_output=True, text=True, check=False
+    )
+
+
+def write_film(path: Path, frames: Iterable[np.ndarray]) -> Path:
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (200, 160))
+    for frame in frames:
+        writer.write(cv2.cvtColor(frame, cv2.COLOR_GRAY2BGR))
+    writer.release()
+    return path
+
+
+@pytest.fixture(scope="module")
+def swim(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_film(tmp_path_factory.mktemp("films") / "swim.avi", film(SCENE))
+
+
+def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Path) -> None:
+    track, sheet, overlay = (tmp_path / name for name in ("t.npz", "s.png", "o.avi"))
+    done = snakewalk(
+        str(swim), "-o", str(track), "--length-m", "0.35", "--sheet", str(sheet),
+        "--overlay", str(overlay), "--json",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert facts["frames"] == facts["frames_used"] == 24
+    assert facts["verdicts"] == {"good": 24}
+    assert facts["length_m"] == pytest.approx(0.35)
+    loaded = load_track(str(track))
+    assert loaded.rate_hz == 30.0
+    assert loaded.length_m == pytest.approx(0.35, rel=0.02)
+    truth = true_midlines(SCENE) * [1.0, -1.0]
+    step = -np.diff(truth, axis=1)
+    angles = np.unwrap(np.arctan2(step[..., 1], step[..., 0]), axis=1)
+    error = np.angle(np.exp(1j * (loaded.angles_rad - angles)))
+    assert np.median(np.abs(error)) < 0.08
+    with np.load(track) as held:
+        assert held["verdict"].tolist() == ["good"] * 24
+        assert held["points_px"].shape == (24, 101, 2)
+        assert held["head_margin"].shape == (24,)
+    assert cv2.imread(str(sheet)).shape == (800, 1200, 3)
+    assert open_footage(overlay).count == 24
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["o.avi", "s.png", "t.npz"]
+
+
+def test_nothing_is_overwritten_without_force(swim: Path, tmp_path: Path) -> None:
+    track = tmp_path / "t.npz"
+    track.write_bytes(b"mine")
+    with pytest.raises(InputError, match=r"t\.npz: exists; --force overwrites it"):
+        capture_file(Wanted(swim, track))
+    assert track.read_bytes() == b"mine"
+    capture_file(Wanted(swim, track, force=True))
+    assert load_track(str(track)).frames == 24
+
+
+def test_a_fault_leaves_nothing_behind(swim: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    whole = swim.read_bytes()
+    cut = tmp_path / "cut.avi"
+    cut.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match=r"ends after \d+ of 24 frames"):
+        capture_file(Wanted(cut, folder / "t.npz"))
+    assert list(folder.iterdir()) == []
+
+
+def test_a_folder_of_images_is_taken_in_the_order_of_its_numbers(tmp_path: Path) -> None:
+    for number, frame in enumerate(film(SCENE)):
+        cv2.imwrite(str(tmp_path / f"frame{number}.png"), frame)
+    (tmp_path / "notes.txt").write_text("not an image")
+    footage = open_footage(tmp_path, 25.0)
+    assert footage.count == 24
+    assert footage.rate_hz == 25.0
+    assert [f.name for f in footage.files][:3] == ["frame0.png", "frame1.png", "frame2.png"]
+    assert footage.files[-1].name == "frame23.png"
+    assert np.array_equal(next(footage.read()), next(film(SCENE)))
+
+
+def test_a_given_background_is_used(swim: Path, tmp_path: Path) -> None:
+    ground = tmp_path / "ground.png"
+    cv2.imwrite(str(ground), empty(SCENE))
+    facts = capture_file(Wanted(swim, tmp_path / "t.npz", background=ground))
+    assert facts["background"] == "given"
+    assert facts["frames_used"] == 24
+
+
+def test_markers_give_the_scale(tmp_path: Path) -> None:
+    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    image = np.full((200, 300), 230, dtype=np.uint8)
+    image[60:120, 80:140] = cv2.aruco.generateImageMarker(family, 7, 60)
+    assert scale_of_marker("0.05", image) == pytest.approx(0.05 / 60.0, rel=0.02)
+    assert scale_of_marker("10,20,40,60,0.2", image) == pytest.approx(0.2 / 50.0)
+    for wrong in ("", "big", "0", "-1", "1,2,3", "5,5,5,5,1", "nan"):
+        with pytest.raises(InputError, match="--marker"):
+            scale_of_marker(wrong, image)
+    with pytest.raises(InputError, match="no ArUco or AprilTag marker"):
+        scale_of_marker("0.05", image[:, 150:])
+
+
+def test_help_has_an_example() -> None:
+    done = snakewalk("--help")
+    assert done.returncode == 0
+    assert "snakewalk capture film.mp4" in " ".join(done.stdout.split())
+
+
+def test_bad_files_end_with_exit_code_2_and_one_line(tmp_path: Path) -> None:
+    junk = tmp_path / "junk.mp4"
+    junk.write_bytes(b"no film" * 50)
+    done = snakewalk(str(junk), "-o", str(tmp_path / "t.npz"))
+    assert done.returncode == 2
+    told = [line for line in done.stderr.splitlines() if line.strip()]
+    assert len(told) == 1
+    assert "junk.mp4: no frame can be read" in told[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"recording": "absent.mp4"}, "absent.mp4: no such video"),
+        ({"recording": "empty.mp4"}, "is an empty file"),
+        ({"recording": "bare"}, "holds no images"),
+        ({"output": "track.txt"}, "a track is an .npz"),
+        ({"output": "no/folder/t.npz"}, "no/folder: no such folder"),
+        ({"overlay": "o.gif"}, "an overlay film is one of"),
+        ({"sheet": "s.doc"}, "a picture is one of"),
+        ({"length_m": 0.0}, "longer than 0 m"),
+        ({"length_m": 0.2, "marker": "0.05"}, "say one of them"),
+        ({"rate_hz": 0.0}, "frame rate must be above 0"),
+        ({"head": "left"}, "expected X,Y"),
+        ({"background": "junk.png"}, "is no image"),
+    ],
+)
+def test_bad_options_are_told_before_any_work(
+    swim: Path, tmp_path: Path, change: dict[str, object], said: str
+) -> None:
+    (tmp_path / "empty.mp4").touch()
+    (tmp_path / "junk.png").write_bytes(b"junk")
+    (tmp_path / "bare").mkdir()
+    paths = {"recording", "output", "overlay", "sheet", "background"}
+    given = {k: tmp_path / str(v) if k in paths else v for k, v in change.items()}
+    wanted = replace(Wanted(swim, tmp_path / "t.npz"), **given)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=said):
+        capture_file(wanted)
+    assert not (tmp_path / "t.npz").exists()

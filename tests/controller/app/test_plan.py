@@ -1,0 +1,74 @@
+"""The command line on paper: plans, lists, and refuses bad input with exit code 2."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.runs.prepare import prepare
+
+
+def snakewalk(*words: str) -> subprocess.CompletedProcess[str]:
+    code = "from snakewalk.controller.app.cli.main import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.parametrize("run", ["flat-square", "flat-slalom"])
+@pytest.mark.parametrize("motion", ["walk", "serpenoid"])
+def test_the_walk_and_the_baseline_reach_every_waypoint_on_paper(run: str, motion: str) -> None:
+    prepared = prepare(run, motion=motion, seed=3)
+    ahead = prepared.forecast()
+    assert ahead.reached == len(prepared.run.waypoints_m)
+    assert ahead.joint_speed_rad_s.max() <= 1.1 * prepared.robot.joint_speed_limit_rad_s
+
+
+def test_without_feedback_slip_carries_the_body_off_its_path() -> None:
+    prepared = prepare("flat-slalom", motion="walk-blind", time_limit_s=80.0)
+    assert prepared.forecast().reached < 5
+
+
+def test_the_same_seed_gives_the_same_joints_bit_for_bit() -> None:
+    one, two = (prepare("flat-slalom", seed=5, time_limit_s=15.0).forecast() for _ in range(2))
+    assert one.joint_rad.tobytes() == two.joint_rad.tobytes()
+    other = prepare("flat-slalom", seed=6, time_limit_s=15.0).forecast()
+    assert not np.array_equal(one.joint_rad, other.joint_rad)
+
+
+def test_a_plan_as_json() -> None:
+    done = snakewalk("plan", "flat-slalom", "--motion", "serpenoid", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["waypoints_reached"] == found["waypoints"] == 5
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["plan", "nosuch"], "nosuch: no such run"),
+        (["plan", "missing.toml"], "missing.toml: no such file"),
+        (["plan", "--motion", "fly"], "motion"),
+        (["plan", "--seed", "-1"], "seed"),
+    ],
+)
+def test_bad_input_is_one_clear_line_and_exit_code_2(words: list[str], said: str) -> None:
+    done = snakewalk(*words)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+
+
+def test_a_robot_that_cannot_bend_enough_is_refused_before_torque(tmp_path: Path) -> None:
+    (tmp_path / "stiff.toml").write_text(
+        'name = "stiff"\njoint_axes = "yyyyyyyy"\nlink_length_m = 0.13\nyaw_limit_rad = 0.1\n'
+    )
+    run = tmp_path / "run.toml"
+    run.write_text('name = "r"\nrobot = "stiff.toml"\nwaypoints_m = [[2, 0]]\n')
+    with pytest.raises(InputError, match="joint limits"):
+        prepare(str(run)).forecast()

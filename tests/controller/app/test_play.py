@@ -1,0 +1,64 @@
+"""A recording played in time: within the limits, on the same path as every run."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.app.cli.main import app
+from snakewalk.controller.app.recordings.recorded_joints import recorded_joints
+from snakewalk.controller.app.runs.job import job_of
+from snakewalk.controller.app.runs.prepare_playback import prepare_playback
+from snakewalk.controller.runlog.reader import read_log
+
+
+def test_auto_is_as_fast_as_the_joints_can_and_faster_is_refused() -> None:
+    """The default just keeps the limits; twice that is one line."""
+    prepared = prepare_playback("worm-like")
+    assert 0.0 < prepared.speed <= 1.0
+    prepared.judged()
+    with pytest.raises(InputError, match="--speed"):
+        prepare_playback("worm-like", speed=min(2.0 * prepared.speed, 10.0) + 1.0)
+
+
+def test_slower_takes_longer_in_proportion() -> None:
+    """Half the speed is twice the time."""
+    fast = prepare_playback("worm-like", speed=0.2)
+    assert prepare_playback("worm-like", speed=0.1).duration_s == pytest.approx(
+        2.0 * fast.duration_s
+    )
+
+
+def test_joints_of_a_synthesis_are_played_as_they_are(tmp_path: Path) -> None:
+    """No detour over midlines where the file holds the robot's own joints; run and log agree."""
+    robot = load_robot("yaw16")
+    time_s = np.arange(61) / 30.0
+    wave = 0.2 * np.sin(2.0 * time_s[:, None] + np.arange(16) / 3.0)
+    path = tmp_path / "made.npz"
+    np.savez(path, joints_rad=wave, rate_hz=30.0, robot="yaw16")
+    known_s, joints = recorded_joints(str(path), robot)
+    np.testing.assert_allclose(known_s, time_s)
+    np.testing.assert_array_equal(joints, wave)
+    found = CliRunner().invoke(
+        app, ["play", str(path), "--no-film", "--json", "--out", str(tmp_path / "run")]
+    )
+    assert found.exit_code == 0, found.output
+    told = json.loads(found.stdout)
+    assert told["tripped"] is None
+    record = read_log(Path(told["log"]))
+    np.testing.assert_allclose(record.cycle.asked_rad[-1], wave[-1], atol=1e-3)
+    header = record.header
+    again = job_of(header.run, header.robot, header.world)
+    np.testing.assert_allclose(again.guide(lambda kind, text: None).first_goal_rad(), wave[0])
+
+
+@pytest.mark.parametrize("arguments", [["nowhere.npz"], ["worm-like", "--speed", "quick"]])
+def test_bad_input_is_one_line(arguments: list[str]) -> None:
+    """No such recording, no such speed."""
+    found = CliRunner().invoke(app, ["play", *arguments])
+    assert isinstance(found.exception, InputError)
+    assert len(found.exception.faults) == 1

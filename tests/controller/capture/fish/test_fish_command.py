@@ -1,0 +1,99 @@
+"""``snakewalk fish``: from a rendered film to a track for a run; bad input in one line."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.main import app
+from snakewalk.controller.capture.fish.postures import save_postures
+from snakewalk.controller.capture.fish.swimmer import swim
+from snakewalk.controller.capture.readers.load import load_track
+
+PNG = b"\x89PNG"
+
+
+def snakewalk(*words: object) -> dict[str, object]:
+    done = CliRunner().invoke(app, ["fish", *map(str, words), "--json"], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    found: dict[str, object] = json.loads(done.stdout)
+    return found
+
+
+def refused(*words: object) -> str:
+    done = CliRunner().invoke(app, ["fish", *map(str, words)])
+    assert isinstance(done.exception, InputError), (words, done.output, done.exception)
+    assert len(done.exception.faults) == 1
+    assert "\n" not in done.exception.faults[0]
+    return done.exception.faults[0]
+
+
+def test_film_match_and_picture(tmp_path: Path) -> None:
+    tank = tmp_path / "tank"
+    assert snakewalk("film", tank, "--frames", 6, "--length-px", 60)["frames"] == 6
+    found = snakewalk(
+        "match", tank / "top", "--background", tank / "top-background.png",
+        "--truth", tank / "truth.npz", "--rate", 30, "--length", 0.3,
+        "-o", tmp_path / "found.npz", "--picture", tmp_path / "match.png",
+    )  # fmt: skip
+    assert found["matched"] == 6
+    assert found["turned_round"] == 0
+    assert found["head_error_deg"][0] < 2.0  # type: ignore[index]
+    assert (tmp_path / "match.png").read_bytes().startswith(PNG)
+    track = load_track(str(tmp_path / "found.npz"))
+    assert track.length_m == pytest.approx(0.3, rel=0.01)
+    assert track.frames == 6
+
+
+def test_synthesised_motion_is_a_recording(tmp_path: Path) -> None:
+    save_postures(tmp_path / "p.npz", swim())
+    made = snakewalk(
+        "synthesise", tmp_path / "p.npz", "--through", "3,0", "--through", "5,2", "--mirror",
+        "-o", tmp_path / "t.npz", "--picture", tmp_path / "way.png",
+    )  # fmt: skip
+    assert len(made["reached_s"]) == 2  # type: ignore[arg-type]
+    assert made["join_step_blended_deg"] < made["join_step_deg"]  # type: ignore[operator]
+    assert (tmp_path / "way.png").read_bytes().startswith(PNG)
+    track = load_track(str(tmp_path / "t.npz"))
+    assert track.frames > 60
+    with np.load(tmp_path / "t.npz") as held:
+        assert held["joints_rad"].shape == (track.frames, 16)
+    first = (tmp_path / "t.npz").read_bytes()
+    assert "--force" in refused("synthesise", tmp_path / "p.npz", "-o", tmp_path / "t.npz")
+    assert (tmp_path / "t.npz").read_bytes() == first
+
+
+def test_bad_input_is_one_line(tmp_path: Path) -> None:
+    out = ("-o", tmp_path / "o.npz")
+    (tmp_path / "none").mkdir()
+    (tmp_path / "cut.mp4").write_bytes(b"\x00" * 400)
+    still = tmp_path / "still"
+    still.mkdir()
+    for k in range(3):
+        cv2.imwrite(str(still / f"{k}.png"), np.full((60, 80), 128, np.uint8))
+    save_postures(tmp_path / "p.npz", swim())
+    assert "no such video" in refused("match", tmp_path / "gone.mp4", *out)
+    assert "no images" in refused("match", tmp_path / "none", *out)
+    assert "no frame can be read" in refused("match", tmp_path / "cut.mp4", *out)
+    assert "no silhouette" in refused("match", still, *out)
+    assert "carp and eel" in refused("match", still, "--build", "shark", *out)
+    assert "picture ends in" in refused("match", still, "--picture", tmp_path / "a.doc", *out)
+    assert "no such file" in refused("synthesise", tmp_path / "gone.npz", *out)
+    np.savez(tmp_path / "other.npz", a=1)
+    assert "lacks" in refused("synthesise", tmp_path / "other.npz", *out)
+    assert "X,Y" in refused("synthesise", tmp_path / "p.npz", "--through", "3", *out)
+    assert "straight or commonest" in refused(
+        "synthesise", tmp_path / "p.npz", "--reference", "bent", *out
+    )
+    assert not (tmp_path / "o.npz").exists()
+
+
+@pytest.mark.parametrize("name", ["match", "synthesise", "film"])
+def test_help_shows_an_example(name: str) -> None:
+    done = CliRunner().invoke(app, ["fish", name, "--help"])
+    assert done.exit_code == 0
+    assert f"snakewalk fish {name}" in done.stdout

@@ -1,0 +1,214 @@
+"""Pulse speed, sliding, amplitudes and frequency of motions by formula, and of real animals."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.analysis import analyse
+from snakewalk.controller.capture.pulse_speed import measure_pulse_speed
+from snakewalk.controller.capture.readers.arrays import save_track
+from snakewalk.controller.capture.readers.load import load_track
+from snakewalk.controller.capture.resample import body_points
+from snakewalk.controller.capture.track import Track, track_from_points
+from snakewalk.controller.mechanics.speed_law import SpeedLaw
+from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.controller.walk.behaviour import Behaviour
+from snakewalk.controller.walk.synthesis import synthesise
+from tests.helpers.in_process import snakewalk
+
+N = np.arange(100)
+
+
+def travelling(u: float, frames: int = 60, waves: float = 1.5) -> np.ndarray:
+    """Theta(n - u t): 0.6 rad, ``waves`` on the body, u points a frame."""
+    place = N - u * np.arange(frames)[:, None]
+    return 0.6 * np.sin(2 * np.pi * waves * place / 100)
+
+
+@pytest.mark.parametrize("u", [0.25, 1.0, 2.6, 7.4, -3.3])
+def test_a_travelling_wave_has_its_pulse_speed_everywhere(u: float) -> None:
+    found = measure_pulse_speed(travelling(u), np.arange(60))
+    known = np.isfinite(found.points_per_frame)
+    assert known.mean() > 0.75
+    np.testing.assert_allclose(found.points_per_frame[known], u, atol=0.025)
+    assert found.error_rad[known].max() < 1e-3
+
+
+def test_the_printed_sum_is_wrong_and_the_difference_right() -> None:
+    """U = u + w ([PT] 2.4) would be 3 + 0.4 here: the model looks up n - (u - w)."""
+    at = N[20:80]
+    before = np.sin(0.1 * N)
+    u, w = 3, 0.4
+    model = before[at - u] + w * (before[at + 1 - u] - before[at - u])
+    as_u_minus_w = np.abs(model - np.sin(0.1 * (at - (u - w)))).max()
+    as_printed = np.abs(model - np.sin(0.1 * (at - (u + w)))).max()
+    assert as_u_minus_w < 2e-3 < 0.05 < as_printed
+    two = np.stack([np.sin(0.1 * N), np.sin(0.1 * (N - 2.6))])
+    found = measure_pulse_speed(two, np.arange(2)).points_per_frame
+    assert np.nanmedian(found) == pytest.approx(2.6, abs=0.01)
+
+
+def test_two_speeds_along_one_body_are_told_apart() -> None:
+    """[PT] 2.4: U depends on n; here 2 points a frame in front and 4 behind."""
+    place = np.where(N < 50, N / 2.0, 25.0 + (N - 50) / 4.0)  # frames since the head
+    angles = 0.5 * np.sin(0.35 * (place - np.arange(40)[:, None]))
+    found = measure_pulse_speed(angles, np.arange(40)).points_per_frame
+    assert np.nanmedian(found[:, 10:40]) == pytest.approx(2.0, abs=0.05)
+    assert np.nanmedian(found[:, 62:90]) == pytest.approx(4.0, abs=0.05)
+
+
+def test_noise_of_one_degree_moves_the_median_little() -> None:
+    rng = np.random.default_rng(0)
+    noise = rng.normal(0.0, np.radians(1.0), (60, 100))
+    found = measure_pulse_speed(travelling(4.0) + noise, np.arange(60))
+    assert found.typical == pytest.approx(4.0, abs=0.15)
+
+
+def test_what_cannot_be_known_is_not_told() -> None:
+    angles = travelling(5.0)
+    found = measure_pulse_speed(angles, np.arange(60))
+    assert np.isnan(found.points_per_frame[:, :9]).all()  # it came from ahead of the head
+    straight = angles.copy()
+    straight[:, 60:] = straight[:, 60:61]
+    flat = measure_pulse_speed(straight, np.arange(60)).points_per_frame
+    assert np.isnan(flat[:, 72:]).all()
+    gap = np.r_[0:30, 40:70]
+    assert len(measure_pulse_speed(angles, gap).frame) == 58  # never across the gap
+    with pytest.raises(ValueError, match="cannot look for shifts"):
+        measure_pulse_speed(angles, np.arange(60), most=60)
+
+
+def test_turned_frames_are_turned_back() -> None:
+    """Files of joint angles hold no heading: every frame is turned to mean zero."""
+    angles = travelling(3.0, waves=1.3)
+    turned = angles - angles.mean(axis=1, keepdims=True)
+    blind = measure_pulse_speed(turned, np.arange(60)).points_per_frame
+    seeing = measure_pulse_speed(turned, np.arange(60), heading_known=False).points_per_frame
+    np.testing.assert_allclose(np.nanmedian(seeing), 3.0, atol=0.05)
+    assert np.nanstd(seeing) < 0.2 * np.nanstd(blind)
+
+
+def wave_track(travel: float, amplitude: float = 0.5, rate_hz: float = 40.0) -> Track:
+    """1.4 waves at 0.8 Hz for five cycles, head advancing at ``travel`` of the wave's speed."""
+    waves, hz, length = 1.4, 0.8, 0.3
+    time = np.arange(251) / rate_hz
+    s = (N + 0.5) / 100
+    angles = amplitude * np.sin(2 * np.pi * (waves * s - hz * time[:, None]))
+    step = np.stack([np.cos(angles[:, 0]), np.sin(angles[:, 0])], axis=-1)
+    head = np.cumsum(step, axis=0) * travel * hz / waves / rate_hz
+    points = (body_points(angles) + head[:, None]) * length
+    return track_from_points("wave", points, rate_hz, scale_m=1.0)
+
+
+def test_closed_form_of_a_wave() -> None:
+    facts = analyse(wave_track(1.0)).facts()
+    assert facts["frequency_hz"] == pytest.approx(0.8, rel=0.01)
+    assert facts["waves_on_body"] == pytest.approx(1.4, rel=0.02)
+    assert facts["wave_number_rad_per_body_length"] == pytest.approx(2.8 * np.pi, rel=0.02)
+    assert facts["pulse_body_lengths_s"] == pytest.approx(0.8 / 1.4, rel=0.01)
+    assert facts["wave_speed_body_lengths_s"] == pytest.approx(0.8 / 1.4, rel=0.02)
+    assert facts["angle_amplitude_rad"] == pytest.approx([0.5] * 5, abs=0.02)
+    # y' = sin(0.5 sin(phase)): its first harmonic is 2 J1(0.5), over k for the path itself
+    sideways = 2 * 0.24227 / (2.8 * np.pi)
+    assert facts["lateral_amplitude_body_lengths"][2] == pytest.approx(sideways, rel=0.15)
+    assert facts["length_m"] == pytest.approx(0.3, rel=1e-3)
+    assert facts["energy_kept"] > 0.99
+
+
+@pytest.mark.parametrize("travel", [0.4, 0.7, 1.0])
+def test_travel_and_sliding_weight_of_a_slipping_wave(travel: float) -> None:
+    """The head's speed is exact; points behind it slip sideways too, so theirs is near."""
+    found = analyse(wave_track(travel, amplitude=0.25))
+    assert found.travel == pytest.approx(travel, abs=0.03)
+    assert found.sliding is not None
+    assert found.sliding < 0.02  # it slips; nothing glides
+
+
+@pytest.mark.parametrize("sliding", [0.0, 0.3, 0.5])
+def test_the_synthesis_sliding_weight_is_measured_again(sliding: float) -> None:
+    """[PT] 2.6.4 forwards, 2.4 backwards: what w_d did is what is found."""
+    oldest_first = 0.5 * np.sin(2 * np.pi * np.arange(600) / 60.0)
+    track = AngleTrack(oldest_first[:100][::-1])
+    track.append(oldest_first[100:])
+    law = SpeedLaw.printed(0.15)
+    how = Behaviour(sliding=sliding)
+    run = synthesise(track, law, 120, 0.04, 0.01, behaviour=how, speed_m_s=0.24)
+    found = analyse(track_from_points("made", run.points_m[20:], 25.0))
+    assert found.sliding == pytest.approx(sliding, abs=0.05)
+
+
+def test_nothing_to_analyse_is_one_line() -> None:
+    still = track_from_points("still", np.stack([body_points(travelling(1.0)[0])] * 6), 10.0)
+    with pytest.raises(InputError, match="still: no motion"):
+        analyse(still)
+    few = track_from_points("few", body_points(travelling(1.0)[:3]), 10.0)
+    with pytest.raises(InputError, match="few: an analysis needs 4"):
+        analyse(few)
+
+
+def test_a_real_lamprey(shared_data: Path) -> None:
+    """Published with the recording: 3.85 Hz, a wave of 0.57 body lengths; so 2.2 lengths/s."""
+    facts = analyse(load_track(str(shared_data / "lamprey" / "lampreydata.csv"))).facts()
+    assert facts["frequency_hz"] == pytest.approx(3.85, rel=0.02)
+    assert facts["pulse_body_lengths_s"] == pytest.approx(0.57 * 3.85, rel=0.05)
+    assert facts["wavelength_body_lengths"] == pytest.approx(0.6, abs=0.06)
+    head, *_, tail = facts["lateral_amplitude_body_lengths"]
+    assert tail > 3.0 * head  # anguilliform: the tail swings most
+    assert 0.07 < tail < 0.11
+    assert 0.7 < facts["travel"] < 1.0  # a swimmer slips
+    assert facts["energy_kept"] > 0.99
+
+
+def test_a_real_worm_that_backs_up(shared_data: Path) -> None:
+    """Forward, back from second 6.5 to 10.5, an omega turn, forward again."""
+    found = analyse(
+        load_track(str(shared_data / "worm-joint-angles" / "kymogram_omega-turn.npy"), 32.0)
+    )
+    u = found.pulse.points_per_frame
+    when = found.track.time_s[found.pulse.frame]
+    assert np.nanmedian(u[(when > 0.5) & (when < 6.0)]) > 0.3
+    assert np.nanmedian(u[(when > 7.0) & (when < 10.0)]) < -0.8
+    assert np.nanmedian(u[when > 12.5]) > 0.5
+    assert found.travel is None
+
+
+def test_the_command_takes_names_and_files_and_draws(tmp_path: Path) -> None:
+    save_track(tmp_path / "mine.npz", wave_track(0.8))
+    words = ["analyse", str(tmp_path / "mine.npz"), "lamprey-like", "--picture", str(tmp_path)]
+    done = snakewalk(*words, "--json")
+    assert done.returncode == 0, done.stderr
+    mine, shipped = json.loads(done.stdout)
+    assert mine["travel"] == pytest.approx(0.8, abs=0.06)
+    assert shipped["pulse_body_lengths_s"] == pytest.approx(2.3, abs=0.15)
+    assert (tmp_path / "mine.png").read_bytes().startswith(b"\x89PNG")
+    again = snakewalk(*words)
+    assert again.returncode == 2
+    assert "mine.png: exists; --force overwrites it" in again.stderr
+    table = snakewalk("analyse", words[1], "--min-score", "0").stdout
+    assert "sliding weight w_d" in table
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "Missing argument"),
+        (["nosuch"], "nosuch: no such recording or file"),
+        (["worm-like", "--picture", "a.docx"], "a.docx: a picture ends in"),
+        (["worm-like", "lamprey-like", "--picture", "a.png"], "a.png: one file for 2"),
+    ],
+)
+def test_bad_input_ends_with_2(words: list[str], said: str) -> None:
+    done = snakewalk("analyse", *words)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("command", ["analyse", "body"])
+def test_help_has_an_example(command: str) -> None:
+    done = snakewalk(command, "--help")
+    assert done.returncode == 0
+    assert f"snakewalk {command} worm-like" in done.stdout

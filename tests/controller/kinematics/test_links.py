@@ -1,0 +1,53 @@
+"""Forward kinematics: closed forms of a chain carried by its head."""
+
+import numpy as np
+import pytest
+
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.drivers.types import BodyPose
+
+YAW = load_robot("yaw16")
+BOTH = load_robot("alternating16")
+
+
+def pose(heading: float = 0.0, at=(0.0, 0.0, 0.0)) -> BodyPose:
+    c, s = np.cos(heading), np.sin(heading)
+    return BodyPose(0.0, np.array(at), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]]))
+
+
+def test_a_straight_body_lies_behind_its_head() -> None:
+    view = body_in_world(YAW, pose(np.pi / 2, (1.0, 2.0, 0.1)), np.zeros(16))
+    np.testing.assert_allclose(view.link_m[:, 0], 1.0, atol=1e-12)
+    np.testing.assert_allclose(view.link_m[:, 1], 2.0 - 0.07 * np.arange(17), atol=1e-12)
+    np.testing.assert_allclose(view.link_m[:, 2], 0.1)
+
+
+def test_equal_joints_lie_on_a_circle_and_turn_left_when_positive() -> None:
+    q = 0.2
+    view = body_in_world(YAW, pose(), np.full(16, q))
+    np.testing.assert_allclose(view.headings_rad, -q * np.arange(17), atol=1e-12)
+    # centres of links of length l in a regular polygon lie at the inradius from its centre
+    inradius = 0.5 * 0.07 / np.tan(q / 2)
+    centre = view.link_m[0, :2] + inradius * np.array([0.0, 1.0])  # to the left of the head
+    np.testing.assert_allclose(np.hypot(*(view.link_m[:, :2] - centre).T), inradius)
+
+
+def test_positive_pitch_lifts_the_head_side() -> None:
+    q = np.zeros(16)
+    q[1] = 0.3
+    view = body_in_world(BOTH, pose(), q)
+    assert view.forward[1, 2] == pytest.approx(0.0)
+    assert view.forward[2, 2] == pytest.approx(-np.sin(0.3))
+    assert view.link_m[-1, 2] > 0.0  # level head, tail looking down its way of travel: it is higher
+
+
+def test_neighbouring_links_meet_at_the_joint() -> None:
+    rng = np.random.default_rng(1)
+    for robot in (YAW, BOTH):
+        view = body_in_world(robot, pose(0.7), rng.uniform(-1, 1, 16))
+        half = 0.5 * robot.link_length_m
+        rear = view.link_m[:-1] - half * view.forward[:-1]
+        front = view.link_m[1:] + half * view.forward[1:]
+        np.testing.assert_allclose(rear, front, atol=1e-12)
+        np.testing.assert_allclose(np.linalg.norm(view.forward, axis=1), 1.0)

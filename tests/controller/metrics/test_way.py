@@ -1,0 +1,101 @@
+"""Path error, waypoints and lengths against closed forms."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from snakewalk.controller.metrics.path import (
+    distance_m,
+    length_m,
+    path_error_m,
+    travelled_m,
+    waypoint_times_s,
+)
+from snakewalk.controller.runlog.record import PlanSummary, PoseTable, RunRecord
+
+UNKNOWN = np.array([np.nan])
+
+
+def pose_along(points: np.ndarray, times: np.ndarray, along: np.ndarray | None = None) -> PoseTable:
+    n = len(points)
+    nan = np.full(n, np.nan)
+    flat = np.column_stack([points, np.zeros(n)])
+    links = np.full((n, 17, 3), np.nan)
+    target = np.zeros(n, dtype=np.int64)
+    s = nan if along is None else along
+    eye = np.tile(np.eye(3), (n, 1, 1))
+    return PoseTable(times, flat, eye, links, flat, nan, nan, nan, s, target)
+
+
+@pytest.mark.parametrize("radius", [0.8, 1.0, 1.3])
+def test_a_circle_beside_a_circle(radius: float) -> None:
+    phi = np.linspace(0.0, 2 * np.pi, 721)
+    path = np.column_stack([np.cos(phi), np.sin(phi)])
+    at = np.linspace(0.3, 5.9, 400)
+    points = radius * np.column_stack([np.cos(at), np.sin(at)])
+    error = distance_m(points, path, at)
+    assert error == pytest.approx(abs(radius - 1.0), abs=2e-5)
+
+
+def test_only_the_start_goes_on_straight() -> None:
+    path = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
+    points = np.array([[-0.6, 0.1], [-3.0, 0.0], [2.3, -0.4], [1.0, 0.3]])
+    along = np.array([0.0, 0.0, 2.0, 1.0])
+    assert distance_m(points, path, along) == pytest.approx([0.1, 0.0, 0.5, 0.3])
+
+
+def test_a_crossing_branch_is_not_the_way() -> None:
+    path = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [2.0, 2.0], [2.0, -2.0]])
+    crossing = np.array([[2.0, 0.4]])  # near the last branch too
+    assert distance_m(crossing, path, np.array([2.0])) == pytest.approx(0.4)
+    assert distance_m(crossing, path, UNKNOWN) == pytest.approx(0.0)
+
+
+def test_a_path_of_one_place() -> None:
+    assert distance_m(np.array([[3.0, 4.0]]), np.zeros((2, 2)), UNKNOWN) == pytest.approx(5.0)
+
+
+def test_lengths() -> None:
+    phi = np.linspace(0.0, np.pi, 5000)
+    half = np.column_stack([np.cos(phi), np.sin(phi), 3.0 * phi])
+    assert length_m(half) == pytest.approx(np.pi, rel=1e-6)
+    assert travelled_m(pose_along(half[:, :2], phi)) == pytest.approx(np.pi, rel=1e-6)
+
+
+def test_waypoints_count_in_their_order_only() -> None:
+    t = np.linspace(0.0, 10.0, 1001)
+    pose = pose_along(np.column_stack([t, np.zeros_like(t)]), t)
+    path = np.array([[0.0, 0.0], [10.0, 0.0]])
+    for points, expected in (
+        ([[2.0, 0.0], [6.0, 0.3]], [1.5, 5.6]),  # 0.3 aside: 0.4 before
+        ([[6.0, 0.0], [2.0, 0.0]], [5.5]),  # passed before its turn
+        ([[2.0, 0.6]], []),
+    ):
+        plan = PlanSummary(path, np.array(points), 0.5)
+        assert waypoint_times_s(pose, plan) == pytest.approx(expected, abs=0.011)
+
+
+def test_a_path_laid_again_counts_from_then_on(record: RunRecord) -> None:
+    t = np.linspace(0.0, 4.0, 401)
+    points = np.column_stack([t, np.full_like(t, 0.5)])
+    moved = dataclasses.replace(
+        record,
+        pose=pose_along(points, t),
+        paths=(
+            (0.0, np.array([[0.0, 0.0], [4.0, 0.0]])),
+            (2.0, np.array([[2.0, 0.4, 1.0], [4.0, 0.4, 1.0]])),
+        ),
+    )
+    error = path_error_m(moved)
+    assert error[t < 2.0] == pytest.approx(0.5)
+    assert error[t >= 2.0] == pytest.approx(0.1)
+
+
+def test_many_points_at_once_are_each_alone() -> None:
+    rng = np.random.default_rng(1)
+    path = np.cumsum(rng.normal(size=(40, 2)), axis=0)
+    points = rng.normal(size=(50, 2)) * 3
+    both = distance_m(points, path, np.full(50, np.nan))
+    one = [float(distance_m(p[None], path, UNKNOWN)[0]) for p in points]
+    assert both == pytest.approx(one)

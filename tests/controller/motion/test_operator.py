@@ -1,0 +1,159 @@
+"""A live operator: keys from a terminal or a gamepad change what runs, and nothing steps."""
+
+import os
+import pty
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.app.cli.gamepad import Gamepad, Pad
+from snakewalk.controller.app.cli.keyboard import Keyboard, names
+from snakewalk.controller.gaits.registry import make_gait
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.gait_motion import GaitMotion
+from snakewalk.controller.motion.operator import Operator
+
+VIEW = BodyView(np.zeros((17, 3)), np.zeros((17, 3)), np.zeros(3))
+
+
+class Hands:
+    def __init__(self, robot: str = "alternating16", gait: str = "sidewinding") -> None:
+        self.robot = load_robot(robot)
+        self.waiting: list[str] = []
+        self.said: list[str] = []
+        self.operator = Operator(
+            GaitMotion(make_gait(gait), self.robot), self.robot, self._take, self._hear
+        )
+        self.seen = [self.operator.goal_rad()]
+
+    def _take(self) -> list[str]:
+        taken, self.waiting = self.waiting, []
+        return taken
+
+    def _hear(self, kind: str, text: str) -> None:
+        assert kind == "operator"
+        self.said.append(text)
+
+    def press(self, *keys: str, seconds: float = 0.3) -> None:
+        self.waiting = list(keys)
+        for _ in range(int(seconds / 0.02)):
+            self.seen.append(self.operator.step(0.02, VIEW))
+
+
+def test_arrows_choose_a_parameter_and_change_it_within_its_range() -> None:
+    hands = Hands()
+    assert hands.operator.selected == "frequency_hz"
+    hands.press("right")
+    assert hands.operator.motion.gait.params.frequency_hz == pytest.approx(0.55)
+    hands.press("down", "down", "left")
+    assert hands.operator.selected == "winding_rad"
+    assert hands.operator.motion.gait.params.winding_rad == pytest.approx(0.7 - 1.4 / 40)
+    hands.press(*["left"] * 60)
+    assert hands.operator.motion.gait.params.winding_rad == 0.0
+    assert hands.said[-1] == "winding_rad = 0.0"
+
+
+def test_other_gaits_mirror_defaults_halt_and_stop() -> None:
+    hands = Hands()
+    hands.press("m")
+    assert hands.operator.motion.gait.params.mirror
+    hands.press("n")
+    assert hands.operator.motion.gait.name == "rolling"
+    hands.press("p")
+    assert hands.operator.motion.gait.name == "sidewinding"
+    hands.press("right", "d")
+    assert hands.operator.motion.gait.params == make_gait("sidewinding").params
+    hands.press("space", seconds=1.0)
+    np.testing.assert_array_equal(hands.seen[-1], hands.seen[-2])
+    hands.press("space", seconds=1.0)
+    assert np.abs(hands.seen[-1] - hands.seen[-2]).max() > 1e-3
+    hands.press("q", seconds=1.5)
+    assert hands.operator.done
+    assert "halt" in hands.said
+    assert hands.said[-1] == "stop"
+
+
+def test_on_a_yaw_robot_only_gaits_of_yaw_come_round() -> None:
+    hands = Hands("yaw16", "lateral-undulation")
+    seen = set()
+    for _ in range(8):
+        hands.press("n")
+        assert not hands.operator.motion.gait.needs.pitch
+        seen.add(hands.operator.motion.gait.name)
+    assert {"lateral-undulation", "concertina"} <= seen
+
+
+def test_what_the_joints_cannot_do_is_refused_and_told() -> None:
+    hands = Hands("alternating16", "concertina")
+    while hands.operator.selected != "folds":
+        hands.press("down")
+    hands.press(*["right"] * 40, seconds=1.0)
+    assert any(said.startswith("refused: gait concertina: joint") for said in hands.said)
+    hands.operator.motion.gait.check(hands.robot)
+
+
+def test_hammering_on_the_keys_makes_no_step() -> None:
+    hands = Hands()
+    rng = np.random.default_rng(3)
+    keys = ["up", "down", "left", "right", "n", "p", "m", "d", "space", "?"]
+    for _ in range(150):
+        hands.press(*rng.choice(keys, size=3), seconds=0.1)
+    speed = np.diff(hands.seen, axis=0) / 0.02
+    acceleration = np.diff(speed, axis=0) / 0.02
+    assert np.abs(speed).max() < 1.06 * hands.robot.joint_speed_limit_rad_s
+    assert np.abs(acceleration).max() < 1.06 * hands.robot.joint_acceleration_limit_rad_s2
+
+
+def test_a_terminals_characters_become_names() -> None:
+    assert names("\x1b[A\x1b[Bn \x1b[Cq\x1bOD") == [
+        "up", "down", "n", "space", "right", "q", "left",
+    ]  # fmt: skip
+    assert names("\x1b") == []
+
+
+def test_keys_come_from_a_terminal_at_once_and_it_is_restored() -> None:
+    ours, theirs = pty.openpty()
+    import termios
+
+    before = termios.tcgetattr(theirs)
+    with Keyboard(theirs) as keyboard:
+        assert keyboard.pressed() == []
+        os.write(ours, b"\x1b[Am")
+        assert keyboard.pressed() == ["up", "m"]
+    assert termios.tcgetattr(theirs) == before
+    os.close(ours)
+    os.close(theirs)
+
+
+def test_a_pipe_is_no_keyboard(tmp_path: Path) -> None:
+    with (tmp_path / "keys").open("w+") as file, pytest.raises(InputError, match="a terminal"):
+        Keyboard(file.fileno())
+
+
+def event(value: int, kind: int, number: int) -> bytes:
+    return struct.pack("<IhBB", 0, value, kind, number)
+
+
+def test_a_gamepads_events_become_names_once_a_push() -> None:
+    pad = Pad()
+    start = event(0, 0x81, 0) + event(32767, 0x82, 1)
+    assert pad.keys(start) == [], "the state at the start is no push"
+    pushed = event(-32767, 2, 0) + event(-30000, 2, 0) + event(0, 2, 0) + event(32767, 2, 0)
+    data = pushed + event(1, 1, 0) + event(0, 1, 0) + event(1, 1, 7)
+    assert pad.keys(data[:11]) + pad.keys(data[11:]) == ["left", "right", "n", "q"]
+
+
+def test_a_gamepad_is_read_without_waiting_and_a_missing_one_refused(tmp_path: Path) -> None:
+    fifo = tmp_path / "js0"
+    os.mkfifo(fifo)
+    with Gamepad(fifo) as pad:
+        assert pad.pressed() == []
+        with fifo.open("wb", buffering=0) as file:
+            file.write(event(1, 1, 1))
+            assert pad.pressed() == ["m"]
+    with pytest.raises(InputError, match="no gamepad"):
+        Gamepad(tmp_path / "none")

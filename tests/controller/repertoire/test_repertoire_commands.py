@@ -1,0 +1,74 @@
+"""``snakewalk repertoire`` and ``snakewalk plan --with repertoire`` from outside."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from snakewalk.controller.repertoire.repertoire import Repertoire
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def snakewalk(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    code = "from snakewalk.controller.app.cli.main import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+
+
+def test_help_has_an_example(tmp_path: Path) -> None:
+    for command in ("record", "show", "run"):
+        done = snakewalk(tmp_path, "repertoire", command, "--help")
+        assert done.returncode == 0, done.stderr
+        assert f"snakewalk repertoire {command}" in done.stdout
+
+
+def test_plan_save_and_refuse_to_overwrite(repertoire: Repertoire, tmp_path: Path) -> None:
+    repertoire.save(tmp_path / "repertoire-yaw16-flat.npz")
+    words = ("plan", "flat-slalom", "--with", "repertoire", "-o", "plan.json", "--json")
+    done = snakewalk(tmp_path, *words)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["waypoints_reached"] == 5
+    plan = json.loads((tmp_path / "plan.json").read_text())
+    assert plan["actions"] == found["actions"]
+    again = snakewalk(tmp_path, *words)
+    assert again.returncode == 2
+    assert again.stderr == "snakewalk: plan.json: exists; --force overwrites it\n"
+    shown = snakewalk(tmp_path, "repertoire", "show", "repertoire-yaw16-flat.npz", "--json")
+    rows = json.loads(shown.stdout)["actions"]
+    assert [row["name"] for row in rows] == [segment.name for segment in repertoire.segments]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("plan", "--with", "physics"), "there is: repertoire"),
+        (("plan", "flat-slalom", "--with", "repertoire"), "snakewalk repertoire record"),
+        (("plan", "flat-slalom", "--with", "repertoire", "--motion", "walk"), "takes no --motion"),
+        (("plan", "flat-slalom", "--run"), "belong to --with repertoire"),
+        (("repertoire", "record", "--world", "jacksboro-gentle"), "flat one"),
+        (("repertoire", "record", "-o", "no/where.npz"), "no such folder"),
+        (("repertoire", "record", "--robot", "nosuch"), "nosuch"),
+        (("repertoire", "show", "none.npz"), "no such file"),
+        (("repertoire", "run", "none.json"), "no such plan"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    done = snakewalk(tmp_path, *words)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1
+    assert said in done.stderr
+    assert not list(tmp_path.iterdir())

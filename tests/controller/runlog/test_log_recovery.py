@@ -1,0 +1,97 @@
+"""A killed run, a cut file, a flipped bit: what comes before the break comes back."""
+
+import os
+import subprocess
+import sys
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snakewalk.controller.runlog.reader import LogError, read_log
+from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.writer import RunLog, part_path
+
+Write = Callable[[Path, int], Path]
+
+
+@pytest.fixture(scope="module")
+def whole(write: Write, tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, RunRecord]:
+    path = write(tmp_path_factory.mktemp("log") / "run.mcap", 220)
+    return path.read_bytes(), read_log(path)
+
+
+def test_cut_anywhere_gives_a_prefix_and_says_so(
+    whole: tuple[bytes, RunRecord], tmp_path: Path
+) -> None:
+    data, full = whole
+    path = tmp_path / "cut.mcap"
+    sizes: list[int] = []
+    for cut in (*range(0, 64), *np.linspace(64, len(data) - 1, 150).astype(int)):
+        path.write_bytes(data[:cut])
+        try:
+            part = read_log(path)
+        except LogError:
+            assert not sizes, "once the start can be read, more bytes never give less"
+            continue
+        rows = len(part.cycle.time_s)
+        assert not part.complete
+        assert "cut or damaged" in part.note
+        assert np.array_equal(part.cycle.asked_rad, full.cycle.asked_rad[:rows])
+        assert np.array_equal(part.pose.head_m, full.pose.head_m[: len(part.pose.time_s)])
+        sizes.append(rows)
+    assert sizes == sorted(sizes)
+    assert sizes[0] == 0
+    assert sizes[-1] == 220, "only the index was cut off"
+    assert len(set(sizes)) >= 5, "a chunk a second"
+
+
+def test_a_flipped_bit_is_noticed(whole: tuple[bytes, RunRecord], tmp_path: Path) -> None:
+    data, full = whole
+    path = tmp_path / "bad.mcap"
+    for at in np.linspace(len(data) // 3, len(data) * 2 // 3, 40).astype(int):
+        bad = bytearray(data)
+        bad[at] ^= 0x10
+        path.write_bytes(bad)
+        part = read_log(path)
+        rows = len(part.cycle.time_s)
+        assert np.array_equal(part.cycle.measured_rad, full.cycle.measured_rad[:rows])
+        assert not part.complete
+
+
+def test_a_killed_process_loses_less_than_a_second(tmp_path: Path) -> None:
+    conftest = Path(__file__).with_name("conftest.py")
+    path = tmp_path / "run.mcap"
+    script = textwrap.dedent(
+        f"""
+        import os, runpy, signal
+        from pathlib import Path
+        from snakewalk.controller.runlog.writer import RunLog
+        cycle = RunLog.cycle
+        def until_killed(self, time_s, *args, **more):
+            cycle(self, time_s, *args, **more)
+            if time_s > 3.5:
+                os.kill(os.getpid(), signal.SIGKILL)
+        RunLog.cycle = until_killed
+        runpy.run_path({str(conftest)!r})["write_log"](Path({str(path)!r}), 1000)
+        """
+    )
+    done = subprocess.run([sys.executable, "-c", script], check=False, env=dict(os.environ))
+    assert done.returncode == -9
+    assert not path.exists()
+    record = read_log(part_path(path))
+    assert not record.complete
+    assert record.cycle.time_s[-1] > 2.5
+    assert record.cycle.time_s[-1] <= 3.51
+
+
+def test_a_warning_is_on_the_disk_at_once(tmp_path: Path) -> None:
+    log = RunLog(tmp_path / "run.mcap")
+    before = part_path(log.path).stat().st_size
+    log.event(0.1, "start", "torque on")
+    assert part_path(log.path).stat().st_size == before
+    log.event(0.2, "trip", "servo 4: overload", level="error")
+    assert part_path(log.path).stat().st_size > before
+    log.__exit__(None, None, None)

@@ -1,0 +1,161 @@
+"""What goes into the log comes out of it."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from snakewalk.config.loader import digest, load_robot, load_run, load_world
+from snakewalk.controller.runlog.reader import LogError, read_log
+from snakewalk.controller.runlog.record import PlanSummary
+from snakewalk.controller.runlog.schema import TOPICS
+from snakewalk.controller.runlog.writer import RunLog, part_path
+from snakewalk.drivers.types import JointState
+
+Write = Callable[[Path, int], Path]
+
+
+def test_every_table_comes_back(
+    write: Write, state_of: Callable[[int], JointState], tmp_path: Path
+) -> None:
+    record = read_log(write(tmp_path / "run.mcap", 120))
+    assert record.complete
+    assert record.note == ""
+    cycle = record.cycle
+    k = np.arange(120)
+    asked = np.sin(np.arange(16)[None] + 0.02 * k[:, None]) / 3.0
+    assert np.array_equal(cycle.asked_rad, asked), "exact, to the last digit"
+    assert np.array_equal(cycle.sent_rad, np.clip(asked, -0.3, 0.3))
+    for i in (0, 9, 77):
+        state = state_of(i)
+        np.testing.assert_allclose(cycle.measured_rad[i], state.position_rad, atol=6e-7)
+        np.testing.assert_allclose(cycle.velocity_rad_s[i], state.velocity_rad_s, atol=6e-7)
+        np.testing.assert_allclose(cycle.current_a[i], state.current_a, atol=6e-7)
+        np.testing.assert_array_equal(cycle.valid[i], state.valid)
+        np.testing.assert_allclose(cycle.age_s[i], state.age_s)
+    assert cycle.verdict[7] == "clamp"
+    assert cycle.joints[7] == (1, 5)
+    assert cycle.reason[8] == ""
+    assert record.pose.links_m.shape == (120, 17, 3)
+    assert np.isnan(record.pose.links_m[1::2]).all()
+    assert record.pose.links_m[4, 16, 2] == pytest.approx(0.4)
+    assert record.pose.rotation.shape == (120, 3, 3)
+    assert np.isnan(record.pose.speed_m_s).all()
+    assert record.walk.state.tolist() == [0, 40, 80]
+    assert record.qpos.qpos.shape == (3, 23)
+    assert [e.kind for e in record.events] == ["start"]
+    assert [t for t, _ in record.paths] == [0.0, 1.0]
+    assert record.end_s == pytest.approx(119 * 0.02 + 0.004)
+
+
+def test_slow_rows_only_on_change(write: Write, tmp_path: Path) -> None:
+    slow = read_log(write(tmp_path / "run.mcap", 120)).slow
+    assert slow.time_s.tolist() == pytest.approx([0.004, 0.504, 1.004, 2.004])
+    assert np.isnan(slow.temperature_c[0]).all()
+    assert slow.temperature_c[1:, 0].tolist() == [30.0, 31.0, 32.0]
+
+
+def test_the_header_says_what_ran(write: Write, tmp_path: Path) -> None:
+    header = read_log(write(tmp_path / "run.mcap", 1)).header
+    run, robot, world = load_run("flat-square"), load_robot("yaw16"), load_world("flat")
+    assert (header.run, header.robot, header.world) == (run, robot, world)
+    assert header.config_hash == digest(run, robot, world)
+    assert header.backend == "sim"
+    assert header.plan.states == {"recorded": 40, "random": 160}
+    assert np.isnan(header.plan.predicted_speed_m_s)
+    assert header.plan.waypoints_m.shape == (4, 2)
+
+
+def test_the_ground_is_thinned_in_place(write: Write, tmp_path: Path) -> None:
+    ground = read_log(write(tmp_path / "run.mcap", 1)).header.ground
+    assert ground is not None
+    assert ground.z_m.shape == (150, 100)
+    assert ground.spacing_m == pytest.approx(0.04)
+    assert ground.elevation_m(-1.0, 1.0) == pytest.approx((1.0 + 3.0) / 0.02 * 1e-3)
+
+
+def test_no_rows_give_empty_tables(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with RunLog(path) as log:
+        log.config(
+            load_run("flat-square"),
+            load_robot("yaw16"),
+            load_world("flat"),
+            backend="sim",
+            plan=PlanSummary(np.zeros((2, 2)), np.zeros((1, 2)), 0.3),
+        )
+    record = read_log(path)
+    assert record.cycle.asked_rad.shape == (0, 16)
+    assert record.pose.links_m.shape == (0, 17, 3)
+    assert record.end_s == 0.0
+    assert record.header.ground is None
+
+
+def test_same_run_same_bytes(write: Write, tmp_path: Path) -> None:
+    first = write(tmp_path / "a" / "run.mcap", 130).read_bytes()
+    assert first == write(tmp_path / "b" / "run.mcap", 130).read_bytes()
+
+
+def test_other_readers_see_schemas_and_the_injected_time(write: Write, tmp_path: Path) -> None:
+    with write(tmp_path / "run.mcap", 60).open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert {c.topic for c in summary.channels.values()} == set(TOPICS)
+        for schema, channel, message in reader.iter_messages():
+            assert schema is not None
+            assert schema.encoding == "jsonschema"
+            assert channel.message_encoding == "json"
+            said = json.loads(schema.data)["properties"]
+            row = json.loads(message.data, parse_constant=pytest.fail)
+            assert set(row) == set(said)
+            if "time_s" in row:
+                assert message.log_time == round(row["time_s"] * 1e9)
+
+
+def test_nan_in_a_command_is_kept_as_unknown(
+    state_of: Callable[[int], JointState], tmp_path: Path
+) -> None:
+    asked = np.zeros(16)
+    asked[2], asked[5] = np.nan, np.inf
+    with RunLog(tmp_path / "run.mcap") as log:
+        log.config(
+            load_run("flat-square"),
+            load_robot("yaw16"),
+            load_world("flat"),
+            backend="sim",
+            plan=PlanSummary(np.zeros((2, 2)), np.zeros((1, 2)), 0.3),
+        )
+        log.cycle(0.0, asked, np.zeros(16), state_of(0), deadline_s=0.0, lateness_s=0.0)
+    row = read_log(tmp_path / "run.mcap").cycle.asked_rad[0]
+    assert np.flatnonzero(np.isnan(row)).tolist() == [2, 5]
+
+
+def test_a_run_that_fails_still_closes_its_log(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+
+    def fail() -> None:
+        with RunLog(path) as log:
+            log.event(0.0, "start", "torque on")
+            assert part_path(path).is_file()
+            assert not path.exists()
+            raise RuntimeError("servo 4")
+
+    with pytest.raises(RuntimeError, match="servo 4"):
+        fail()
+    assert not part_path(path).exists()
+    assert path.is_file()
+
+
+def test_reading_says_what_is_wrong(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="No such file"):
+        read_log(tmp_path / "no.mcap")
+    (tmp_path / "no.mcap.part").write_bytes(b"x")
+    with pytest.raises(LogError, match=r"killed left .*no\.mcap\.part"):
+        read_log(tmp_path / "no.mcap")
+    (tmp_path / "text.mcap").write_text("a diary")
+    with pytest.raises(LogError, match="not an MCAP"):
+        read_log(tmp_path / "text.mcap")

@@ -1,0 +1,100 @@
+"""Slower before a servo trips: by heat, current and supply; never standing still, and told once."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from snakewalk.config.run import SafetyConfig
+from snakewalk.controller.runtime.derating import LEAST, Derating, allowed
+from snakewalk.drivers.types import JointState
+
+SAFETY = SafetyConfig()
+J = 4
+
+
+def state(celsius: float = 30.0, volts: float = 12.0, amps: float = 0.3) -> JointState:
+    cool = np.array([30.0, celsius, 30.0, 30.0])
+    return JointState(
+        time_s=0.0,
+        position_rad=np.zeros(J),
+        velocity_rad_s=np.zeros(J),
+        current_a=np.array([0.1, -amps, 0.1, 0.1]),
+        temperature_c=cool,
+        voltage_v=np.full(J, volts),
+        hardware_error=np.zeros(J, np.uint8),
+        error=np.zeros(J, np.uint8),
+        age_s=np.zeros(J),
+        valid=np.ones(J, bool),
+    )
+
+
+def rate(found: JointState) -> float:
+    return allowed(found, np.abs(found.current_a), SAFETY).rate
+
+
+def test_a_cool_robot_on_a_good_supply_runs_at_full_rate() -> None:
+    assert allowed(state(), np.full(J, 0.3), SAFETY).reason == ""
+    assert rate(state()) == 1.0
+
+
+def test_what_was_not_read_yet_limits_nothing() -> None:
+    unknown = state()._replace(temperature_c=np.full(J, np.nan), voltage_v=np.full(J, np.nan))
+    assert rate(unknown) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("found", "reason"),
+    [
+        (state(celsius=66.0), "joint 2 at 66 C, limit 70 C"),
+        (state(amps=1.8), "joint 2 at 1.80 A, limit 2.00 A"),
+        (state(volts=10.5), "joint 1 at 10.5 V, limit 10.0 V"),
+    ],
+)
+def test_near_a_limit_it_slows_down_and_names_joint_value_and_limit(
+    found: JointState, reason: str
+) -> None:
+    now = allowed(found, np.abs(found.current_a), SAFETY)
+    assert LEAST < now.rate < 1.0
+    assert now.reason == reason
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    a=st.floats(20.0, 90.0), b=st.floats(20.0, 90.0),
+    u=st.floats(0.0, 3.0), v=st.floats(0.0, 3.0),
+    p=st.floats(8.0, 15.0), q=st.floats(8.0, 15.0),
+)  # fmt: skip
+def test_worse_is_never_faster(a: float, b: float, u: float, v: float, p: float, q: float) -> None:
+    good = state(min(a, b), max(p, q), min(u, v))
+    bad = state(max(a, b), min(p, q), max(u, v))
+    assert LEAST <= rate(bad) <= rate(good) <= 1.0
+
+
+def test_before_every_limit_the_least_rate_is_reached() -> None:
+    assert rate(state(celsius=68.5)) == LEAST
+    assert rate(state(amps=1.97)) == LEAST
+    assert rate(state(volts=10.15)) == LEAST
+
+
+def test_it_says_once_that_it_slows_and_once_that_it_is_back() -> None:
+    derating = Derating(SAFETY)
+    hot, cool = state(celsius=67.0), state()
+    said = []
+    for found, seconds in ((hot, 3.0), (cool, 60.0)):
+        before = derating.rate
+        for _ in range(int(seconds / 0.02)):
+            now = derating.update(found, 0.02)
+            assert abs(now - before) < 0.05, "the rate itself has no step"
+            before = now
+        said += derating.news()
+    assert said == ["slowing down: joint 2 at 67 C, limit 70 C", "at full rate again"]
+    assert derating.rate == 1.0
+    assert derating.least < 0.5
+
+
+def test_a_peak_of_current_shorter_than_the_average_is_no_load() -> None:
+    derating = Derating(SAFETY)
+    for k in range(200):
+        derating.update(state(amps=2.2 if k % 50 == 0 else 0.5), 0.02)
+    assert derating.least == 1.0

@@ -1,0 +1,200 @@
+"""The planner: plain on flat ground, around hills, held to its limits, clear when it cannot."""
+
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.ground import build_ground
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.loader import load_run, load_world, shipped
+from snakewalk.config.world import PlannerConfig
+from snakewalk.controller.terrain.bends import sharpest_bend, widen
+from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.terrain.planner import TerrainPlanner, straighten
+from snakewalk.controller.terrain.summary import path_relief, slopes_rad
+
+CONFIG = PlannerConfig()
+POINTS = np.array([(-1.5, -0.3), (0.2, 0.4), (1.4, -0.2)])
+
+
+def field(of, half=2.0, spacing=0.05) -> HeightField:
+    x = np.linspace(-half, half, round(2 * half / spacing) + 1)
+    return HeightField(
+        np.asarray(of(*np.meshgrid(x, x)), float) + np.zeros((len(x),) * 2), spacing, -half, -half
+    )
+
+
+def hill(x, y):
+    return 0.4 * np.exp(-(x**2 + (y - 0.2) ** 2) / (2 * 0.3**2))
+
+
+def ridge(x, y):
+    """Across the whole world."""
+    return 0.4 * np.exp(-(x**2) / (2 * 0.2**2)) + 0.0 * y
+
+
+def looked_at(path: SplinePath) -> np.ndarray:
+    return path.position(np.arange(0.0, path.length_m, 0.01))
+
+
+@pytest.mark.parametrize("ground", [None, field(lambda x, y: 0.0 * x)], ids=["floor", "level"])
+def test_on_level_ground_it_is_the_plain_spline(ground: HeightField | None) -> None:
+    planner = TerrainPlanner(ground, CONFIG)
+    for path in (planner(POINTS), planner.plan(POINTS)):
+        np.testing.assert_allclose(looked_at(path), looked_at(SplinePath(POINTS)), atol=1e-12)
+    relief = path_relief(planner, planner(POINTS))
+    assert relief.max_slope_rad == pytest.approx(0.0, abs=1e-6)
+    assert relief.safe_node_share == 1.0
+
+
+def test_on_level_ground_variance_ties_and_length_decides() -> None:
+    graph = TerrainPlanner(field(lambda x, y: 0.0 * x), CONFIG).graph
+    assert graph is not None
+    a, b = graph.nearest(np.array([-1.5, -1.5])), graph.nearest(np.array([1.5, 0.0]))
+    way = graph.way(a, b)
+    length = np.hypot(*np.diff(way, axis=0).T).sum()
+    assert length <= 1.03 * np.hypot(*(way[-1] - way[0]))  # the grid's own error; 16 neighbours
+    assert len(straighten(way, graph)) == 2
+
+
+def test_a_hill_is_gone_around_by_the_shorter_side() -> None:
+    planner = TerrainPlanner(field(hill), CONFIG)
+    ends = np.array([(-1.5, 0.0), (1.5, 0.0)])
+    path = planner.plan(ends)
+    assert not planner.relief.safe(*SplinePath(ends).position(1.5))
+    at = looked_at(path)
+    assert planner.relief.safe(*at.T).all()
+    assert at[:, 1].min() < -0.3  # the hill's centre lies to the left of the straight way
+    assert at[:, 1].max() < 0.2
+    assert path.length_m < 4.0
+    np.testing.assert_allclose(path.position([0.0, path.length_m]), ends, atol=1e-9)
+
+
+def test_a_path_passes_through_every_waypoint() -> None:
+    planner = TerrainPlanner(field(hill), CONFIG)
+    points = np.array([(-1.5, 0.2), (0.0, -1.2), (1.5, 0.2), (0.0, 1.5)])
+    at = looked_at(planner.plan(points))
+    nearest = [int(np.argmin(np.hypot(*(at - point).T))) for point in points]
+    assert nearest == sorted(nearest)
+    np.testing.assert_allclose(at[nearest], points, atol=0.011)
+
+
+def test_a_blocked_pair_is_named() -> None:
+    planner = TerrainPlanner(field(ridge), CONFIG)
+    points = [(-1.5, 0.0), (-1.5, 1.0), (1.5, 1.0)]
+    for ask in (planner, planner.plan):
+        with pytest.raises(InputError) as error:
+            ask(points)
+        (line,) = error.value.faults
+        assert line.startswith("waypoint 2 (1.50, 1.00) cannot be reached from waypoint 1 (-1.50, ")
+        assert "slope of 20.1 deg" in line
+
+
+def test_the_spline_is_checked_again_and_held_to_the_polygon() -> None:
+    # a corridor with a sharp bend: the polygon is safe, the plain cubic through its corners is not
+    def corridor(x, y):
+        free = (abs(x) < 0.5) & (y < 1.0) | (abs(y - 0.6) < 0.4) & (x > -0.5)
+        return np.where(free, 0.0, 0.5)
+
+    config = PlannerConfig(
+        variance_window_m=0.1, slope_window_m=0.1, node_spacing_m=0.1, edge_margin_m=0.1
+    )
+    planner = TerrainPlanner(field(corridor), config)
+    points = np.array([(0.0, -1.7), (0.33, 0.85), (1.7, 0.35)])
+    corners = planner._polygon(points, planner.graph)
+    assert not planner.relief.safe(*looked_at(SplinePath(corners)).T).all()
+    assert planner.relief.safe(*looked_at(planner.plan(points)).T).all()
+
+
+def test_bad_places_are_named_with_the_nearest_safe_one() -> None:
+    planner = TerrainPlanner(field(hill), CONFIG)
+    with pytest.raises(InputError) as error:
+        planner.plan([(-1.9, 0.0), (5.0, 0.0), (0.3, 0.2), (1.5, 0.0)])
+    start, outside, steep = error.value.faults
+    assert start.startswith("start (-1.90, 0.00) is within 0.3 m of the world's border")
+    assert outside.startswith("waypoint 1 (5.00, 0.00) is outside the world, 4.0 m by 4.0 m")
+    assert "waypoint 2 (0.30, 0.20) is on unsafe ground: slope 3" in steep
+    x, y = (float(number) for number in steep.rsplit("(", 1)[1].strip(")").split(","))
+    assert planner.relief.safe(x, y)
+    assert np.hypot(x - 0.3, y - 0.2) < 1.0
+
+
+@pytest.mark.parametrize("head", [(-1.95, 0.3), (-2.4, 0.0), (-0.1, 0.1)])
+def test_a_path_is_laid_again_from_wherever_the_head_is(head: tuple[float, float]) -> None:
+    planner = TerrainPlanner(field(hill), CONFIG)
+    goal = (1.5, 0.0)
+    with pytest.raises(InputError, match="start"):
+        planner.plan([head, goal])
+    path = planner([head, goal])
+    np.testing.assert_allclose(path.position([0.0, path.length_m]), [head, goal], atol=1e-9)
+    safe = planner.relief.safe(*looked_at(path).T)
+    first = int(np.argmax(safe))
+    assert first * 0.01 < 1.3  # straight out of the bad place
+    assert safe[first + 2 :].all()
+
+
+def test_it_is_deterministic_and_forgets_nothing() -> None:
+    ground = field(hill)
+    points = [(-1.5, 0.0), (1.5, 0.0), (0.0, 1.5)]
+    planner = TerrainPlanner(ground, CONFIG)
+    first = looked_at(planner(points))
+    planner([(0.5, -1.0), (0.0, 1.5)])
+    np.testing.assert_array_equal(looked_at(planner(points)), first)
+    np.testing.assert_array_equal(looked_at(TerrainPlanner(ground, CONFIG)(points)), first)
+
+
+def test_no_safe_ground_at_all_is_said() -> None:
+    planner = TerrainPlanner(field(lambda x, y: x), CONFIG)
+    with pytest.raises(InputError, match="no safe ground at all"):
+        planner([(0, 0), (1, 1)])
+
+
+def test_sharpest_bend_of_a_circle_is_its_radius() -> None:
+    turn = np.linspace(0.0, 1.5 * np.pi, 300)  # many: a natural end disturbs the first few
+    circle = SplinePath(0.7 * np.stack([np.cos(turn), np.sin(turn)], axis=1))
+    assert sharpest_bend(circle)[0] == pytest.approx(0.7, rel=0.05)
+    assert sharpest_bend(SplinePath([(0, 0), (1, 2)]))[0] > 1e3
+
+
+def test_widening_keeps_what_is_fixed_and_what_is_safe() -> None:
+    points = np.array([(0.0, 0.0), (1.0, 0.0), (1.1, 0.15), (1.0, 0.3), (2.0, 1.0)])
+    free = np.array([False, True, True, True, False])
+    before = sharpest_bend(SplinePath(points))[0]
+    wide = widen(points, free, 0.4, lambda path: True)
+    assert sharpest_bend(wide)[0] >= 0.4 > before
+    np.testing.assert_allclose(wide.position([0.0, wide.length_m]), points[[0, -1]], atol=1e-9)
+    same = widen(points, free, 0.4, lambda path: False)
+    np.testing.assert_array_equal(looked_at(same), looked_at(SplinePath(points)))
+
+
+@pytest.mark.parametrize(
+    ("run", "least_deg", "most_deg", "bends"),
+    [
+        ("jacksboro-traverse", 2.0, 8.0, False),
+        ("jacksboro-around", 4.0, 8.0, True),
+        ("jacksboro-steep", 12.0, 17.0, True),
+    ],
+)
+def test_shipped_runs_on_the_real_model(
+    run: str, least_deg: float, most_deg: float, bends: bool
+) -> None:
+    pytest.importorskip("matplotlib")
+    assert run in shipped("runs")
+    given = load_run(run)
+    world = load_world(given.world)
+    planner = TerrainPlanner(build_ground(world), world.planner)
+    points = np.vstack([given.start_m, given.waypoints_m])
+    path = planner.plan(points)
+    relief = path_relief(planner, path)
+    assert least_deg < np.degrees(relief.median_slope_rad) <= most_deg
+    assert least_deg < np.degrees(relief.median_surface_slope_rad) <= most_deg
+    assert slopes_rad(planner, path).max() <= world.planner.slope_limit_rad
+    assert relief.world_median_slope_rad > relief.median_slope_rad
+    assert relief.min_radius_m >= world.planner.bend_radius_m
+    assert 5.0 < relief.length_m < 7.0
+    plain = SplinePath(points)
+    assert (slopes_rad(planner, plain).max() > world.planner.slope_limit_rad) == bends
+    # the body lies behind the head at the start
+    heading = path.heading_rad(0.05)
+    behind = points[0] - np.linspace(0, 1.25, 30)[:, None] * [np.cos(heading), np.sin(heading)]
+    assert planner.relief.safe(*behind.T).all()

@@ -1,0 +1,67 @@
+"""Windowed variance and slope: closed forms on a plane, up to the border; brute force agrees."""
+
+import numpy as np
+import pytest
+
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.world import PlannerConfig
+from snakewalk.controller.terrain.relief import Relief, elevation_variance_m2, fitted_slope_rad
+
+SPACING = 0.05
+
+
+def field(of, half=1.5) -> HeightField:
+    count = round(2 * half / SPACING) + 1
+    x = np.linspace(-half, half, count)
+    xx, yy = np.meshgrid(x, x)
+    return HeightField(np.asarray(of(xx, yy), float), SPACING, -half, -half)
+
+
+def test_a_plane_has_its_own_slope_even_at_the_corners() -> None:
+    ground = field(lambda x, y: 0.3 * x - 0.2 * y + 7.0)
+    slope = fitted_slope_rad(ground, 0.2)
+    np.testing.assert_allclose(slope, np.arctan(np.hypot(0.3, 0.2)), atol=1e-9)
+
+
+def test_variance_of_a_plane_is_the_quarter_of_rise_over_the_radius_squared() -> None:
+    ground = field(lambda x, y: 0.3 * x + 0.4 * y)
+    inside = elevation_variance_m2(ground, 0.5)[15:-15, 15:-15]
+    np.testing.assert_allclose(inside, 0.25 * 0.5**2 / 4, rtol=0.05)  # a disc of samples
+    assert np.ptp(inside) < 1e-12
+
+
+def test_windows_are_cut_at_the_border_as_brute_force_cuts_them() -> None:
+    rng = np.random.default_rng(3)
+    ground = HeightField(rng.normal(100.0, 0.1, (21, 17)), SPACING, 0.0, 0.0)
+    variance, slope = elevation_variance_m2(ground, 0.17), fitted_slope_rad(ground, 0.17)
+    yy, xx = np.mgrid[:21, :17] * SPACING
+    for row, column in ((0, 0), (20, 16), (0, 9), (10, 8), (3, 15)):
+        near = np.hypot(xx - xx[row, column], yy - yy[row, column]) <= 0.17 + 1e-9
+        z = ground.z_m[near]
+        plane = np.linalg.lstsq(
+            np.stack([xx[near], yy[near], np.ones(near.sum())], axis=1), z, rcond=None
+        )[0]
+        assert variance[row, column] == pytest.approx(z.var())
+        assert slope[row, column] == pytest.approx(np.arctan(np.hypot(*plane[:2])))
+
+
+def test_a_window_bridges_a_ripple_that_the_surface_shows() -> None:
+    ground = field(lambda x, y: 0.01 * np.sin(2 * np.pi * x / 0.2))
+    wide = fitted_slope_rad(ground, 0.4)[20:-20, 20:-20]
+    assert wide.max() < 0.1 * ground.slope_rad(*np.meshgrid(*[np.linspace(-1, 1, 400)] * 2)).max()
+
+
+def test_risk_keeps_both_limits_and_the_margin() -> None:
+    config = PlannerConfig(
+        slope_limit_rad=0.2, variance_limit_m2=1e-3, edge_margin_m=0.4, slope_window_m=0.15
+    )
+    relief = Relief(field(lambda x, y: 0.15 * x**2), config)
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(-1.6, 1.6, (2, 4000))
+    safe = relief.safe(x, y)
+    assert 0.2 < safe.mean() < 0.8
+    assert (relief.slope_rad(x, y)[safe] <= 0.2).all()
+    assert (relief.variance_m2(x, y)[safe] <= 1e-3).all()
+    assert (np.maximum(abs(x), abs(y))[safe] <= 1.1 + 1e-6).all()
+    assert relief.safe(0.0, 1.1)
+    assert not relief.safe(0.0, 1.11)

@@ -1,0 +1,54 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from snakewalk.drivers.bus.budget import wire_budget
+from snakewalk.drivers.bus.group_read import GroupQuestion
+from snakewalk.drivers.bus.group_write import GroupWrite
+from snakewalk.drivers.errors import BudgetError
+
+
+@pytest.mark.parametrize(  # measured with 16 XM430
+    ("baud", "fast", "cycle_ms"),
+    [(1_000_000, False, 4.60), (1_000_000, True, 3.56), (4_000_000, False, 1.15),
+     (4_000_000, True, 0.89)],
+)  # fmt: skip
+def test_the_measured_wire_limits(baud: int, fast: bool, cycle_ms: float) -> None:
+    assert wire_budget(16, baud, fast=fast).cycle_s * 1e3 == pytest.approx(cycle_ms, abs=1e-9)
+
+
+@given(st.integers(1, 64), st.booleans(), st.integers(1, 30))
+def test_bytes_are_those_that_the_codec_sends_and_awaits(n: int, fast: bool, length: int) -> None:
+    ids = range(1, n + 1)
+    question = GroupQuestion(ids, 126, length, fast=fast)
+    budget = wire_budget(n, 1_000_000, fast=fast, read_bytes=length)
+    assert budget.write_bytes == len(GroupWrite(ids, 116).encode(np.zeros(n, np.int32)))
+    assert budget.request_bytes == len(question.request)
+    assert budget.answer_bytes == question.answer_bytes
+
+
+def test_a_rate_above_the_limit_is_refused_with_the_limit() -> None:
+    budget = wire_budget(16, 1_000_000, fast=False)
+    budget.check(217.3)
+    with pytest.raises(BudgetError, match=r"250 Hz.*4\.60 ms.*at most 217 Hz.*fast sync read"):
+        budget.check(250.0)
+
+
+def test_return_delays_count_for_each_answer() -> None:
+    plain = wire_budget(16, 1_000_000, fast=False, return_delay_s=500e-6)
+    fast = wire_budget(16, 1_000_000, fast=True, return_delay_s=500e-6)
+    assert plain.cycle_s == pytest.approx(4.60e-3 + 8e-3)
+    assert fast.cycle_s == pytest.approx(3.56e-3 + 0.5e-3)
+
+
+def test_the_slow_round_is_a_second_read_in_the_longest_cycle() -> None:
+    both = wire_budget(16, 1_000_000, fast=True, slow_read_bytes=3)
+    assert both.total_bytes == 356 + (14 + 16) + 8 + 16 * (4 + 3)
+    assert both.share(50.0) == pytest.approx(50.0 * 5.06e-3)
+
+
+def test_reading_alone_sends_no_goals() -> None:
+    assert wire_budget(3, 57_600, fast=False, goal_bytes=0).write_bytes == 0
+    with pytest.raises(ValueError, match="at least one servo"):
+        wire_budget(0, 1_000_000, fast=True)

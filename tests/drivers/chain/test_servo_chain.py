@@ -1,0 +1,252 @@
+"""Start-up order, faults at start, held values and the slow round of the chain."""
+
+import numpy as np
+import pytest
+
+from snakewalk.config.robot import RobotConfig, ServoConfig
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.chain.start_up import inspect
+from snakewalk.drivers.errors import BusError, ChainError
+from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
+from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.types import JointCommand
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+
+ROBOT = RobotConfig(
+    name="four",
+    joint_axes="ypyp",
+    servo=ServoConfig(position_p_gain=800, pitch_p_gain=640, pitch_current_limit_a=0.6),
+)
+STEP_RAD = 2 * np.pi / 4096
+START = [0.3, -0.2, 0.1, 0.0]
+
+
+class Recorder(SimLine):
+    """A simulated line that keeps the instructions it hears."""
+
+    def __init__(self, bank: ServoBank, start_rad: list[float]) -> None:
+        super().__init__(bank, BenchPlant(len(bank), start_rad=start_rad))
+        self.heard: list[InstructionPacket] = []
+
+    def write(self, data: bytes) -> None:
+        self.heard.extend(PacketReader().feed(data))  # type: ignore[arg-type]
+        super().write(data)
+
+    def writePort(self, packet: bytes | list[int]) -> int:
+        self.heard.extend(PacketReader().feed(bytes(packet)))  # type: ignore[arg-type]
+        return super().writePort(packet)
+
+    def writes(self) -> list[tuple[int, int, bytes]]:
+        """(address, servo, data) of all writes, group ones taken apart, in order."""
+        found = []
+        for packet in self.heard:
+            params = packet.params
+            address = int.from_bytes(params[:2], "little")
+            if packet.instruction == Instruction.WRITE:
+                found.append((address, packet.servo_id, params[2:]))
+            elif packet.instruction == Instruction.SYNC_WRITE:
+                size = int.from_bytes(params[2:4], "little") + 1
+                entries = (params[k : k + size] for k in range(4, len(params), size))
+                found += [(address, entry[0], entry[1:]) for entry in entries]
+        return found
+
+
+@pytest.fixture
+def line() -> Recorder:
+    return Recorder(ServoBank(ROBOT.servo_ids), START)
+
+
+@pytest.fixture
+def chain(line: Recorder) -> ServoChain:
+    return ServoChain(DynamixelBus(line), ROBOT)
+
+
+def at(line: Recorder, address: int, servo_id: int) -> list[int]:
+    return [k for k, (a, s, _) in enumerate(line.writes()) if (a, s) == (address, servo_id)]
+
+
+def test_start_up_keeps_its_order_for_every_servo(line: Recorder, chain: ServoChain) -> None:
+    chain.enable()
+    writes = line.writes()
+    for servo_id in ROBOT.servo_ids:
+        torque_on = [k for k in at(line, 64, servo_id) if writes[k][2] == b"\x01"]
+        assert len(torque_on) == 1
+        (goal,) = at(line, 116, servo_id)
+        armed = [k for k in at(line, 98, servo_id) if writes[k][2] != b"\x00"]
+        settings = [k for a in (9, 11, 48, 52, 84) for k in at(line, a, servo_id)]
+        assert settings
+        assert max(settings) < goal < torque_on[0] < min(armed)
+
+
+def test_goal_is_the_present_pose_when_torque_comes_on(line: Recorder, chain: ServoChain) -> None:
+    state = chain.enable()
+    assert state.position_rad == pytest.approx(START, abs=STEP_RAD)
+    goals = (line.bank["Goal Position"] - 2048) * STEP_RAD
+    assert goals == pytest.approx(state.position_rad, abs=STEP_RAD)
+    line.clock.advance(0.1)
+    assert chain.read().position_rad == pytest.approx(START, abs=3 * STEP_RAD)
+
+
+def test_what_the_servos_are_set_to(line: Recorder, chain: ServoChain) -> None:
+    chain.enable()
+    bank = line.bank
+    assert bank["Operating Mode"].tolist() == [3, 5, 3, 5]
+    assert bank["Return Delay Time"].tolist() == [0] * 4
+    assert bank["Position P Gain"].tolist() == [800, 640, 800, 640]
+    assert bank["Goal Current"][[1, 3]].tolist() == [round(0.6 / 2.69e-3)] * 2
+    half = np.floor(np.array(ROBOT.limit_rad) / STEP_RAD)
+    assert (2048 - bank["Min Position Limit"]).tolist() == half.tolist()
+    assert (bank["Max Position Limit"] - 2048).tolist() == half.tolist()
+    assert bank["Bus Watchdog"].tolist() == [10] * 4
+    assert bank["Torque Enable"].tolist() == [1] * 4
+
+
+def test_all_faults_of_a_chain_at_once(line: Recorder, chain: ServoChain) -> None:
+    line.bank["ID"][1] = 77
+    line.bank["Model Number"][2] = 1030
+    line.bank["Hardware Error Status"][3] = 0b100100
+    line.setBaudRate(line.getBaudRate())  # looks the ids up again
+    with pytest.raises(ChainError) as info:
+        chain.enable()
+    text = "\n".join(info.value.faults)
+    assert "no answer from servo 2 of 1 to 4 at 1000000 baud" in text
+    assert "servo 3: is a XM430-W210, not a XM430-W350" in text
+    assert "servo 4: alarm: overheating, overload" in text
+    assert line.bank["Torque Enable"].tolist() == [0] * 4
+
+
+def test_a_pose_beyond_the_limits_is_refused() -> None:
+    line = Recorder(ServoBank(ROBOT.servo_ids), [0.0, 0.0, 1.9, 0.0])
+    with pytest.raises(ChainError, match=r"joint 2 \(servo 3\): stands at 1\.9"):
+        ServoChain(DynamixelBus(line), ROBOT).enable()
+    assert line.bank["Torque Enable"].tolist() == [0] * 4
+
+
+def test_a_current_beyond_the_servos_limit_is_refused() -> None:
+    robot = RobotConfig.model_validate(
+        {"name": "x", "joint_axes": "yp", "servo": {"pitch_current_limit_a": 5.0}}
+    )
+    line = Recorder(ServoBank([1, 2]), [0.0, 0.0])
+    with pytest.raises(ChainError, match=r"pitch_current_limit_a = 5: .* 3\.21 A"):
+        ServoChain(DynamixelBus(line), robot).enable()
+
+
+def test_old_firmware_gets_plain_reads(line: Recorder, chain: ServoChain) -> None:
+    line.bank["Firmware Version"][2] = 44
+    chain.enable()
+    line.heard.clear()
+    assert chain.read().valid.all()
+    assert not chain.fast
+    assert {p.instruction for p in line.heard} == {Instruction.SYNC_READ}
+
+
+def test_a_servo_that_stops_answering_keeps_its_value_and_ages(
+    line: Recorder, chain: ServoChain
+) -> None:
+    chain.enable()
+    before = chain.read()
+    line.bank["ID"][2] = 99
+    line.setBaudRate(line.getBaudRate())
+    for _ in range(5):
+        line.clock.advance(0.02)
+        chain.write(JointCommand(line.clock.now_s(), np.full(4, 0.25)))
+        state = chain.read()
+    assert state.valid.tolist() == [True, True, False, True]
+    assert state.position_rad[2] == before.position_rad[2]
+    assert state.age_s[2] > 0.1 > state.age_s[[0, 1, 3]].max()
+    assert state.position_rad[0] != before.position_rad[0]
+
+
+def test_an_alarm_is_read_at_once(line: Recorder, chain: ServoChain) -> None:
+    chain.enable()
+    assert chain.read().hardware_error.tolist() == [0] * 4
+    line.bank["Hardware Error Status"][1] = 0x20
+    state = chain.read()
+    assert state.error[1] & 0x80
+    assert state.hardware_error.tolist() == [0, 0x20, 0, 0]
+
+
+def test_the_slow_round_comes_every_sixteenth_read(line: Recorder, chain: ServoChain) -> None:
+    chain.enable()
+    line.heard.clear()
+    for _ in range(64):
+        state = chain.read()
+        line.clock.advance(0.01)
+        chain.write(JointCommand(line.clock.now_s(), np.zeros(4)))
+    slow = [p for p in line.heard if p.params[:2] == (144).to_bytes(2, "little")]
+    assert len(slow) == 4
+    assert state.voltage_v == pytest.approx(np.full(4, 12.0), abs=0.11)
+    assert np.isfinite(state.temperature_c).all()
+
+
+def test_states_are_snapshots(chain: ServoChain, line: Recorder) -> None:
+    first = chain.enable()
+    kept = first.position_rad.copy()
+    for _ in range(10):
+        chain.write(JointCommand(line.clock.now_s(), np.full(4, 0.5)))
+        line.clock.advance(0.02)
+        chain.read()
+    assert (first.position_rad == kept).all()
+    with pytest.raises(ValueError, match="read-only"):
+        first.position_rad[0] = 1.0
+
+
+def test_goals_are_kept_inside_the_joint_limits(chain: ServoChain, line: Recorder) -> None:
+    chain.enable()
+    chain.write(JointCommand(line.clock.now_s(), np.array([9.0, -9.0, 9.0, -9.0])))
+    chain.read()
+    goals = (line.bank["Goal Position"] - 2048) * STEP_RAD
+    assert goals == pytest.approx([1.5, -1.2, 1.5, -1.2], abs=STEP_RAD)
+
+
+def test_a_pause_longer_than_the_watchdog_is_noticed(chain: ServoChain, line: Recorder) -> None:
+    chain.enable()
+    line.clock.advance(0.3)
+    with pytest.raises(BusError, match=r"bus watchdog \(0\.2 s\) has stopped the servos"):
+        chain.write(JointCommand(line.clock.now_s(), np.zeros(4)))
+
+
+def test_disable_any_time_and_twice(chain: ServoChain, line: Recorder) -> None:
+    chain.disable()
+    chain.enable()
+    chain.disable()
+    chain.disable()
+    assert line.bank["Torque Enable"].tolist() == [0] * 4
+    assert line.bank["Bus Watchdog"].tolist() == [0] * 4
+    line.clock.advance(1.0)
+    assert chain.enable().valid.all()
+
+
+def test_disable_reaches_the_others_when_one_is_gone(chain: ServoChain, line: Recorder) -> None:
+    chain.enable()
+    line.bank["ID"][0] = 99
+    line.setBaudRate(line.getBaudRate())
+    with pytest.raises(BusError, match="servo 1: torque off is not confirmed"):
+        chain.disable()
+    assert line.bank["Torque Enable"][1:].tolist() == [0] * 3
+
+
+def test_torque_goes_off_again_when_the_start_fails_half_way(
+    chain: ServoChain, line: Recorder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sync_write = DynamixelBus.sync_write
+
+    def lame(self: DynamixelBus, ids: tuple[int, ...], name: str, value: int) -> None:
+        few = ids[:2] if (name, value) == ("Torque Enable", 1) else ids
+        sync_write(self, few, name, value)
+
+    monkeypatch.setattr(DynamixelBus, "sync_write", lame)
+    with pytest.raises(BusError, match="servo 3: Torque Enable is 0 after 1"):
+        chain.enable()
+    assert line.bank["Torque Enable"].tolist() == [0] * 4
+
+
+def test_inspection_changes_nothing(line: Recorder) -> None:
+    report = inspect(DynamixelBus(line), ROBOT)
+    assert report.faults == ()
+    assert [servo.servo_id for servo in report.servos] == [1, 2, 3, 4]
+    assert report.servos[0].return_delay_s == pytest.approx(500e-6)
+    assert line.writes() == []

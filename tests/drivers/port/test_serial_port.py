@@ -1,0 +1,183 @@
+"""The serial port on a pseudo terminal; the other end is the test."""
+
+import os
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.drivers.errors import PortError
+from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.sim.line.clock import SimClock
+
+
+@pytest.fixture
+def pair() -> Iterator[tuple[int, SerialPort]]:
+    master, slave = os.openpty()
+    with SerialPort(os.ttyname(slave), 57_600) as port:
+        yield master, port
+    os.close(master)
+    os.close(slave)
+
+
+def test_bytes_go_both_ways(pair: tuple[int, SerialPort]) -> None:
+    master, port = pair
+    port.write(b"\xff\xff\xfd\x00")
+    assert os.read(master, 10) == b"\xff\xff\xfd\x00"
+    os.write(master, b"abcdef")
+    far = port.clock.now_s() + 5.0
+    assert port.read_until(4, far) == b"abcd"
+    assert port.getBytesAvailable() == 2
+    assert port.readPort(10) == b"ef"
+
+
+def test_a_deadline_returns_what_came(pair: tuple[int, SerialPort]) -> None:
+    master, port = pair
+    os.write(master, b"ab")
+    now = port.clock.now_s()
+    assert port.read_until(4, now + 0.01) == b"ab"
+    assert port.clock.now_s() >= now + 0.01
+    assert port.read_until(4, now) == b""
+
+
+def test_draining_and_clearing_throw_away(pair: tuple[int, SerialPort]) -> None:
+    master, port = pair
+    os.write(master, b"late answer")
+    assert port.drain_until_quiet(0.01) == len(b"late answer")
+    os.write(master, b"more")
+    port.clearPort()
+    assert port.read_until(1, port.clock.now_s()) == b""
+
+
+def test_the_sdks_timeout_runs_on_the_ports_clock() -> None:
+    master, slave = os.openpty()
+    clock = SimClock()
+    with SerialPort(os.ttyname(slave), 57_600, clock) as port:
+        port.setPacketTimeout(11)  # 11 bytes, two latency timers of 16 ms, 2 ms
+        clock.sleep_until_s(11 * 10 / 57_600 + 0.0339)
+        assert not port.isPacketTimeout()
+        clock.sleep_until_s(11 * 10 / 57_600 + 0.0341)
+        assert port.isPacketTimeout()
+    os.close(master)
+    os.close(slave)
+
+
+def test_baud_rates(pair: tuple[int, SerialPort]) -> None:
+    port = pair[1]
+    assert port.setBaudRate(1_000_000)
+    assert port.getBaudRate() == 1_000_000
+    assert not port.setBaudRate(-1)
+    assert port.getBaudRate() == 1_000_000
+
+
+def test_a_port_that_is_not_there_is_an_input_error() -> None:
+    with pytest.raises(InputError, match="/dev/ttyNOPE: no such port; there is"):
+        SerialPort("/dev/ttyNOPE")
+
+
+def test_a_file_is_no_port(tmp_path: os.PathLike[str]) -> None:
+    path = os.path.join(tmp_path, "file")
+    open(path, "w").close()
+    with pytest.raises(PortError, match="cannot be opened"):
+        SerialPort(path)
+
+
+def test_a_port_is_opened_for_one_program_alone(pair: tuple[int, SerialPort]) -> None:
+    with pytest.raises(PortError, match="another program has it open"):
+        SerialPort(pair[1].name)
+
+
+def test_a_closed_port_says_so(pair: tuple[int, SerialPort]) -> None:
+    port = pair[1]
+    port.closePort()
+    port.closePort()
+    with pytest.raises(PortError, match="is closed"):
+        port.write(b"x")
+    assert port.openPort()
+    port.write(b"x")
+
+
+@pytest.mark.parametrize("call", ["write", "read", "ask", "clear", "waiting"])
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_port_that_vanishes_is_a_port_error(call: str, compiled: bool) -> None:
+    master, slave = os.openpty()
+    port = SerialPort(os.ttyname(slave), 57_600)
+    os.close(slave)
+    os.close(master)
+    if not compiled:
+        port._exchange = None
+    calls = {
+        "write": lambda: port.write(b"x"),
+        "read": lambda: port.read_until(1, 0.0),
+        "ask": lambda: port.ask(b"x", 1, 1.0),
+        "clear": port.clearPort,
+        "waiting": port.getBytesAvailable,
+    }
+    port.is_using = True
+    with pytest.raises(PortError, match="the port is gone"):
+        calls[call]()
+    assert not port.is_using
+    port.closePort()
+
+
+@pytest.fixture(params=[True, False], ids=["compiled", "python"])
+def asking(pair: tuple[int, SerialPort], request: pytest.FixtureRequest) -> tuple[int, SerialPort]:
+    if not request.param:
+        pair[1]._exchange = None
+    elif pair[1]._exchange is None:
+        pytest.skip("numba is not installed")
+    return pair
+
+
+def servo(master: int, request: bytes, *answers: bytes) -> threading.Thread:
+    """Answers piece by piece once the whole request is there."""
+
+    def serve() -> None:
+        heard = b""
+        while len(heard) < len(request):
+            heard += os.read(master, 4096)
+        for answer in answers if heard == request else ():
+            os.write(master, answer)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    return thread
+
+
+def test_an_exchange_forgets_what_came_before_it(asking: tuple[int, SerialPort]) -> None:
+    master, port = asking
+    os.write(master, b"an older answer")
+    thread = servo(master, b"question", b"a" * 100, b"b" * 64, b"c" * 64, b"d" * 72)
+    whole = b"a" * 100 + b"b" * 64 + b"c" * 64 + b"d" * 72
+    assert port.ask(b"question", 300, 5.0) == whole
+    thread.join()
+
+
+def test_an_exchange_ends_at_its_deadline_with_what_came(asking: tuple[int, SerialPort]) -> None:
+    master, port = asking
+    thread = servo(master, b"question", b"short")
+    now = port.clock.now_s()
+    assert port.ask(b"question", 300, 0.2) == b"short"
+    assert port.clock.now_s() >= now + 0.2
+    thread.join()
+
+
+def test_an_exchange_takes_no_more_than_it_asked_for(asking: tuple[int, SerialPort]) -> None:
+    master, port = asking
+    thread = servo(master, b"question", b"answer and more")
+    assert port.ask(b"question", 6, 5.0) == b"answer"
+    assert port.read_until(9, port.clock.now_s() + 5.0) == b" and more"
+    thread.join()
+
+
+def test_a_question_longer_than_the_devices_buffer(asking: tuple[int, SerialPort]) -> None:
+    master, port = asking
+    question = bytes(range(256)) * 80
+    thread = servo(master, question, b"answer")
+    assert port.ask(question, 6, 5.0) == b"answer"
+    thread.join()
+
+
+def test_no_latency_timer_on_a_pseudo_terminal(pair: tuple[int, SerialPort]) -> None:
+    assert pair[1].latency_timer_ms is None

@@ -1,0 +1,295 @@
+"""A line or a servo that goes away in the middle of a run: hold, verify, and go on or not."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from snakewalk.config.robot import RobotConfig, ServoConfig
+from snakewalk.config.run import SafetyConfig
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.errors import ChainError, PortError, SafetyTrippedError
+from snakewalk.drivers.safety.recovery import Policy, Recovery
+from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.vet import SafetyLimits
+from snakewalk.drivers.types import JointCommand
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+
+ROBOT = RobotConfig(
+    name="four",
+    joint_axes="ypyp",
+    servo=ServoConfig(pitch_p_gain=800, pitch_current_limit_a=0.6),
+)
+PERIOD_S = 0.02
+WATCHDOG_S = 0.2
+
+
+class LooseLine(SimLine):
+    """A line whose plug can be pulled until a time."""
+
+    back_s = 0.0
+
+    def pull(self, seconds: float) -> None:
+        self.back_s = self.clock.now_s() + seconds
+        self.closePort()
+
+    def openPort(self) -> bool:
+        if self.clock.now_s() < self.back_s:
+            raise PortError("plug: no such port")
+        return super().openPort()
+
+
+class Rig:
+    """A chain that is asked to swing, and everything that can be known about it."""
+
+    def __init__(self, policy: Policy, confirm: Callable[[str], bool] | None = None) -> None:
+        self.line = LooseLine(ServoBank(ROBOT.servo_ids), BenchPlant(4, start_rad=0.1))
+        self.chain = ServoChain(DynamixelBus(self.line), ROBOT, watchdog_s=WATCHDOG_S)
+        self.said: list[str] = []
+        recovery = Recovery(
+            self.chain, self.line, policy=policy, confirm=confirm, say=self.said.append
+        )
+        limits = SafetyLimits.from_config(ROBOT, SafetyConfig())
+        self.link = SafeLink(self.chain, limits, self.line.clock, recovery)
+        self.link.enable()
+        self.goal = 0.1
+
+    @property
+    def position(self) -> np.ndarray:
+        self.line.settle()
+        return self.line.firmware.plant.position_rad.copy()
+
+    def settled(self, seconds: float = 1.0) -> np.ndarray:
+        """Let time pass without a word."""
+        self.line.clock.advance(seconds)
+        return self.position
+
+    def cycles(self, count: int, speed_rad_s: float = 0.5) -> None:
+        clock = self.line.clock
+        for _ in range(count):
+            next_s = clock.now_s() + PERIOD_S
+            self.goal += speed_rad_s * PERIOD_S
+            self.link.read()
+            self.link.write(JointCommand(clock.now_s(), np.full(4, self.goal)))
+            clock.sleep_until_s(next_s)
+
+    def torque(self) -> list[int]:
+        return self.line.bank["Torque Enable"].tolist()
+
+    def limp(self, register: str, servo: int, value: int) -> None:
+        """Reboot a servo and change a register."""
+        self.line.firmware.reboot(servo)
+        self.alter(register, servo, value)
+
+    def turn(self, servo: int) -> None:
+        """Reboot a servo and turn its shaft once around by hand."""
+        self.line.firmware.reboot(servo)
+        self.line.firmware.plant.position_rad[servo] += 2.0 * np.pi
+
+    def alter(self, register: str, servo: int, value: int) -> None:
+        self.line.bank[register][servo] = value
+        self.line.setBaudRate(self.line.getBaudRate())
+        self.line.firmware.changed()
+
+
+@pytest.fixture
+def rig() -> Rig:
+    made = Rig("resume")
+    made.cycles(30)
+    return made
+
+
+def test_a_vanished_port_that_returns(rig: Rig) -> None:
+    before = rig.position
+    rig.line.pull(1.5)
+    rig.link.read()  # blocks, in simulated time, until the plug is back
+    held = rig.position
+    assert rig.line.clock.now_s() > rig.line.back_s
+    assert np.abs(held - before).max() < 0.15  # ran on for one watchdog time at most
+    assert rig.torque() == [1] * 4
+    assert rig.link.recoveries == 1
+    assert rig.said[-1] == "going on from where it stands"
+    assert "moved by at most" in rig.said[1]
+    goal = rig.goal
+    rig.cycles(40)
+    assert rig.position == pytest.approx(np.full(4, goal + 0.4), abs=0.1)  # the goal is not lost
+
+
+def test_it_does_not_move_while_it_comes_back(rig: Rig) -> None:
+    rig.cycles(20, speed_rad_s=3.0)  # far ahead of the shafts: an old goal would pull
+    rig.line.pull(1.0)
+    with pytest.raises(PortError):
+        rig.chain.read()
+    held = rig.settled(1.0)
+    rig.link.read()
+    assert np.abs(rig.position - held).max() < 0.01
+    for _ in range(10):
+        rig.chain.read()
+        rig.line.clock.advance(PERIOD_S)
+    assert np.abs(rig.position - held).max() < 0.01
+
+
+def test_the_first_command_afterwards_starts_where_it_stands(rig: Rig) -> None:
+    rig.cycles(20, speed_rad_s=3.0)
+    rig.line.pull(1.0)
+    rig.link.read()
+    held = rig.position
+    rig.line.clock.advance(PERIOD_S)
+    rig.link.write(JointCommand(rig.line.clock.now_s(), np.full(4, 1.0)))
+    rig.line.drain_until_quiet(1e-3)
+    goals = (rig.line.bank["Goal Position"] - 2048) * 2 * np.pi / 4096
+    assert np.abs(goals - held).max() < 4.0 * 0.04  # rate-limited from here, not from the old goal
+
+
+def test_a_servo_that_reboots_is_noticed_and_set_up_again(rig: Rig) -> None:
+    rig.line.firmware.reboot(1)
+    assert rig.torque() == [1, 0, 1, 1]
+    rig.line.bank["Goal Current"][1] = 1193  # as after power-on
+    rig.cycles(16)
+    assert rig.link.recoveries == 1
+    assert rig.said[0] == "interrupted: servo 2: torque is off: has it rebooted?; the servos hold"
+    assert rig.said[1].endswith("torque off at joint 1")
+    assert rig.torque() == [1] * 4
+    assert rig.line.bank["Goal Current"][1] == round(0.6 / 2.69e-3)
+    assert rig.line.bank["Bus Watchdog"].tolist() == [10] * 4
+
+
+def test_a_servo_that_is_away_for_a_while(rig: Rig) -> None:
+    away = iter([True] * 9)
+
+    def boot(_: bytes) -> list[bytes]:
+        if next(away, False):
+            return []
+        rig.line.tamper = None
+        rig.line.firmware.reboot(3)
+        return []
+
+    rig.line.tamper = boot
+    rig.cycles(30)
+    assert rig.link.recoveries >= 1
+    assert rig.link.tripped is None
+    assert rig.torque() == [1] * 4
+
+
+def test_a_tripped_watchdog_is_noticed_though_the_host_talks(rig: Rig) -> None:
+    rig.line.settle()
+    rig.line.bank["Bus Watchdog"][2] = 0xFF
+    rig.line.firmware.changed()
+    rig.cycles(16)
+    assert "servo 3: its bus watchdog has stopped it" in rig.said[0]
+    assert rig.line.bank["Bus Watchdog"].tolist() == [10] * 4
+
+
+def test_policy_stop_switches_torque_off_when_the_port_is_back() -> None:
+    rig = Rig("stop")
+    rig.cycles(10)
+    rig.line.pull(0.0)  # gone and back at once, under an open handle
+    with pytest.raises(SafetyTrippedError, match="the port is closed"):
+        rig.cycles(1)
+    rig.line.drain_until_quiet(1e-3)
+    assert rig.torque() == [0] * 4
+    assert rig.said == []
+
+
+@pytest.mark.parametrize("yes", [True, False])
+def test_policy_confirm_asks_with_what_was_found(yes: bool) -> None:
+    asked: list[str] = []
+    rig = Rig("confirm", confirm=lambda found: asked.append(found) or yes)
+    rig.cycles(10)
+    rig.line.pull(0.5)
+    if yes:
+        rig.cycles(5)
+    else:
+        with pytest.raises(SafetyTrippedError):
+            rig.cycles(5)
+    assert len(asked) == 1
+    assert asked[0].startswith("the same servos, moved by at most 0.0")
+    assert rig.torque() == [int(yes)] * 4
+
+
+def test_without_an_operator_confirm_means_no() -> None:
+    rig = Rig("confirm")
+    rig.line.pull(0.5)
+    with pytest.raises(SafetyTrippedError):
+        rig.cycles(1)
+    assert rig.torque() == [0] * 4
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda r: r.alter("Model Number", 1, 1030), "servo 2: is a XM430-W210"),
+        (lambda r: r.alter("Firmware Version", 2, 47), "servo 3: firmware 47, was 48: another"),
+        (lambda r: r.alter("Hardware Error Status", 0, 4), "servo 1: alarm: overheating"),
+        (lambda r: r.alter("ID", 3, 44), "no answer from servo 4"),
+        (lambda r: r.limp("Homing Offset", 0, 400), "joint 0 (servo 1): moved by +0.6"),
+        (lambda r: r.limp("Homing Offset", 1, 4096), "joint 1 (servo 2): off by +1 turns"),
+    ],
+)
+def test_what_is_not_as_it_was_does_not_go_on(
+    rig: Rig, change: Callable[[Rig], None], said: str
+) -> None:
+    rig.line.pull(0.3)
+    change(rig)
+    before = rig.position
+    with pytest.raises(SafetyTrippedError):
+        rig.cycles(1)
+    assert said in rig.said[-1]
+    assert rig.said[-1].startswith("given up: ")
+    assert rig.link.recoveries == 0
+    assert np.abs(rig.position - before).max() < 0.3  # only its own motion before the watchdog
+    assert not any(rig.torque()[k] for k in range(4) if rig.line.bank["ID"][k] < 5)
+
+
+def test_a_port_that_stays_away_is_given_up(rig: Rig) -> None:
+    start_s = rig.line.clock.now_s()
+    rig.line.pull(1e6)
+    with pytest.raises(SafetyTrippedError, match=r"torque off failed: plug: no such port"):
+        rig.link.read()
+    assert rig.line.clock.now_s() - start_s == pytest.approx(10.0, abs=0.3)
+    rig.line.settle()
+    assert (rig.line.bank["Bus Watchdog"] == 0xFF).all()  # they stopped by themselves
+
+
+def test_a_stop_button_ends_the_waiting(rig: Rig) -> None:
+    rig.line.pull(1e6)
+    rig.link.request_stop("stop button")
+    start_s = rig.line.clock.now_s()
+    with pytest.raises(SafetyTrippedError):
+        rig.link.read()
+    assert rig.said[-1] == "given up: stop button"
+    assert rig.line.clock.now_s() - start_s < 0.5
+
+
+def test_it_is_mended_three_times_and_no_more(rig: Rig) -> None:
+    for _ in range(3):
+        rig.line.pull(0.1)
+        rig.cycles(5)
+    rig.line.pull(0.1)
+    with pytest.raises(SafetyTrippedError):
+        rig.cycles(5)
+    assert rig.link.recoveries == 3
+
+
+def test_an_alarm_is_never_mended(rig: Rig) -> None:
+    rig.alter("Hardware Error Status", 1, 0x20)
+    with pytest.raises(SafetyTrippedError, match="overload"):
+        rig.cycles(3)
+    assert rig.said == []
+    assert rig.torque() == [0] * 4
+
+
+def test_a_break_while_going_on_switches_torque_off(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lame(found: object) -> None:
+        raise ChainError("servo 2: smoke")
+
+    monkeypatch.setattr(rig.chain, "resume", lame)
+    rig.line.pull(0.1)
+    with pytest.raises(SafetyTrippedError, match="while going on: servo 2: smoke"):
+        rig.cycles(1)
+    assert rig.torque() == [0] * 4

@@ -1,0 +1,104 @@
+"""Every way out of a running program, seen from the servos behind a pseudo-terminal."""
+
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snakewalk.drivers.clock import WallClock
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.serve.pty import PtyServer
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+from tests.helpers.swing_child import ROBOT, WATCHDOG_S
+
+CHILD = Path(__file__).parents[2] / "helpers" / "swing_child.py"
+PATIENCE_S = 60.0
+
+
+class Servos:
+    """Simulated servos on a pseudo-terminal, and a program that moves them."""
+
+    def __init__(self, server: PtyServer, line: SimLine, how: str) -> None:
+        self.server, self.line = server, line
+        self.child = subprocess.Popen(
+            [sys.executable, str(CHILD), server.path, how],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+        self.clock = WallClock()
+
+    def serve_until(self, done: object) -> None:
+        assert callable(done)
+        while not done():
+            assert self.clock.now_s() < PATIENCE_S, "it hangs"
+            self.server.step(0.005)
+
+    def moving(self) -> bool:
+        assert self.child.stdout is not None
+        assert self.child.poll() is None or self.said()
+        return bool(select.select([self.child.stdout], [], [], 0.0)[0])
+
+    def said(self) -> str:
+        assert self.child.stderr is not None
+        return self.child.stderr.read().decode()
+
+    def torque(self) -> list[int]:
+        return self.line.bank["Torque Enable"].tolist()
+
+
+@pytest.fixture
+def servos(request: pytest.FixtureRequest) -> Iterator[Servos]:
+    line = SimLine(ServoBank(ROBOT.servo_ids), BenchPlant(3))
+    with PtyServer(line, WallClock()) as server:
+        made = Servos(server, line, getattr(request, "param", "swing"))
+        try:
+            made.serve_until(made.moving)
+            yield made
+        finally:
+            made.child.kill()
+            made.child.communicate()
+
+
+def test_a_killed_program_leaves_servos_that_stop_within_the_watchdogs_time(
+    servos: Servos,
+) -> None:
+    line = servos.line
+    servos.child.kill()
+    servos.child.wait()
+    servos.serve_until(lambda: line.next_event_s() is None)
+    # from here on simulated time alone: no client, no wall clock
+    line.clock.advance(WATCHDOG_S + 0.02)
+    line.settle()
+    assert (line.bank["Bus Watchdog"] == 0xFF).all()
+    held = line.firmware.drive.goal_rad.copy()
+    line.clock.advance(1.0)
+    line.settle()
+    at_rest = line.firmware.plant.position_rad.copy()
+    line.clock.advance(5.0)
+    line.settle()
+    assert line.firmware.plant.position_rad == pytest.approx(at_rest, abs=1e-9)
+    assert np.abs(at_rest - held).max() < 0.1
+    assert servos.torque() == [1] * 3  # they hold, and take no goal
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_a_signal_switches_torque_off(servos: Servos, number: signal.Signals) -> None:
+    servos.child.send_signal(number)
+    servos.serve_until(lambda: servos.child.poll() is not None)
+    assert servos.torque() == [0] * 3
+    assert servos.line.bank["Bus Watchdog"].tolist() == [0] * 3
+    assert servos.child.returncode in (128 + number, -number)
+
+
+@pytest.mark.parametrize("servos", ["crash"], indirect=True)
+def test_an_exception_switches_torque_off(servos: Servos) -> None:
+    servos.serve_until(lambda: servos.child.poll() is not None)
+    assert servos.torque() == [0] * 3
+    assert servos.child.returncode == 1
+    assert "planner crashed" in servos.said()

@@ -1,0 +1,1 @@
+"""What several tests share: packets, bodies, films and ports made for them."""

@@ -1,0 +1,1 @@
+"""Independent models and drawn views with known truth: what only tests and benchmarks use."""

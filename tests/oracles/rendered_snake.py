@@ -1,0 +1,157 @@
+"""Films of a snake whose midline is known: to measure the eyes with, and to try them without one.
+
+A body bends in a travelling wave and swims in a circle; it is drawn finely, then lit, shadowed,
+blurred and made noisy as a camera would.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.controller.capture.resample import body_points, equal_arc_length
+
+_FINE = 8  # parts of a pixel's side in which bodies up to 100 px are drawn
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is filmed, and how; grey values 0 to 255."""
+
+    length_px: float = 150.0
+    rows: int = 480
+    columns: int = 640
+    slender: float = 14.0
+    """Length over greatest width."""
+    waves: float = 1.3
+    bend_rad: float = 0.9
+    """Amplitude of the tangent angle."""
+    frames: int = 120
+    rate_hz: float = 30.0
+    wave_hz: float = 0.8
+    ground: float = 170.0
+    body: float = 60.0
+    noise: float = 3.0
+    """Standard deviation of every pixel in every frame."""
+    blur_px: float = 0.8
+    light: float = 0.0
+    """How much brighter the light is in one corner than in the middle, of its strength."""
+    shadow: float = 0.0
+    """How much light the body's shadow takes away."""
+    taper: float = 0.45
+    """Part of the body over which the tail tapers."""
+    texture: float = 0.0
+    """Standard deviation of the pattern of the ground."""
+    seed: int = 0
+
+
+def true_midlines(scene: Scene) -> Floats:
+    """(T, 101, 2) x, y in pixels, head first, equal arcs; a pixel's centre is whole."""
+    s = (np.arange(400) + 0.5) / 400
+    time_s = np.arange(scene.frames) / scene.rate_hz
+    pulse = scene.wave_hz / scene.waves  # body lengths a second
+    around = min(scene.rows, scene.columns) / 2.0 - 0.3 * scene.length_px - 8.0
+    # the middle of the body runs round the image's centre, the body along that circle
+    radius = max(around, 0.3 * scene.length_px)
+    turn = 0.8 * pulse * scene.length_px / radius
+    tau = time_s[:, None] - s / pulse
+    angles = scene.bend_rad * np.sin(2.0 * np.pi * scene.wave_hz * tau) - turn * tau
+    body = body_points(angles, scene.length_px)
+    body = body - body.mean(axis=1, keepdims=True)
+    at = 0.5 * np.pi - turn * (time_s - 0.5 / pulse)
+    centre = radius * np.stack([np.cos(at), np.sin(at)], axis=1)
+    body = body + centre[:, None] + [(scene.columns - 1) / 2.0, (scene.rows - 1) / 2.0]
+    return np.stack([equal_arc_length(one, 100) for one in body])
+
+
+def film(scene: Scene) -> Iterator[Image]:
+    """The frames (H, W)."""
+    rng = np.random.default_rng(scene.seed)
+    ground = _ground(scene, rng)
+    for midline in true_midlines(scene):
+        yield _shot(scene, ground, _coverage(scene, midline), rng)
+
+
+def empty(scene: Scene) -> Image:
+    """(H, W) the same place without the animal."""
+    rng = np.random.default_rng(scene.seed)
+    ground = _ground(scene, rng)
+    return _shot(scene, ground, np.zeros_like(ground), np.random.default_rng(scene.seed + 1))
+
+
+def half_width(scene: Scene) -> Floats:
+    """(101,) px along the body: a rounded head, thickest at two fifths, a tail that tapers."""
+    s = np.linspace(0.0, 1.0, 101)
+    shape = np.sqrt(np.clip(s / 0.08, 0.0, 1.0)) * (
+        0.8 + 0.2 * np.sin(np.pi * np.minimum(s / 0.8, 1.0))
+    )
+    tail = np.clip((1.0 - s) / scene.taper, 0.0, 1.0) ** 0.8
+    return np.asarray(0.5 * scene.length_px / scene.slender * np.minimum(shape, 0.15 + 0.85 * tail))
+
+
+def _coverage(scene: Scene, midline: Floats) -> NDArray[np.float32]:
+    """(H, W) part of each pixel that the body covers."""
+    fine = _FINE if scene.length_px <= 100.0 else 3
+    side = np.gradient(midline, axis=0)
+    normal = np.stack([-side[:, 1], side[:, 0]], axis=1) / np.hypot(*side.T)[:, None]
+    wide = half_width(scene)[:, None]
+    reach = float(wide.max()) + 3.0
+    low = np.floor(midline.min(axis=0) - reach)
+    size = np.ceil(midline.max(axis=0) + reach - low).astype(int)
+    canvas = np.zeros((size[1] * fine, size[0] * fine), dtype=np.uint8)
+    left, right = midline + wide * normal, midline - wide * normal
+    for k in range(len(midline) - 1):
+        piece = np.stack([left[k], left[k + 1], right[k + 1], right[k]])
+        corners = ((piece - low + 0.5) * fine - 0.5) * 256.0
+        cv2.fillConvexPoly(canvas, np.rint(corners).astype(np.int32), 255, shift=8)
+    cv2.circle(
+        canvas,
+        tuple(int(v) for v in np.rint(((midline[-1] - low + 0.5) * fine - 0.5) * 256.0)),
+        round(float(wide[-1, 0]) * fine * 256.0),
+        255,
+        -1,
+        shift=8,
+    )
+    shrunk = cv2.resize(canvas, (int(size[0]), int(size[1])), interpolation=cv2.INTER_AREA)
+    whole = np.zeros((scene.rows, scene.columns), dtype=np.float32)
+    x, y = int(low[0]), int(low[1])
+    rows = slice(max(0, y), min(scene.rows, y + int(size[1])))
+    columns = slice(max(0, x), min(scene.columns, x + int(size[0])))
+    part = shrunk[rows.start - y : rows.stop - y, columns.start - x : columns.stop - x]
+    whole[rows, columns] = part.astype(np.float32) / 255.0
+    return whole
+
+
+def _ground(scene: Scene, rng: np.random.Generator) -> NDArray[np.float32]:
+    ground = np.full((scene.rows, scene.columns), scene.ground, dtype=np.float32)
+    if scene.texture > 0.0:
+        pattern = np.asarray(
+            cv2.GaussianBlur(rng.normal(size=ground.shape).astype(np.float32), (0, 0), 2.0)
+        )
+        ground += scene.texture * pattern / float(pattern.std())
+    return ground
+
+
+def _shot(
+    scene: Scene,
+    ground: NDArray[np.float32],
+    body: NDArray[np.float32],
+    rng: np.random.Generator,
+) -> Image:
+    lit = ground
+    if scene.shadow > 0.0:
+        away = 0.5 * scene.length_px / scene.slender
+        move = np.array([[1.0, 0.0, away], [0.0, 1.0, 0.7 * away]])
+        shade = cv2.warpAffine(body, move, (scene.columns, scene.rows))
+        lit = ground * (1.0 - scene.shadow * cv2.GaussianBlur(shade, (0, 0), 1.0 + 0.3 * away))
+    image = lit * (1.0 - body) + scene.body * body
+    if scene.light > 0.0:
+        y, x = np.mgrid[0 : scene.rows, 0 : scene.columns]
+        image = image * (1.0 + scene.light * (x / scene.columns + y / scene.rows - 1.0))
+    if scene.blur_px > 0.0:
+        image = cv2.GaussianBlur(image.astype(np.float32), (0, 0), scene.blur_px)
+    noisy = image + scene.noise * rng.standard_normal(image.shape, dtype=np.float32)
+    return np.asarray(np.clip(np.rint(noisy), 0, 255), dtype=np.uint8)

@@ -1,0 +1,62 @@
+"""The law of friction by itself: its ellipse, and how it ends at rest."""
+
+import numpy as np
+import pytest
+
+from snakewalk.sim.physics.friction import MOST_SHARE, ellipse_force, ellipse_forces, stop_drag
+
+MU = (0.1, 0.7)
+LOAD_N = 1.1
+DRAG = 33.0
+RNG = np.random.default_rng(5)
+SLIDING = RNG.normal(size=(200, 2))
+
+
+def force(v: np.ndarray) -> np.ndarray:
+    return np.array(ellipse_force(LOAD_N, v[0], v[1], *MU, DRAG, LOAD_N))
+
+
+def test_sliding_force_lies_on_the_ellipse() -> None:
+    for v in SLIDING:
+        assert np.hypot(*(force(v) / (np.array(MU) * LOAD_N))) == pytest.approx(1.0)
+
+
+def test_no_other_force_of_the_ellipse_takes_more_energy() -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 721)
+    others = LOAD_N * np.stack([MU[0] * np.cos(angle), MU[1] * np.sin(angle)], axis=1)
+    for v in SLIDING:
+        taken = -force(v) @ v
+        assert taken >= (-others @ v).max() - 1e-12
+        assert taken == pytest.approx((-others @ v).max(), rel=1e-4)
+
+
+def test_near_rest_it_is_the_drag_that_stops_a_link() -> None:
+    for v in 1e-5 * SLIDING:
+        np.testing.assert_allclose(force(v), -DRAG * v)
+
+
+def test_force_shrinks_to_nothing_without_a_jump() -> None:
+    speeds = np.linspace(0.0, 0.1, 2001)
+    for v in SLIDING[:20]:
+        way = v / np.hypot(*v)
+        forces = np.array([force(speed * way) for speed in speeds])
+        assert np.abs(np.diff(forces, axis=0)).max() < DRAG * 1.01 * speeds[1]
+    assert tuple(force(np.zeros(2))) == (0.0, 0.0)
+    assert ellipse_force(0.0, 1.0, 1.0, *MU, DRAG, 0.0) == (0.0, 0.0)
+
+
+def test_many_at_once_are_one_by_one() -> None:
+    v = np.concatenate([SLIDING, 1e-4 * SLIDING, np.zeros((1, 2))])
+    load = RNG.uniform(0.0, 3.0, len(v))
+    along, across = ellipse_forces(0.5 * load, v[:, 0], v[:, 1], *MU, DRAG, load)
+    single = [ellipse_force(0.5 * n, *each, *MU, DRAG, n) for n, each in zip(load, v, strict=True)]
+    np.testing.assert_allclose(np.stack([along, across], axis=1), single, atol=1e-15)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.4, np.pi / 2, 3.0])
+def test_a_straight_body_that_may_roll_is_stopped_three_times_more_gently(heading: float) -> None:
+    s = np.linspace(0.0, 1.0, 17)
+    line = np.stack([s * np.cos(heading), s * np.sin(heading), 0.0 * s], axis=1)
+    assert stop_drag(line, 0.11, 0.03, 0.002) == pytest.approx(1.8 / 3.0 * 0.11 / 0.002)
+    bent = line + 0.2 * np.sin(9.0 * s)[:, None] * np.array([-np.sin(heading), np.cos(heading), 0])
+    assert stop_drag(bent, 0.11, 0.03, 0.002) == pytest.approx(MOST_SHARE * 0.11 / 0.002)

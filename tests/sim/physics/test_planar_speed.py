@@ -1,0 +1,56 @@
+"""The plant against the independent planar model of ``planar_reference``: speed and direction.
+
+The servos lag, so the plant does not make the shape it is told. The reference is prescribed the
+shape that the plant made: its joint angles after every step, by cubic splines.
+"""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from tests.helpers.physics import HZ, ROBOT, Floats, a_body, a_drive, serpenoid
+from tests.oracles.planar_reference import PlanarBody, simulate
+
+SECONDS = 1.0 + 2.0 / HZ
+
+
+def crawl(mu: tuple[float, float], step_s: float) -> tuple[Floats, Floats, Floats]:
+    """Times (T,), joint angles (T, J), and the centre of mass (T, 2) from 0."""
+    body, drive = a_body(mu, step_s), a_drive()
+    steps = round(SECONDS / step_s)
+    joints = np.zeros((steps + 1, ROBOT.joint_count))
+    centre = np.zeros((steps + 1, 2))
+    origin = body.link_positions_m[:, :2].mean(axis=0)
+    for k in range(1, steps + 1):
+        drive.goal_rad[:] = serpenoid((k - 1) * step_s)
+        body.advance(k * step_s, drive)
+        joints[k] = body.position_rad
+        centre[k] = body.link_positions_m[:, :2].mean(axis=0) - origin
+    return np.arange(steps + 1) * step_s, joints, centre
+
+
+def reference(mu: tuple[float, float], time_s: Floats, joints: Floats, at_s: Floats) -> Floats:
+    """Centre of mass (len(at_s), 2) of a body that makes these shapes."""
+    m, r, length = ROBOT.link_mass_kg, ROBOT.body_radius_m, ROBOT.link_length_m
+    body = PlanarBody(
+        ROBOT.joint_count + 1, length, m, m * (3 * r**2 + length**2) / 12, mu[0], mu[1]
+    )
+    still = np.zeros(ROBOT.joint_count)
+    shape = CubicSpline(time_s, joints, bc_type=((1, still), "not-a-knot"))
+    rate = shape.derivative()
+    return simulate(body, lambda t: (shape(t), rate(t)), at_s).centre_m
+
+
+@pytest.mark.parametrize("step_s", [0.001, 0.002, 0.005])
+@pytest.mark.parametrize("mu", [(0.1, 0.7), (0.4, 0.4)])
+def test_speed_is_that_of_the_independent_model(mu: tuple[float, float], step_s: float) -> None:
+    """Within 2 % of the speed itself, also where that is small and backwards."""
+    time_s, joints, centre = crawl(mu, step_s)
+    marks_s = np.array([0.0, 1.0, SECONDS])
+    expected = reference(mu, time_s, joints, marks_s)
+    way = expected[2] - expected[1]
+    made = centre[-1] - centre[round(1.0 / step_s)]
+    print(f"mu {mu} step {step_s * 1e3:g} ms: {made[0] / way[0] - 1.0:+.2%} of {way[0]:.4f} m")
+    assert (way[0] > 0.3) if mu[0] < mu[1] else (way[0] < -0.03)
+    assert made[0] == pytest.approx(way[0], rel=0.02)
+    assert np.hypot(*(made - way)) < 0.02 * np.hypot(*way) + 0.003

@@ -1,0 +1,88 @@
+"""The body on its floor: rest, friction's sign, and equal answers of both step kernels."""
+
+import numpy as np
+import pytest
+
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.config.world import FrictionConfig
+from snakewalk.sim.physics.plant import MujocoPlant
+from snakewalk.sim.physics.servo_drive import drive_shafts
+from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
+
+ROBOT = load_robot("yaw16")
+FLAT = load_world("flat")
+
+
+def plant(friction: FrictionConfig | None = None, **options) -> MujocoPlant:
+    world = FLAT if friction is None else FLAT.model_copy(update={"friction": friction})
+    return MujocoPlant(ROBOT, world, None, 0.002, **options)
+
+
+def drive():
+    servo = make_drive([MOTORS["XM430-W350"]] * 16, 12.0)
+    servo.torque_on[:] = 1.0
+    servo.p_gain_per_rad[:] = p_gain_per_rad(800, MOTORS["XM430-W350"])
+    return servo
+
+
+def wave(time_s: float) -> np.ndarray:
+    return 0.4 * np.sin(2 * np.pi * (0.3 * time_s - np.arange(16) / 13.0))
+
+
+def crawl(body: MujocoPlant, seconds: float) -> np.ndarray:
+    servo = drive()
+    body.reset((0.0, 0.0), 0.0, wave(0.0))
+    start = body.link_positions_m.mean(axis=0)
+    for k in range(int(seconds * 50)):
+        servo.goal_rad[:] = wave(0.02 * k)
+        body.advance(0.02 * (k + 1), servo)
+    return body.link_positions_m.mean(axis=0) - start
+
+
+def test_a_body_at_rest_stays_at_rest() -> None:
+    body = plant()
+    before = body.link_positions_m
+    body.advance(1.0, drive())
+    np.testing.assert_allclose(body.link_positions_m, before, atol=1e-4)
+    assert body.energy_j[1] < 1e-8
+
+
+def test_the_wave_drives_forward_with_grip_across_and_backwards_without() -> None:
+    seconds = 10.0 / 3.0 * 2
+    forward = crawl(plant(), seconds)
+    back = crawl(plant(FrictionConfig(along=0.4, across=0.4)), seconds)
+    assert np.hypot(*forward[:2]) > 0.5
+    assert forward[0] > 0.4
+    assert back[0] < 0.0
+
+
+def test_compiled_and_interpreted_steps_agree() -> None:
+    pytest.importorskip("numba")
+    one, two = plant(compiled=True), plant(compiled=False)
+    np.testing.assert_allclose(crawl(one, 0.5), crawl(two, 0.5), atol=1e-9)
+    np.testing.assert_allclose(one.position_rad, two.position_rad, atol=1e-9)
+
+
+def test_the_same_run_twice_is_the_same_bit_for_bit() -> None:
+    one, two = plant(), plant()
+    crawl(one, 1.0)
+    crawl(two, 1.0)
+    assert one.qpos.tobytes() == two.qpos.tobytes()
+
+
+def test_steps_that_a_signal_ended_can_be_gone_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    body, servo, calls = plant(compiled=False), drive(), []
+
+    def interrupted(*given):
+        calls.append(given)
+        if len(calls) == 4:
+            raise KeyboardInterrupt
+        return drive_shafts(*given)
+
+    monkeypatch.setattr("snakewalk.sim.physics.interpreted.drive_shafts", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        body.advance(0.02, servo)
+    assert body.time_s == pytest.approx(0.006)
+    body.advance(0.02, servo)
+    assert body.time_s == pytest.approx(0.02)
+    assert len(calls) == 11

@@ -1,0 +1,170 @@
+"""``snakewalk bus serve`` and ``bus sniff`` from the outside; the plugin's fixture."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import dynamixel_sdk as sdk
+import pytest
+
+from snakewalk.sim.line.clock import SimClock
+from snakewalk.sim.serve.pty import LATE_S, PtyServer
+from snakewalk.sim.serve.servo_bus import ServoBus
+from tests.helpers.bus import a_line, serve_for
+from tests.sim.faults.test_faults import fault, scripted
+
+pytestmark = pytest.mark.usefixtures("patient_sdk")
+
+PING = bytes.fromhex("FF FF FD 00 01 03 00 01 19 4E")
+
+
+def snakewalk(*words: str) -> subprocess.Popen[str]:
+    code = "from snakewalk.controller.app.cli.main import main; main()"
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path) -> None:
+    record = tmp_path / "exchange.jsonl"
+    link = tmp_path / "tty"
+    words = ("--servos", "1-2:XL330-M288", "--json")
+    with snakewalk("bus", "serve", *words, "--record", str(record), "--link", str(link)) as process:
+        assert process.stdout is not None
+        first = json.loads(process.stdout.readline())
+        assert first["ids"] == [1, 2]
+        port = sdk.PortHandler(str(link))
+        port.setBaudRate(1_000_000)
+        handler = sdk.PacketHandler(2.0)
+        assert handler.ping(port, 2) == (1200, 0, 0)
+        port.setBaudRate(57_600)
+        assert handler.ping(port, 2)[1] == sdk.COMM_RX_TIMEOUT  # servos at 1 Mbaud are silent
+        port.closePort()
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate()
+    done = json.loads(out)
+    assert done["answers"] == 1
+    assert not link.exists()
+    sniffed = subprocess.run(
+        [
+            *(sys.executable, "-c", "from snakewalk.controller.app.cli.main import main; main()"),
+            *("bus", "sniff", str(record), "--json"),
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    lines = [json.loads(line) for line in sniffed.stdout.splitlines()]
+    assert [line["name"] for line in lines][:2] == ["ping", "ok"]
+    assert lines[1]["values"]["model"] == "XL330-M288"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("serve", "--servos", "1-300"), "ID 300: a servo has 0 to 252"),
+        (("serve", "--servos", "1", "--baud", "1234"), "1234 baud: XM430-W350 has 9600"),
+        (("serve", "--servos", "1:XL-9"), "XL-9: not simulated"),
+        (("serve", "--pace", "0"), "pace 0: must be above 0"),
+        (("serve", "--faults", "nowhere.toml"), "nowhere.toml: No such file"),
+        (("sniff", "nowhere.jsonl"), "nowhere.jsonl: no such file"),
+    ],
+)
+def test_wrong_input_is_one_line_and_exit_code_2(words: tuple[str, ...], said: str) -> None:
+    with snakewalk("bus", *words) as process:
+        _, error = process.communicate()
+    assert process.returncode == 2
+    assert said in error
+    assert len(error.splitlines()) == 1
+
+
+def test_the_pty_vanishes_and_comes_back_behind_its_link(tmp_path: Path) -> None:
+    line = scripted(fault("port", at_s=1.0, for_s=1.0), joints=1)
+    clock, link = SimClock(), tmp_path / "tty"
+    with PtyServer(line, clock, link=link) as server:
+        first = server.path
+        serve_for(server, clock, 1.1)
+        assert not server.path
+        assert not os.path.exists(first)
+        assert not link.exists()
+        serve_for(server, clock, 1.0)
+        client = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            os.write(client, PING)
+            for _ in range(3):
+                server.step(0.0)
+                clock.advance(0.01)
+            assert len(os.read(client, 99)) == 14
+        finally:
+            os.close(client)
+
+
+def test_pace_stretches_time() -> None:
+    clock = SimClock()
+    line = a_line(1)
+    start_s = line.clock.now_s()
+    with PtyServer(line, clock, pace=0.25) as server:
+        serve_for(server, clock, 2.0)
+    assert line.clock.now_s() - start_s == pytest.approx(0.5)
+
+
+def test_time_that_the_server_missed_is_left_out() -> None:
+    clock, line = SimClock(), a_line(1)
+    start_s = line.clock.now_s()
+    with PtyServer(line, clock) as server:
+        clock.advance(5.0)
+        server.step(0.0)
+        assert line.clock.now_s() - start_s == pytest.approx(LATE_S)
+        serve_for(server, clock, 1.0)
+        assert line.clock.now_s() - start_s == pytest.approx(LATE_S + 1.0)
+        assert server.missed_s == pytest.approx(5.0 - LATE_S)
+
+
+def test_three_lines_are_enough_for_a_test_suite(servo_bus: Callable[..., ServoBus]) -> None:
+    bus = servo_bus("1-3", start_rad=0.5)
+    assert sdk.PacketHandler(2.0).write1ByteTxRx(bus.line, 2, 65, 1) == (0, 0)
+    assert bus["LED"].tolist() == [0, 1, 0]
+    assert (bus["Present Position"] > 2300).all()
+
+
+def test_the_fixture_takes_faults(servo_bus: Callable[..., ServoBus], tmp_path: Path) -> None:
+    path = tmp_path / "faults.toml"
+    path.write_text(fault("mute", ids=[2]))
+    bus = servo_bus("1-3", faults=path)
+    handler = sdk.PacketHandler(2.0)
+    bus.line.clock.advance(0.01)
+    assert handler.ping(bus.line, 1)[1] == sdk.COMM_SUCCESS
+    assert handler.ping(bus.line, 2)[1] == sdk.COMM_RX_TIMEOUT
+
+
+def test_serve_speaks_protocol_1_for_an_ax12() -> None:
+    with snakewalk("bus", "serve", "--servos", "5:AX-12A", "--json") as process:
+        assert process.stdout is not None
+        port = sdk.PortHandler(json.loads(process.stdout.readline())["port"])
+        port.setBaudRate(1_000_000)
+        assert sdk.PacketHandler(1.0).ping(port, 5) == (12, 0, 0)
+        port.closePort()
+        process.send_signal(signal.SIGTERM)
+        out, _ = process.communicate()
+    assert json.loads(out)["answers"] == 2  # the SDK reads the model number, too
+
+
+def test_the_fixture_takes_servos_of_protocol_1(
+    servo_bus: Callable[..., ServoBus], tmp_path: Path
+) -> None:
+    path = tmp_path / "faults.toml"
+    path.write_text(fault("mute", ids=[2]))
+    bus = servo_bus("1-3:AX-12A", faults=path, start_rad=0.5)
+    handler = sdk.PacketHandler(1.0)
+    bus.line.clock.advance(0.01)
+    assert handler.write1ByteTxRx(bus.line, 1, 25, 1) == (0, 0)
+    assert handler.ping(bus.line, 2)[1] == sdk.COMM_RX_TIMEOUT
+    assert bus["LED"].tolist() == [1, 0, 0]
+    assert (bus["Present Position"] > 600).all()

@@ -1,0 +1,75 @@
+"""The servos behind a pseudo-terminal: by hand with a simulated clock, and in real time."""
+
+import os
+import threading
+
+import dynamixel_sdk as sdk
+import pytest
+
+from snakewalk.drivers.clock import WallClock
+from snakewalk.sim.line.clock import SimClock
+from snakewalk.sim.serve.pty import PtyServer
+from tests.helpers.bus import a_line, serve_for, write
+
+PING = bytes.fromhex("FF FF FD 00 01 03 00 01 19 4E")
+
+
+def test_answers_come_when_their_bytes_are_due() -> None:
+    clock = SimClock()
+    with PtyServer(a_line(1), clock) as server:
+        client = os.open(server.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            os.write(client, PING[:4])
+            server.step(0.0)
+            os.write(client, PING[4:])
+            server.step(0.0)
+            with pytest.raises(BlockingIOError):
+                os.read(client, 99)
+            clock.advance(100e-6 + 50e-6)  # ten bytes out, five of fourteen back
+            server.step(0.0)
+            assert os.read(client, 99) == b"\xff\xff\xfd\x00\x01"
+            clock.advance(1e-3)
+            server.step(0.0)
+            assert len(os.read(client, 99)) == 9
+        finally:
+            os.close(client)
+
+
+def test_physics_runs_on_while_nobody_talks_and_clients_come_and_go() -> None:
+    clock = SimClock()
+    line = a_line(1)
+    write(line, 1, 64, 1, 1)
+    write(line, 1, 116, 2400, 4)
+    with PtyServer(line, clock) as server:
+        for _ in range(2):
+            os.close(os.open(server.path, os.O_RDWR | os.O_NOCTTY))
+            serve_for(server, clock, 0.5)
+        assert line.firmware.plant.position_rad[0] > 0.4
+        path = server.path
+    server.close()
+    assert not os.path.exists(path)
+
+
+@pytest.mark.usefixtures("patient_sdk")
+def test_the_sdk_opens_it_as_a_serial_port() -> None:
+    stop = threading.Event()
+    ph = sdk.PacketHandler(2.0)
+    with PtyServer(a_line(4), WallClock()) as server:
+        thread = threading.Thread(target=server.serve, args=(stop.is_set,))
+        thread.start()
+        port = sdk.PortHandler(server.path)
+        try:
+            assert port.openPort()
+            assert ph.ping(port, 2) == (1020, sdk.COMM_SUCCESS, 0)
+            assert ph.write4ByteTxRx(port, 2, 116, 2100) == (sdk.COMM_SUCCESS, 0)
+            reads = sdk.GroupSyncRead(port, ph, 116, 4)
+            for servo in range(1, 5):
+                reads.addParam(servo)
+            assert reads.txRxPacket() == sdk.COMM_SUCCESS
+            assert [reads.getData(s, 116, 4) for s in range(1, 5)] == [2048, 2100, 2048, 2048]
+            assert reads.fastSyncRead() == sdk.COMM_SUCCESS
+        finally:
+            port.closePort()
+            stop.set()
+            thread.join(5.0)
+    assert not thread.is_alive()

@@ -1,0 +1,99 @@
+"""The servo model against recordings of a real XL330 that swings a pendulum (Rhoban, bam)."""
+
+import importlib.util
+import json
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from snakewalk.sim.servo.gearbox import GEARBOXES
+from snakewalk.sim.servo.motor import MOTORS, PWM_FULL, p_gain_per_rad
+
+XL330 = MOTORS["XL330-M288"]
+GEAR = GEARBOXES["XL330-M288"]
+LOGS = (
+    *("kp200_lift_and_drop", "kp200_sin_sin", "kp400_lift_and_drop"),
+    *("kp800_sin_sin", "kp800_up_and_down"),
+)
+
+
+@pytest.fixture(scope="module")
+def pendulum() -> ModuleType:
+    """The benchmark of the same name, which also prints each term's share."""
+    path = Path(__file__).resolve().parents[3] / "benchmarks" / "pendulum.py"
+    spec = importlib.util.spec_from_file_location("pendulum", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def log_path(folder: Path, name: str) -> Path:
+    return folder / "xl330-logs" / f"{name}.json"
+
+
+@pytest.mark.parametrize(
+    "name", ["kp200_lift_and_drop", "kp400_lift_and_drop", "kp800_up_and_down"]
+)
+def test_output_register_follows_the_error_at_the_models_gain(shared_data: Path, name: str) -> None:
+    log = json.loads(log_path(shared_data, name).read_text())
+    keys = ("goal_position", "position", "load", "torque_enable")
+    column = {key: np.array([entry[key] for entry in log["entries"]], float) for key in keys}
+    load = np.where(column["load"] > 32_767, column["load"] - 65_536, column["load"])
+    error_rad = column["goal_position"] - column["position"]
+    fit = (column["torque_enable"] > 0) & (np.abs(load) < 800)
+    slope = (error_rad[fit] @ load[fit]) / (error_rad[fit] @ error_rad[fit])
+    assert slope == pytest.approx(p_gain_per_rad(int(log["kp"]), XL330) * PWM_FULL, rel=0.02)
+    assert np.abs(load).max() <= PWM_FULL
+
+
+def test_the_pendulum_is_followed_at_every_gain_and_twice_as_well_as_without_friction(
+    shared_data: Path, pendulum: ModuleType
+) -> None:
+    """Within 0.1 rad RMS on each log with torque on, one set of constants."""
+    paths = [log_path(shared_data, name) for name in LOGS]
+    shipped = [pendulum.errors(path, GEAR)[0] for path in paths]
+    plain = [pendulum.errors(path, None)[0] for path in paths]
+    assert max(shipped) < 0.08
+    assert np.mean(shipped) < 0.5 * np.mean(plain)
+
+
+@pytest.mark.parametrize("name", ["kp200_lift_and_drop", "kp400_lift_and_drop"])
+def test_it_swings_freely_once_torque_is_off(
+    shared_data: Path, pendulum: ModuleType, name: str
+) -> None:
+    gain, log = pendulum.recording(log_path(shared_data, name))
+    simulated = pendulum.simulate(gain, log, GEAR)
+    free = log["torque_enable"] == 0
+    swing, real = np.ptp(simulated[free]), np.ptp(log["position"][free])
+    assert swing == pytest.approx(real, rel=0.3)
+    assert abs(simulated[-1] - log["position"][-1]) < 0.2
+
+
+def test_friction_and_data_sheet_agree_on_the_speed_without_load() -> None:
+    """What is left of 5 V at the specified 103 rev/min drives the gears."""
+    speed = XL330.no_load_rad_s
+    w = np.linspace(0.1, 2.0 * speed, 4_000)
+    volts = 5.0 - XL330.back_emf_v_s * w
+    motor = XL330.torque_constant_n_m_a * volts / XL330.resistance_ohm
+    left = motor - GEAR.friction_n_m(w, motor, np.zeros_like(w)) - GEAR.viscous_n_m_s * w
+    reached = w[np.flatnonzero(left > 0.0)[-1]]
+    assert reached == pytest.approx(speed, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("volts", "stall_n_m", "stall_a", "rpm"),
+    [(11.1, 3.8, 2.1, 43.0), (12.0, 4.1, 2.3, 46.0), (14.8, 4.8, 2.7, 57.0)],
+)
+def test_one_set_of_xm430_constants_gives_its_data_sheet_at_every_voltage(
+    volts: float, stall_n_m: float, stall_a: float, rpm: float
+) -> None:
+    """E-manual XM430-W350, Specifications: torque, current and speed at three supplies."""
+    motor = MOTORS["XM430-W350"]
+    amps = volts / motor.resistance_ohm
+    assert amps == pytest.approx(stall_a, rel=0.06)
+    assert motor.torque_constant_n_m_a * amps == pytest.approx(stall_n_m, rel=0.06)
+    assert volts / motor.back_emf_v_s * 60.0 / (2.0 * np.pi) == pytest.approx(rpm, rel=0.02)
