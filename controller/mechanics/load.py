@@ -6,7 +6,6 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
 
 _STILL_M_S = 1e-4
-STANDARD_GRAVITY_M_S2 = 9.80665
 
 
 def friction_n(

@@ -9,8 +9,8 @@ the slope is more than friction holds.
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.mechanics.load import STANDARD_GRAVITY_M_S2
 from snakewalk.drivers.compiling import compiled
 
 _STILL_M_S = 1e-4  # smooths the kink of |v| at rest
@@ -91,7 +91,7 @@ def carried_velocity(
 
     """
     velocity = np.zeros(3) if guess is None else np.array(guess, dtype=float)
-    heavy = 1.0 / (STANDARD_GRAVITY_M_S2 * step_s)
+    heavy = 1.0 / (GRAVITY_M_S2 * step_s)
     x, y = points_m[:, 0], points_m[:, 1]
     links, sx, sy = float(len(x)), x.sum(), y.sum()
     heft = heavy * np.array([[links, 0.0, -sy], [0.0, links, sx], [-sy, sx, x @ x + y @ y]])

@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.controller.metrics.ground_contact import CLEAR_M
 from snakewalk.controller.motion.stop_profile import STOP_S
 from snakewalk.controller.runlog.record import RunRecord
-
-G_M_S2 = 9.81
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +53,7 @@ def effort(record: RunRecord, from_s: float, motor: Winding | None) -> Effort:
     span_s = float(pose.time_s[steady][-1] - pose.time_s[steady][0])
     way = pose.centre_m[steady][-1] - pose.centre_m[steady][0]
     net_m_s = float(np.linalg.norm(way)) / span_s
-    weight_n = header.robot.link_mass_kg * (header.robot.joint_count + 1) * G_M_S2
+    weight_n = header.robot.link_mass_kg * (header.robot.joint_count + 1) * GRAVITY_M_S2
     cost = power / (weight_n * net_m_s) if net_m_s > 1e-6 else float("inf")
     return Effort(power, cost, float(way[2]) / span_s, _slip(record, steady))
 

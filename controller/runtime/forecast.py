@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world, mean_heading_rad, pose_at
-from snakewalk.controller.mechanics.load import STANDARD_GRAVITY_M_S2, friction_n, yaw_load_n_m
+from snakewalk.controller.mechanics.load import friction_n, yaw_load_n_m
 from snakewalk.controller.mechanics.rigid_motion import (
     NoBalanceError,
     carried_velocity,
@@ -112,7 +113,7 @@ def forecast(
     times, angles, centres, pulse_m = [0.0], [joints], [], 0.0
     torques = [np.zeros(robot.joint_count)]
     yaw = np.array([axis == "y" for axis in robot.joint_axes])
-    weight_n = robot.link_mass_kg * STANDARD_GRAVITY_M_S2
+    weight_n = robot.link_mass_kg * GRAVITY_M_S2
     while True:
         view = body_in_world(robot, pose_at(head_m, head_rad), joints)
         centres.append(view.centre_m[:2])

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.mechanics.rigid_motion import (
     NoBalanceError,
@@ -174,5 +175,5 @@ def test_with_inertia_a_sliding_body_gains_what_friction_leaves_of_gravity(slope
     w = carried_velocity(
         LINE, np.zeros(17), np.zeros((17, 2)), SNAKE, before, step_s, **ramp(slope, 0.0)
     )
-    gained = step_s * 9.80665 * (np.sin(slope) - SNAKE.along * np.cos(slope))
+    gained = step_s * GRAVITY_M_S2 * (np.sin(slope) - SNAKE.along * np.cos(slope))
     np.testing.assert_allclose(w, [1.0 + gained, 0.0, 0.0], atol=1e-6)
