@@ -1,4 +1,4 @@
-"""Many points at once: on this machine's processes, or on the workers of a Dask cluster."""
+"""The one pool of processes: on this machine, or on the workers of a Dask cluster."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -9,6 +9,14 @@ from snakewalk.config.errors import InputError
 
 A = TypeVar("A")
 B = TypeVar("B")
+
+
+def process_pool(workers: int) -> ProcessPoolExecutor:
+    """Return a pool whose workers are fresh interpreters.
+
+    A forked worker would inherit the threads of MuJoCo and numba in whatever state they are.
+    """
+    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
 
 
 def each(
@@ -23,8 +31,7 @@ def each(
     if dask is not None:
         yield from _on_cluster(work, items, dask)
         return
-    # a fresh interpreter for each worker: a forked one would share MuJoCo's and numba's threads
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with process_pool(workers) as pool:
         waiting = {pool.submit(work, item): item for item in items}
         try:
             for done in as_completed(waiting):

@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,6 +13,7 @@ import numpy as np
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.prepare import Prepared, prepare
+from snakewalk.controller.app.studies.pool import each
 from snakewalk.controller.metrics.ground_contact import footing
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.terrain.summary import path_relief
@@ -103,13 +104,13 @@ def trials(
     run: str, cases: Sequence[Case], seeds: int, workers: int, changes: Mapping[str, object]
 ) -> Iterator[Trial]:
     """Yield trials as they finish; ``changes`` replace fields of the run where not None."""
-    with ProcessPoolExecutor(workers) as pool:
-        waiting = [
-            pool.submit(run_trial, run, case, seed, changes)
-            for case, seed in product(cases, range(seeds))
-        ]
-        for done in as_completed(waiting):
-            yield done.result()
+    work = partial(_run_seed, run=run, changes=changes)
+    for _, trial in each(work, list(product(cases, range(seeds))), workers=workers):
+        yield trial
+
+
+def _run_seed(item: tuple[Case, int], *, run: str, changes: Mapping[str, object]) -> Trial:
+    return run_trial(run, *item, changes)
 
 
 def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[dict[str, object]]:

@@ -6,10 +6,8 @@ keeps to the box of the parameters' ranges, and its generations run side by side
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from multiprocessing import get_context
 from typing import Any, Literal
 
 import numpy as np
@@ -18,6 +16,7 @@ from scipy.optimize import Bounds, differential_evolution
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
+from snakewalk.controller.app.studies.pool import process_pool
 from snakewalk.controller.app.studies.sweep_measure import Row, measure
 from snakewalk.controller.app.studies.sweep_points import Point, Space
 from snakewalk.controller.gaits.gait import Aim as Goal
@@ -141,8 +140,7 @@ def tune(
     space = Space.of(kind)
     start = Point(gait, body.name, kind.world, 0, seed, seconds)
     default = kind().params.model_dump()
-    # fresh interpreters: forked ones would share MuJoCo's and numba's threads
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with process_pool(workers) as pool:
         first = measure(start)
         task = task_of(first, aim, kind.aim)
         if task.least <= 0.0:

@@ -1,14 +1,17 @@
 """The same results from processes and from a cluster; a scheduler that is not there is one line."""
 
 import math
+import os
 from operator import attrgetter
+from pathlib import Path
 
 import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.app.studies.pool import each
+from snakewalk.controller.app.studies.pool import each, process_pool
 from snakewalk.controller.app.studies.sweep_points import points_of
+from snakewalk.controller.app.studies.trials import Case, trials
 from snakewalk.controller.gaits.registry import GAITS
 
 distributed = pytest.importorskip("distributed")
@@ -31,3 +34,26 @@ def test_points_travel_to_other_processes() -> None:
 def test_no_scheduler() -> None:
     with pytest.raises(InputError, match="no scheduler"):
         dict(each(math.factorial, [1], workers=1, dask="inproc://nowhere/1/1"))
+
+
+def test_trials_never_fork_beside_the_physics(monkeypatch: pytest.MonkeyPatch) -> None:
+    def forked() -> int:
+        raise AssertionError("forked: a worker must be a fresh interpreter")
+
+    monkeypatch.setattr(os, "fork", forked)
+    changes = {"time_limit_s": 0.5}
+    (trial,) = trials("flat-slalom", [Case("serpenoid")], 1, 1, changes)
+    assert trial.refused is None
+    assert trial.duration_s > 0.0
+
+
+def test_processes_are_started_in_one_place_and_spawned() -> None:
+    root = Path(__file__).parents[4]
+    sources = [
+        p for top in ("config", "controller", "drivers", "sim") for p in (root / top).rglob("*.py")
+    ]
+    names = ("multiprocessing", "ProcessPoolExecutor", "os.fork")
+    starters = {p.name for p in sources if any(name in p.read_text() for name in names)}
+    assert starters == {"pool.py"}
+    with process_pool(1) as pool:
+        assert pool._mp_context.get_start_method() == "spawn"
