@@ -98,10 +98,12 @@ def fitted_slope_rad(ground: HeightField, radius_m: float) -> Floats:
 
 def _disc(ground: HeightField, radius_m: float) -> tuple[Floats, Floats, Floats]:
     """Offsets in x and y of a window's samples, and 1 within the radius."""
-    reach_m = max(radius_m, 1.5 * ground.spacing_m)  # a plane needs the diagonal neighbours
-    cells = int(reach_m / ground.spacing_m)
-    dy, dx = np.mgrid[-cells : cells + 1, -cells : cells + 1] * ground.spacing_m
-    return dx, dy, (np.hypot(dx, dy) <= reach_m + 1e-9).astype(float)
+    # A plane needs the diagonal neighbours. Where samples lie exactly on the radius, the quotient
+    # is just below a whole number as often as not: those samples belong to the disc.
+    cells = max(radius_m / ground.spacing_m, 1.5) + 1e-9
+    row, column = np.mgrid[-int(cells) : int(cells) + 1, -int(cells) : int(cells) + 1]
+    inside = (np.hypot(column, row) <= cells).astype(float)
+    return column * ground.spacing_m, row * ground.spacing_m, inside
 
 
 def _summed(values: Floats, weight: Floats) -> Floats:

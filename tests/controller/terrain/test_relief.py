@@ -30,19 +30,42 @@ def test_variance_of_a_plane_is_the_quarter_of_rise_over_the_radius_squared() ->
     assert np.ptp(inside) < 1e-12
 
 
-def test_windows_are_cut_at_the_border_as_brute_force_cuts_them() -> None:
-    rng = np.random.default_rng(3)
-    ground = HeightField(rng.normal(100.0, 0.1, (21, 17)), SPACING, 0.0, 0.0)
-    variance, slope = elevation_variance_m2(ground, 0.17), fitted_slope_rad(ground, 0.17)
-    yy, xx = np.mgrid[:21, :17] * SPACING
-    for row, column in ((0, 0), (20, 16), (0, 9), (10, 8), (3, 15)):
-        near = np.hypot(xx - xx[row, column], yy - yy[row, column]) <= 0.17 + 1e-9
+def check_against_brute_force(ground: HeightField, radius_m: float) -> None:
+    variance, slope = elevation_variance_m2(ground, radius_m), fitted_slope_rad(ground, radius_m)
+    rows, columns = ground.z_m.shape
+    yy, xx = np.mgrid[:rows, :columns] * ground.spacing_m
+    corners = ((0, 0), (rows - 1, columns - 1), (0, columns // 2))
+    for row, column in (*corners, (rows // 2, columns // 2), (3, columns - 2)):
+        near = np.hypot(xx - xx[row, column], yy - yy[row, column]) <= radius_m + 1e-9
         z = ground.z_m[near]
         plane = np.linalg.lstsq(
             np.stack([xx[near], yy[near], np.ones(near.sum())], axis=1), z, rcond=None
         )[0]
         assert variance[row, column] == pytest.approx(z.var())
         assert slope[row, column] == pytest.approx(np.arctan(np.hypot(*plane[:2])))
+
+
+def test_windows_are_cut_at_the_border_as_brute_force_cuts_them() -> None:
+    rng = np.random.default_rng(3)
+    check_against_brute_force(HeightField(rng.normal(100.0, 0.1, (21, 17)), SPACING, 0, 0), 0.17)
+
+
+@pytest.mark.parametrize("spacing_m", [0.1, 0.05, 0.04, 0.03, 0.025, 0.02, 0.01])
+@pytest.mark.parametrize("radius_m", [0.15, 0.3, 0.35, 0.6])
+def test_a_window_holds_every_sample_within_its_radius(spacing_m: float, radius_m: float) -> None:
+    rng = np.random.default_rng(4)
+    count = 2 * int(1.2 * radius_m / spacing_m) + 9
+    z = rng.normal(0.0, 0.1, (count, count + 2))
+    check_against_brute_force(HeightField(z, spacing_m, -0.3, 0.7), radius_m)
+
+
+@pytest.mark.parametrize("spacing_m", [0.1, 0.05, 0.025])
+def test_a_spike_on_the_radius_is_not_overlooked(spacing_m: float) -> None:
+    cells = round(0.3 / spacing_m)
+    z = np.zeros((2 * cells + 1, 2 * cells + 1))
+    z[cells, 0] = 1.0
+    variance = elevation_variance_m2(HeightField(z, spacing_m, 0.0, 0.0), 0.3)
+    assert variance[cells, cells] > 1e-4
 
 
 def test_a_window_bridges_a_ripple_that_the_surface_shows() -> None:
