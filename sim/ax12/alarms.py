@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats, Indices
 from snakewalk.sim.ax12.protocol1 import Error1
 from snakewalk.sim.plant import ServoDrive
-from snakewalk.sim.servo.blocked_shaft import Jam
+from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 from snakewalk.sim.servo.motor import MotorModel
 from snakewalk.sim.servo.supply import Supply
 
@@ -37,11 +37,16 @@ class Ax12Alarms:
         register: Callable[[str], NDArray[np.unsignedinteger]],
         drive: ServoDrive,
         motor: MotorModel,
-        jam: Jam,
+        blocked_shaft: BlockedShaft,
         supply_v: float,
     ) -> None:
         servos = len(drive.torque_on)
-        self._register, self._drive, self._motor, self._jam = register, drive, motor, jam
+        self._register, self._drive, self._motor, self._blocked_shaft = (
+            register,
+            drive,
+            motor,
+            blocked_shaft,
+        )
         self._supply = Supply(servos, supply_v)
         self._blocked_s = np.zeros(servos)
         self._kept = np.zeros(servos, np.uint8)
@@ -78,7 +83,7 @@ class Ax12Alarms:
         """Judge the last ``seconds``."""
         drive, motor = self._drive, self._motor
         self._supply.feed(drive.supply_v)
-        amps, pwm = self._jam.current_a(), self._jam.pwm()
+        amps, pwm = self._blocked_shaft.current_a(), self._blocked_shaft.pwm()
         target_c = AMBIENT_C + motor.winding_k_per_w * motor.resistance_ohm * amps**2
         share = 1.0 - np.exp(-seconds / motor.thermal_time_s)
         self.temperature_c += (target_c - self.temperature_c) * share

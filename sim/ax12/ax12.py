@@ -9,8 +9,8 @@ from snakewalk.sim.ax12.alarms import Ax12Alarms
 from snakewalk.sim.ax12.protocol1 import MAX_ID, Error1
 from snakewalk.sim.ax12.table import AT, CELLS, EEPROM_END, MODEL, TABLE_BYTES, Cell
 from snakewalk.sim.plant import Plant
-from snakewalk.sim.servo.blocked_shaft import Jam
-from snakewalk.sim.servo.event_queue import Agenda
+from snakewalk.sim.servo.blocked_shaft import BlockedShaft
+from snakewalk.sim.servo.event_queue import EventQueue
 from snakewalk.sim.servo.motor import MotorModel, make_drive
 from snakewalk.sim.servo.profile import VELOCITY_UNIT_RAD_S, Trajectory
 
@@ -47,11 +47,11 @@ class Ax12Servos:
         self.table = np.zeros((servos, TABLE_BYTES), np.uint8)
         self.drive = make_drive([AX12_MOTOR] * servos, supply_v)
         self._views = {name: self._view(cell) for name, cell in CELLS.items()}
-        self.jam = Jam(self.drive)
+        self.blocked_shaft = BlockedShaft(self.drive)
         self.protection = Ax12Alarms(
-            self._views.__getitem__, self.drive, AX12_MOTOR, self.jam, supply_v
+            self._views.__getitem__, self.drive, AX12_MOTOR, self.blocked_shaft, supply_v
         )
-        self.agenda = Agenda()
+        self.events = EventQueue()
         """What happens to the servos at a time of its own, whoever talks."""
         self.powered = np.ones(servos, bool)
         """(S,) False while a servo has no supply: it hears nothing and lets go."""
@@ -144,33 +144,33 @@ class Ax12Servos:
         """Take the supply away: shafts go limp, and all that is not EEPROM is lost."""
         self.powered[rows] = False
 
-    def give_power(self, rows: Indices) -> None:
+    def restore_power(self, rows: Indices) -> None:
         """Give the supply back."""
         self.powered[rows] = True
         for row in rows:
             self.reboot(int(row))
 
-    def seize(self, rows: Indices) -> None:
-        """Jam shafts where they are."""
+    def block_shafts(self, rows: Indices) -> None:
+        """Block shafts where they are."""
         for row in rows:
-            self.jam.seize(int(row), float(self.plant.position_rad[row]))
+            self.blocked_shaft.block(int(row), float(self.plant.position_rad[row]))
 
-    def release(self, rows: Indices) -> None:
-        """Free jammed shafts."""
+    def free_shafts(self, rows: Indices) -> None:
+        """Free blocked shafts."""
         for row in rows:
-            self.jam.free(int(row))
+            self.blocked_shaft.free(int(row))
 
     def advance(self, until_s: float) -> None:
         """Step physics, trajectories and alarms to ``until_s``."""
         while self._time_s < until_s:
-            stop_s = min(until_s, self._time_s + SLICE_S, self.agenda.next_s)
+            stop_s = min(until_s, self._time_s + SLICE_S, self.events.next_s)
             if stop_s > self._time_s:
                 self._steer(stop_s - self._time_s)
                 self.plant.advance(stop_s, self.drive)
                 self.protection.look(stop_s - self._time_s, self.plant.velocity_rad_s)
                 self._time_s = stop_s
-            if stop_s >= self.agenda.next_s:
-                self.agenda.carry_out(stop_s)
+            if stop_s >= self.events.next_s:
+                self.events.run_due(stop_s)
 
     # registers and shafts
 
@@ -180,7 +180,7 @@ class Ax12Servos:
         ticks = (self.plant.position_rad - self._turn_rad) * TICKS_PER_RAD + CENTRE_TICKS
         self["Present Position"][:] = np.clip(np.rint(ticks), 0, 1023)
         self["Present Speed"][:] = _signed(self.plant.velocity_rad_s / SPEED_UNIT_RAD_S)
-        self["Present Load"][:] = _signed(self.jam.pwm() * 1023.0)
+        self["Present Load"][:] = _signed(self.blocked_shaft.pwm() * 1023.0)
         self["Present Voltage"][:] = np.clip(np.rint(self.drive.supply_v * 10.0), 0, 255)
         celsius = np.rint(self.protection.temperature_c)
         self["Present Temperature"][:] = np.clip(celsius, 0, 255)
@@ -223,7 +223,7 @@ class Ax12Servos:
         drive.goal_rad[:] = np.where(wheel, push / FAINT, aim)
         drive.pwm_limit[:] = np.minimum(self["Torque Limit"], self["Max Torque"]) / 1023.0
         drive.current_limit_a[:] = np.inf
-        self.jam.hold()
+        self.blocked_shaft.hold()
 
     def _view(self, cell: Cell) -> NDArray[np.unsignedinteger]:
         block = self.table[:, cell.address : cell.address + cell.size]

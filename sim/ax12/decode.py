@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from snakewalk.sim.ax12.protocol1 import BROADCAST_ID, Error1, Instruction1, Packet1, Reader1, frame
 from snakewalk.sim.ax12.table import CELLS
-from snakewalk.sim.sniff.decode import Line
+from snakewalk.sim.sniff.decode import DecodedPacket
 
 GAP_S = 5e-3
 """After such a silence what has begun will not go on, as servos take it."""
@@ -25,7 +25,7 @@ class Decoder1:
         self._asked: Packet1 | None = None
         self._asked_s = self._last_s = 0.0
 
-    def feed(self, time_s: float, data: bytes) -> Iterator[Line]:
+    def feed(self, time_s: float, data: bytes) -> Iterator[DecodedPacket]:
         """Lines of the packets that ``data`` completes."""
         if time_s > self._last_s + GAP_S:
             self._reader.reset()
@@ -33,7 +33,7 @@ class Decoder1:
         for packet in self._reader.feed(data):
             raw = frame(packet.servo_id, packet.instruction, packet.params).hex(" ")
             if not packet.intact:
-                yield Line(time_s, "noise", -1, "wrong checksum", {}, data.hex(" "))
+                yield DecodedPacket(time_s, "noise", -1, "wrong checksum", {}, data.hex(" "))
             elif self._answers(packet, time_s):
                 yield self._answer(time_s, packet, raw)
             else:
@@ -51,7 +51,7 @@ class Decoder1:
         read = asked.instruction == Instruction1.READ and len(asked.params) == 2
         return not packet.params or (read and len(packet.params) == asked.params[1])
 
-    def _question(self, time_s: float, packet: Packet1, raw: str) -> Line:
+    def _question(self, time_s: float, packet: Packet1, raw: str) -> DecodedPacket:
         self._asked, self._asked_s = packet, time_s
         code, params = packet.instruction, packet.params
         known = code in Instruction1.__members__.values()
@@ -66,9 +66,9 @@ class Decoder1:
             for at in range(2, len(params) - size, size + 1):
                 part = _values(address, params[at + 1 : at + 1 + size])
                 values |= {f"{params[at]}: {key}": value for key, value in part.items()}
-        return Line(time_s, "question", packet.servo_id, name, values, raw)
+        return DecodedPacket(time_s, "question", packet.servo_id, name, values, raw)
 
-    def _answer(self, time_s: float, packet: Packet1, raw: str) -> Line:
+    def _answer(self, time_s: float, packet: Packet1, raw: str) -> DecodedPacket:
         asked, values = self._asked, {}
         if asked is not None and asked.servo_id != BROADCAST_ID:
             self._asked = None
@@ -77,7 +77,9 @@ class Decoder1:
         alarms = [
             each.name.lower().replace("_", " ") for each in Error1 if packet.instruction & each
         ]
-        return Line(time_s, "answer", packet.servo_id, ", ".join(alarms) or "ok", values, raw)
+        return DecodedPacket(
+            time_s, "answer", packet.servo_id, ", ".join(alarms) or "ok", values, raw
+        )
 
 
 def _values(address: int, data: bytes) -> dict[str, object]:

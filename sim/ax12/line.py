@@ -17,9 +17,9 @@ from snakewalk.sim.ax12.protocol1 import (
     frame,
 )
 from snakewalk.sim.ax12.table import TABLE_BYTES
-from snakewalk.sim.line.bus_contention import overlay
+from snakewalk.sim.line.bus_contention import bus_contention
 from snakewalk.sim.line.clock import SimClock
-from snakewalk.sim.line.instruction_handler import BITS_PER_BYTE, RETURN_DELAY_UNIT_S, Answer
+from snakewalk.sim.line.instruction_handler import BITS_PER_BYTE, RETURN_DELAY_UNIT_S, Reply
 from snakewalk.sim.line.wire import Wire
 
 BAUD_CLOCK = 2_000_000
@@ -56,7 +56,7 @@ class Ax12Line(Wire):
         """The ID of each row."""
         return [int(each) for each in self.servos["ID"]]
 
-    def speakers(self, answer: bytes) -> Collection[int]:
+    def senders(self, answer: bytes) -> Collection[int]:
         """Who has written an answer."""
         return (answer[_ID_AT],)
 
@@ -68,7 +68,7 @@ class Ax12Line(Wire):
         """Let servos fall silent, or speak again; they hear and obey."""
         self._muted[rows] = on
 
-    def look_again(self) -> None:
+    def refresh_ids(self) -> None:
         """Nothing is remembered: who is there is asked anew for every packet."""
 
     def shown(self, register: str) -> NDArray[np.unsignedinteger]:
@@ -81,13 +81,13 @@ class Ax12Line(Wire):
     def _advance(self, until_s: float) -> None:
         self.servos.advance(until_s)
 
-    def _forget(self) -> None:
+    def _reset_parser(self) -> None:
         self._reader.reset()
 
-    def _retune(self, baud: int) -> None:
+    def _on_baud_change(self, baud: int) -> None:
         del baud  # asked anew for every packet
 
-    def _frames(self, data: bytes) -> Sequence[bytes]:
+    def _split(self, data: bytes) -> Sequence[bytes]:
         frames, at = [], 0
         while data.startswith(HEADER, at) and at + 4 <= len(data):
             end = at + 4 + data[at + 3]
@@ -97,10 +97,10 @@ class Ax12Line(Wire):
             at = end
         return [*frames, data[at:]]
 
-    def _obey(self, data: bytes, end_s: float) -> list[Answer]:
+    def _receive(self, data: bytes, end_s: float) -> list[Reply]:
         return [
             answer
-            for piece in self._heard(data, end_s)
+            for piece in self._instruction_with_faults(data, end_s)
             for packet in self._reader.feed(piece)
             for answer in self._execute(packet)
         ]
@@ -115,11 +115,11 @@ class Ax12Line(Wire):
             and abs(BAUD_CLOCK / (int(servos["Baud Rate"][row]) + 1) / rate - 1.0) <= BAUD_TOLERANCE
         ]
 
-    def _execute(self, packet: Packet1) -> list[Answer]:
+    def _execute(self, packet: Packet1) -> list[Reply]:
         code, params = packet.instruction, packet.params
         if code == Instruction1.SYNC_WRITE:
             return self._sync_write(packet)
-        voices = []
+        replies = []
         for row in self._hearing(packet.servo_id):
             own = int(self.servos["ID"][row])
             delay_s = int(self.servos["Return Delay Time"][row]) * RETURN_DELAY_UNIT_S
@@ -132,16 +132,16 @@ class Ax12Line(Wire):
                 continue
             if level >= asked and not self._muted[row]:
                 shown = error | int(self.servos.protection.shown[row])
-                voices.append((own, delay_s, frame(own, shown, data)))
-        voices.sort(key=lambda voice: voice[0])  # to a broadcast ping, IDs answer in turn
-        return [self._say(list(each)) for _, each in groupby(voices, lambda voice: voice[0])]
+                replies.append((own, delay_s, frame(own, shown, data)))
+        replies.sort(key=lambda reply: reply[0])  # to a broadcast ping, IDs answer in turn
+        return [self._respond(list(each)) for _, each in groupby(replies, lambda reply: reply[0])]
 
-    def _say(self, voices: list[tuple[int, float, bytes]]) -> Answer:
+    def _respond(self, replies: list[tuple[int, float, bytes]]) -> Reply:
         """What is heard of the servos with one ID."""
-        spoken = [(delay_s, data) for _, delay_s, data in voices]
-        delay_s, data, garbled = overlay(spoken, BITS_PER_BYTE / self.getBaudRate())
+        timed = [(delay_s, data) for _, delay_s, data in replies]
+        delay_s, data, garbled = bus_contention(timed, BITS_PER_BYTE / self.getBaudRate())
         self.collisions += garbled
-        return Answer(delay_s, data)
+        return Reply(delay_s, data)
 
     def _one(self, row: int, code: int, params: bytes) -> tuple[int, bytes]:
         """Error bits and parameters of the answer."""
@@ -165,7 +165,7 @@ class Ax12Line(Wire):
             return 0, b""
         return Error1.INSTRUCTION, b""
 
-    def _sync_write(self, packet: Packet1) -> list[Answer]:
+    def _sync_write(self, packet: Packet1) -> list[Reply]:
         params = packet.params
         if packet.intact and packet.servo_id == BROADCAST_ID and len(params) >= 2:
             address, size = params[0], params[1]

@@ -30,7 +30,7 @@ class FaultPlayer:
         self._start_s = line.clock.now_s()
         self._rows = {servo: row for row, servo in enumerate(line.ids())}
         self._check(faults, source)
-        self.noise = Noise(random.Random(faults.seed), self._start_s, line.speakers)
+        self.noise = Noise(random.Random(faults.seed), self._start_s, line.senders)
         self.stalls: list[tuple[float, float]] = []
         """When the host stands still, and for how long; times of the line's clock."""
         for fault in faults.fault:
@@ -43,7 +43,7 @@ class FaultPlayer:
         self.stalls.sort()
         line.attach(self)
 
-    def host_wakes_s(self, now_s: float) -> float:
+    def host_resumes_s(self, now_s: float) -> float:
         """When a host that wants to go on at ``now_s`` does."""
         while self.stalls and self.stalls[0][0] <= now_s:
             begin_s, for_s = self.stalls.pop(0)
@@ -65,11 +65,11 @@ class FaultPlayer:
                 if each not in self._rows
             ]
             if isinstance(fault, plan.Trip) and fault.kind != "reboot":
-                wrong += self._blind(fault, where)
+                wrong += self._undetectable(fault, where)
         if wrong:
             raise ConfigError(wrong)
 
-    def _blind(self, fault: plan.Trip, where: str) -> list[str]:
+    def _undetectable(self, fault: plan.Trip, where: str) -> list[str]:
         """What is wrong with an error that a servo named cannot detect."""
         known = {
             each: self._servos.protection.alarms(self._rows[each])
@@ -83,34 +83,36 @@ class FaultPlayer:
         ]
 
     def _plan(self, fault: plan.Fault) -> None:
-        begin, end = self._deeds(fault)
-        self._servos.agenda.plan(self._start_s + fault.at_s, self._known(begin))
+        begin, end = self._actions(fault)
+        self._servos.events.schedule(self._start_s + fault.at_s, self._then_refresh_ids(begin))
         for_s = getattr(fault, "for_s", None)
         if end is not None and for_s is not None:
-            self._servos.agenda.plan(self._start_s + fault.at_s + for_s, self._known(end))
+            self._servos.events.schedule(
+                self._start_s + fault.at_s + for_s, self._then_refresh_ids(end)
+            )
 
-    def _known(self, deed: Callable[[], None]) -> Callable[[], None]:
-        """A deed after which the line looks again at who is there."""
+    def _then_refresh_ids(self, action: Callable[[], None]) -> Callable[[], None]:
+        """Action after which the line looks up again who has which ID."""
 
         def act() -> None:
-            deed()
-            self._line.look_again()
+            action()
+            self._line.refresh_ids()
 
         return act
 
-    def _deeds(self, fault: plan.Fault) -> tuple[Callable[[], None], Callable[[], None] | None]:
+    def _actions(self, fault: plan.Fault) -> tuple[Callable[[], None], Callable[[], None] | None]:
         """What to do at the beginning and at the end."""
         line, servos = self._line, self._servos
         guard = servos.protection
         rows = np.array([self._rows[each] for each in getattr(fault, "ids", ())], np.intp)
         if isinstance(fault, plan.Port):
-            return line.vanish, line.come_back
+            return line.disconnect, line.reconnect
         if isinstance(fault, plan.Supply):
             some = rows if len(rows) else None
             return lambda: guard.supply(fault.volts, some), lambda: guard.supply(None, some)
         if isinstance(fault, plan.Unplug):
             behind = np.arange(self._rows[fault.behind] + 1, len(line.ids()))
-            return lambda: servos.cut_power(behind), lambda: servos.give_power(behind)
+            return lambda: servos.cut_power(behind), lambda: servos.restore_power(behind)
         if isinstance(fault, plan.Clash):
             row = self._rows[fault.id]
             return lambda: line.rename(row, fault.takes), lambda: line.rename(row, fault.id)
@@ -118,17 +120,17 @@ class FaultPlayer:
             return lambda: guard.heat(rows, fault.celsius), None
         if isinstance(fault, plan.Trip):
             return lambda: self._trip(rows, fault.kind), None
-        return self._servo_deeds(fault, rows)
+        return self._servo_actions(fault, rows)
 
-    def _servo_deeds(
+    def _servo_actions(
         self, fault: plan.Fault, rows: Indices
     ) -> tuple[Callable[[], None], Callable[[], None]]:
         line, servos = self._line, self._servos
         if fault.kind == "mute":
             return lambda: line.mute(rows, True), lambda: line.mute(rows, False)
         if fault.kind == "stuck":
-            return lambda: servos.seize(rows), lambda: servos.release(rows)
-        return lambda: servos.cut_power(rows), lambda: servos.give_power(rows)
+            return lambda: servos.block_shafts(rows), lambda: servos.free_shafts(rows)
+        return lambda: servos.cut_power(rows), lambda: servos.restore_power(rows)
 
     def _trip(self, rows: Indices, kind: str) -> None:
         if kind == "reboot":

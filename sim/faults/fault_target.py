@@ -5,8 +5,8 @@ from typing import Protocol
 
 from snakewalk.config.arrays import Indices
 from snakewalk.sim.line.clock import SimClock
-from snakewalk.sim.line.noise import Script
-from snakewalk.sim.servo.event_queue import Agenda
+from snakewalk.sim.line.noise import FaultScript
+from snakewalk.sim.servo.event_queue import EventQueue
 
 
 class Guard(Protocol):
@@ -33,7 +33,7 @@ class FaultyServos(Protocol):
     """The servos of a line; a row is a place along the chain."""
 
     @property
-    def agenda(self) -> Agenda:
+    def events(self) -> EventQueue:
         """What happens to them at a time of its own."""
         ...
 
@@ -42,19 +42,19 @@ class FaultyServos(Protocol):
         """What they guard themselves against."""
         ...
 
-    def seize(self, rows: Indices) -> None:
-        """Jam shafts where they are."""
+    def block_shafts(self, rows: Indices) -> None:
+        """Block shafts where they are."""
         ...
 
-    def release(self, rows: Indices) -> None:
-        """Free jammed shafts."""
+    def free_shafts(self, rows: Indices) -> None:
+        """Free blocked shafts."""
         ...
 
     def cut_power(self, rows: Indices) -> None:
         """Take the supply away."""
         ...
 
-    def give_power(self, rows: Indices) -> None:
+    def restore_power(self, rows: Indices) -> None:
         """Give it back; the servos start anew."""
         ...
 
@@ -77,7 +77,7 @@ class FaultTarget(Protocol):
         """The ID of each row."""
         ...
 
-    def speakers(self, answer: bytes) -> Collection[int]:
+    def senders(self, answer: bytes) -> Collection[int]:
         """IDs of the servos that have written an answer."""
         ...
 
@@ -89,18 +89,18 @@ class FaultTarget(Protocol):
         """Let servos fall silent, or speak again."""
         ...
 
-    def look_again(self) -> None:
-        """Take note that IDs, power or voices have changed."""
+    def refresh_ids(self) -> None:
+        """Look up again who has which ID, after IDs, power or muting have changed."""
         ...
 
-    def vanish(self) -> None:
+    def disconnect(self) -> None:
         """Take the port away."""
         ...
 
-    def come_back(self) -> None:
+    def reconnect(self) -> None:
         """Give the port back."""
         ...
 
-    def attach(self, script: Script) -> None:
+    def attach(self, script: FaultScript) -> None:
         """Let a script act on packets and host."""
         ...

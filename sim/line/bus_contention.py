@@ -3,17 +3,19 @@
 from collections.abc import Sequence
 
 
-def overlay(voices: Sequence[tuple[float, bytes]], byte_s: float) -> tuple[float, bytes, bool]:
-    """Start, bytes and whether they were garbled, of ``voices`` (start in s, bytes).
+def bus_contention(
+    replies: Sequence[tuple[float, bytes]], byte_s: float
+) -> tuple[float, bytes, bool]:
+    """Start, bytes and whether they were garbled, of ``replies`` (start in s, bytes).
 
-    Voices that say the same at the same time are one voice, as on metal. Otherwise bits are ANDed
+    Voices that say the same at the same time are one reply, as on metal. Otherwise bits are ANDed
     where they overlap, in whole bytes.
     """
-    start_s, first = min(voices)
-    if all(voice == (start_s, first) for voice in voices):
+    start_s, first = min(replies)
+    if all(reply == (start_s, first) for reply in replies):
         return start_s, first, False
     mixed = bytearray()
-    for begin_s, data in voices:
+    for begin_s, data in replies:
         at = round((begin_s - start_s) / byte_s)
         mixed += b"\xff" * (at + len(data) - len(mixed))
         for k, byte in enumerate(data, at):

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Bytes
 from snakewalk.drivers.protocol.crc import TABLE, crc16
 from snakewalk.drivers.protocol.packet import HEADER, STATUS, Instruction, fast_head, stuff
-from snakewalk.sim.line.instruction_handler import RETURN_DELAY_UNIT_S, Answer, Service
-from snakewalk.sim.servo.servo_loops import compose, crc_of
+from snakewalk.sim.line.instruction_handler import RETURN_DELAY_UNIT_S, InstructionHandler, Reply
+from snakewalk.sim.servo.servo_loops import crc_of, fill_replies
 
 MOTION = range(126, 136)
 """Present Current, Velocity and Position: refreshed alone where nothing else is read."""
@@ -46,13 +46,13 @@ class GroupRead(ABC):
         self._share = frames.shape[1]
         self._shape = np.array([len(head), self._share, error_at, data_at])
 
-    def answers(self, table: Bytes, whole: bool) -> list[Answer]:
+    def answers(self, table: Bytes, whole: bool) -> list[Reply]:
         """Packets with the table's present bytes."""
-        compose(self._packet, self._shape, table, self._rows, self._block, TABLE)
+        fill_replies(self._packet, self._shape, table, self._rows, self._block, TABLE)
         return self._cut(self._packet.tobytes(), whole)
 
     @abstractmethod
-    def _cut(self, raw: bytes, whole: bool) -> list[Answer]:
+    def _cut(self, raw: bytes, whole: bool) -> list[Reply]:
         """Cut the answer into the packets that it is."""
 
     @abstractmethod
@@ -70,14 +70,14 @@ class PlainRead(GroupRead):
         frames[:, 4] = ids
         return b"", frames, 8, 9
 
-    def _cut(self, raw: bytes, whole: bool) -> list[Answer]:
+    def _cut(self, raw: bytes, whole: bool) -> list[Reply]:
         size = self._share
         frames = [raw[at : at + size] for at in range(0, len(raw), size)]
         if raw.count(HEADER[:3]) > len(frames):  # some data look like a header
             frames = [self._stuffed(frame) for frame in frames]
         elif whole and self._gapless:
-            return [Answer(self._delays_s[0], raw)]
-        return [Answer(*each) for each in zip(self._delays_s, frames, strict=True)]
+            return [Reply(self._delays_s[0], raw)]
+        return [Reply(*each) for each in zip(self._delays_s, frames, strict=True)]
 
     @staticmethod
     def _stuffed(frame: bytes) -> bytes:
@@ -94,8 +94,8 @@ class FastRead(GroupRead):
         frames[:, 1] = ids
         return fast_head(frames.size), frames, 0, 2
 
-    def _cut(self, raw: bytes, whole: bool) -> list[Answer]:
-        return [Answer(self._delays_s[0], raw)]
+    def _cut(self, raw: bytes, whole: bool) -> list[Reply]:
+        return [Reply(self._delays_s[0], raw)]
 
 
 _PREFIX = HEADER + b"\xfe"
@@ -106,22 +106,22 @@ _GOALS = b"\x74\x00\x04\x00"
 class GroupPath:
     """Vectorised sync write of goal positions and (fast) sync read of any block."""
 
-    def __init__(self, service: Service) -> None:
-        self._service = service
-        self._firmware = service.firmware
-        self._bank = service.bank
+    def __init__(self, handler: InstructionHandler) -> None:
+        self._handler = handler
+        self._firmware = handler.firmware
+        self._bank = handler.bank
         self._status_address = self._bank.register("Hardware Error Status").address
         self._version = -1
         self._reads: dict[bytes, GroupRead] = {}
         self._goals: tuple[bytes, bytes, NDArray[np.intp]] | None = None
 
-    def execute(self, raw: bytes, now_s: float, whole: bool) -> list[Answer] | None:
+    def execute(self, raw: bytes, now_s: float, whole: bool) -> list[Reply] | None:
         """Carry out ``raw`` if it is plain, else return None and leave all as it was.
 
         ``whole`` joins packets that follow each other without a gap into one piece.
         """
-        if self._version != self._service.version:
-            self._version = self._service.version
+        if self._version != self._handler.version:
+            self._version = self._handler.version
             self._reads.clear()
             self._goals = None
         read = self._reads.get(raw)
@@ -134,24 +134,24 @@ class GroupPath:
             if read is None:
                 return None
             self._reads[raw] = read
-        self._firmware.heard(now_s)
+        self._firmware.on_instruction(now_s)
         if read.motion:
             self._firmware.refresh_motion()
         else:
             self._firmware.refresh(read.address, read.length)
         return read.answers(self._bank.table, whole)
 
-    def _write_goals(self, raw: bytes, now_s: float) -> list[Answer] | None:
+    def _write_goals(self, raw: bytes, now_s: float) -> list[Reply] | None:
         head, ids = raw[:12], raw[12:-2:5]
         known = self._goals
         if known is None or known[0] != head or known[1] != ids:
-            rows = self._service.roll.rows[np.frombuffer(ids, np.uint8)]
+            rows = self._handler.directory.rows[np.frombuffer(ids, np.uint8)]
             if (len(raw) - 14) % 5 or (rows < 0).any() or len(np.unique(rows)) != len(rows):
                 return None
             known = self._goals = (head, ids, rows)
         if not _intact(raw):
             return None
-        self._firmware.heard(now_s)
+        self._firmware.on_instruction(now_s)
         self._firmware.write_goals(known[2], np.frombuffer(raw, np.uint8), 12)
         return []
 
@@ -160,7 +160,7 @@ class GroupPath:
             return None
         address, length = int.from_bytes(raw[8:10], "little"), int.from_bytes(raw[10:12], "little")
         ids = np.frombuffer(raw, np.uint8, len(raw) - 14, 12)
-        rows = self._service.roll.rows[ids]
+        rows = self._handler.directory.rows[ids]
         if (rows < 0).any() or not self._bank.readable(address, length):
             return None
         if (self._bank["Status Return Level"][rows] < 1).any():

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from snakewalk.sim.servo.bank import ServoBank
 
 NOBODY, SPECIAL = -1, -2
-"""Entries of ``Roll.rows`` that are no row."""
+"""Entries of ``IdDirectory.rows`` that are no row."""
 _SECONDARY_OFF = 253
 """Secondary(Shadow) ID(12) from here on means none (e-manual)."""
 
 
-class Roll:
+class IdDirectory:
     """The servos with power at the line's baud rate, by primary and by secondary ID."""
 
     def __init__(self, bank: ServoBank) -> None:
@@ -29,7 +29,7 @@ class Roll:
         """Look up who is there after IDs, baud rates or power have changed."""
         bank = self._bank
         first, second = defaultdict(list), defaultdict(list)
-        for row in bank.listeners(baud):
+        for row in bank.tuned_to(baud):
             if not powered[row]:
                 continue
             own, shared = int(bank["ID"][row]), int(bank["Secondary(Shadow) ID"][row])
@@ -60,6 +60,6 @@ class Roll:
         """Rows of the servos that share this secondary ID: they obey, and never answer."""
         return self._second.get(servo_id, [])
 
-    def speaking(self, servo_id: int) -> list[int]:
+    def replying(self, servo_id: int) -> list[int]:
         """Rows that answer to this ID."""
         return [row for row in self.primary(servo_id) if not self.mute[row]]

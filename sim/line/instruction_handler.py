@@ -15,9 +15,9 @@ from snakewalk.drivers.protocol.packet import (
     encode_fast,
     encode_status,
 )
-from snakewalk.sim.line.bus_contention import overlay
-from snakewalk.sim.line.id_directory import Roll
-from snakewalk.sim.line.instructions import Orders, word
+from snakewalk.sim.line.bus_contention import bus_contention
+from snakewalk.sim.line.id_directory import IdDirectory
+from snakewalk.sim.line.instructions import Instructions, word
 from snakewalk.sim.servo.firmware import Firmware
 
 LONGEST = 0xFFFF
@@ -28,42 +28,42 @@ BITS_PER_BYTE = 10
 """Start bit, eight data bits, stop bit."""
 
 
-class Answer(NamedTuple):
+class Reply(NamedTuple):
     """Bytes on the wire after a silence."""
 
     delay_s: float
     data: bytes
 
 
-class Service:
+class InstructionHandler:
     """Executes instruction packets on a firmware and composes the answers."""
 
     def __init__(self, firmware: Firmware, baud: int) -> None:
         self.firmware = firmware
         self.bank = firmware.bank
         self.baud = baud
-        self.roll = Roll(self.bank)
+        self.directory = IdDirectory(self.bank)
         self.version = 0
         """Grows whenever registers were written, so that others know what to look up again."""
         self.collisions = 0
         """Answers that were garbled because servos spoke at once."""
-        self.retune()
-        self._orders = Orders(firmware)
+        self.refresh_ids()
+        self._instructions = Instructions(firmware)
 
-    def retune(self) -> None:
+    def refresh_ids(self) -> None:
         """Look up again who listens at the line's baud rate, under which ID."""
-        self.roll.call(self.baud, self.firmware.powered)
+        self.directory.call(self.baud, self.firmware.powered)
         self.version += 1
 
     def delay_s(self, row: int) -> float:
         """Silence that a servo keeps before it answers."""
         return int(self.bank["Return Delay Time"][row]) * RETURN_DELAY_UNIT_S
 
-    def execute(self, packet: InstructionPacket, now_s: float) -> list[Answer]:
+    def execute(self, packet: InstructionPacket, now_s: float) -> list[Reply]:
         """Carry out a valid packet that ended at ``now_s``; the firmware is already there."""
-        if not self.roll.present():
+        if not self.directory.present():
             return []
-        self.firmware.heard(now_s)
+        self.firmware.on_instruction(now_s)
         code, params, servo_id = packet.instruction, packet.params, packet.servo_id
         if code == Instruction.PING:
             return self._ping(servo_id)
@@ -77,40 +77,40 @@ class Service:
             return self._bulk_write(params)
         if servo_id == BROADCAST_ID:
             whole = code == Instruction.FACTORY_RESET and params == b"\xff"
-            for row in [] if whole else self.roll.present():  # refused since firmware 42
+            for row in [] if whole else self.directory.present():  # refused since firmware 42
                 self._one(row, code, params)
             return []
         if code == Instruction.READ:
             return self._read(servo_id, params)
-        voices = []
-        for row in self.roll.primary(servo_id):
+        replies = []
+        for row in self.directory.primary(servo_id):
             level, delay_s = int(self.bank["Status Return Level"][row]), self.delay_s(row)
             error = self._one(row, code, params)
-            if level == 2 and not self.roll.mute[row]:
-                voices.append((delay_s, self._status(row, servo_id, error, b"")))
-        for row in self.roll.secondary(servo_id):
+            if level == 2 and not self.directory.mute[row]:
+                replies.append((delay_s, self._status(row, servo_id, error, b"")))
+        for row in self.directory.secondary(servo_id):
             self._one(row, code, params, ram_only=True)
-        return self._speak(voices)
+        return self._respond(replies)
 
-    def _speak(self, voices: list[tuple[float, bytes]]) -> list[Answer]:
-        if not voices:
+    def _respond(self, replies: list[tuple[float, bytes]]) -> list[Reply]:
+        if not replies:
             return []
-        delay_s, data, garbled = overlay(voices, BITS_PER_BYTE / self.baud)
+        delay_s, data, garbled = bus_contention(replies, BITS_PER_BYTE / self.baud)
         self.collisions += garbled
-        return [Answer(delay_s, data)]
+        return [Reply(delay_s, data)]
 
     def _status(self, row: int, servo_id: int, error: int, data: bytes) -> bytes:
         return encode_status(StatusPacket(servo_id, error | int(self.bank.alert(row)), data))
 
-    def _ping(self, servo_id: int) -> list[Answer]:
+    def _ping(self, servo_id: int) -> list[Reply]:
         answers = []
-        for each in self.roll.ids() if servo_id == BROADCAST_ID else (servo_id,):
-            voices = []
-            for row in self.roll.speaking(each):
+        for each in self.directory.ids() if servo_id == BROADCAST_ID else (servo_id,):
+            replies = []
+            for row in self.directory.replying(each):
                 model, firmware = self.bank["Model Number"][row], self.bank["Firmware Version"][row]
                 data = int(model).to_bytes(2, "little") + bytes((int(firmware),))
-                voices.append((self.delay_s(row), self._status(row, each, 0, data)))
-            answers += self._speak(voices)
+                replies.append((self.delay_s(row), self._status(row, each, 0, data)))
+            answers += self._respond(replies)
         return answers
 
     def _block(self, row: int, address: int, length: int) -> tuple[int, bytes]:
@@ -118,30 +118,30 @@ class Service:
             return ResultError.ACCESS, b""
         return 0, self.bank.table[row, address : address + length].tobytes()
 
-    def _read(self, servo_id: int, params: bytes) -> list[Answer]:
+    def _read(self, servo_id: int, params: bytes) -> list[Reply]:
         self.firmware.refresh()
-        voices = []
-        for row in self.roll.speaking(servo_id):
+        replies = []
+        for row in self.directory.replying(servo_id):
             if self.bank["Status Return Level"][row] < 1:
                 continue
             error, data = ResultError.DATA_LENGTH.value, b""
             if len(params) == 4:
                 error, data = self._block(row, word(params, 0), word(params, 2))
-            voices.append((self.delay_s(row), self._status(row, servo_id, error, data)))
-        return self._speak(voices)
+            replies.append((self.delay_s(row), self._status(row, servo_id, error, data)))
+        return self._respond(replies)
 
-    def _sync_read(self, params: bytes, *, fast: bool) -> list[Answer]:
+    def _sync_read(self, params: bytes, *, fast: bool) -> list[Reply]:
         asked = [(each, word(params, 0), word(params, 2)) for each in params[4:]]
         return self._group_read(asked, fast)
 
-    def _bulk_read(self, params: bytes, *, fast: bool) -> list[Answer]:
+    def _bulk_read(self, params: bytes, *, fast: bool) -> list[Reply]:
         asked = [
             (params[at], word(params, at + 1), word(params, at + 3))
             for at in range(0, len(params) - 4, 5)
         ]
         return self._group_read(asked, fast)
 
-    def _group_read(self, asked: list[tuple[int, int, int]], fast: bool) -> list[Answer]:
+    def _group_read(self, asked: list[tuple[int, int, int]], fast: bool) -> list[Reply]:
         """Servos answer in the order asked; each waits for the one before.
 
         So after one that is silent, the rest is silent too (ROBOTIS on the SDK's issue tracker).
@@ -149,13 +149,13 @@ class Service:
         if fast and sum(length + 4 for _, _, length in asked) + 1 > LONGEST:
             return []  # no length field could announce the common answer
         self.firmware.refresh()
-        answers: list[Answer] = []
+        answers: list[Reply] = []
         parts: list[tuple[int, int, bytes]] = []
         first_s, garbled = 0.0, False
         for servo_id, address, length in asked:
             rows = [
                 row
-                for row in self.roll.speaking(servo_id)
+                for row in self.directory.replying(servo_id)
                 if self.bank["Status Return Level"][row] >= 1
             ]
             if not rows:
@@ -170,7 +170,7 @@ class Service:
                 garbled |= any(part != said[0] for part in said)
                 parts.append(said[0])
             else:
-                answers += self._speak(
+                answers += self._respond(
                     [
                         (self.delay_s(row), self._status(row, servo_id, error, data))
                         for row, (error, data) in zip(rows, blocks, strict=True)
@@ -180,17 +180,17 @@ class Service:
             whole = sum(length + 4 for _, _, length in asked)
             data = encode_fast(parts, whole)
             self.collisions += garbled
-            answers.append(Answer(first_s, data[:-2] + b"\0\0" if garbled else data))
+            answers.append(Reply(first_s, data[:-2] + b"\0\0" if garbled else data))
         return answers
 
-    def _sync_write(self, params: bytes) -> list[Answer]:
+    def _sync_write(self, params: bytes) -> list[Reply]:
         address, length = word(params, 0), word(params, 2)
         for at in range(4, len(params) - length, length + 1):
             self._write(params[at], address, params[at + 1 : at + 1 + length])
         self._written()
         return []
 
-    def _bulk_write(self, params: bytes) -> list[Answer]:
+    def _bulk_write(self, params: bytes) -> list[Reply]:
         at = 0
         while at + 5 <= len(params):
             length = word(params, at + 3)
@@ -202,16 +202,16 @@ class Service:
         return []
 
     def _write(self, servo_id: int, address: int, data: bytes) -> None:
-        for row in self.roll.primary(servo_id):
-            self._orders.write(row, address, data)
-        for row in self.roll.secondary(servo_id):
-            self._orders.write(row, address, data, ram_only=True)
+        for row in self.directory.primary(servo_id):
+            self._instructions.write(row, address, data)
+        for row in self.directory.secondary(servo_id):
+            self._instructions.write(row, address, data, ram_only=True)
 
     def _one(self, row: int, code: int, params: bytes, *, ram_only: bool = False) -> int:
-        error = self._orders.carry_out(row, code, params, ram_only=ram_only)
+        error = self._instructions.carry_out(row, code, params, ram_only=ram_only)
         self._written()
         return int(error)
 
     def _written(self) -> None:
-        self.firmware.changed()
-        self.retune()
+        self.firmware.apply_registers()
+        self.refresh_ids()

@@ -18,7 +18,7 @@ RESET_KEEPS = {0xFF: (), 0x01: ("ID",), 0x02: ("ID", "Baud Rate")}
 """Factory Reset option -> registers that stay, e-manual."""
 
 
-class Orders:
+class Instructions:
     """Instructions to a single servo that answer with an error number and nothing else."""
 
     def __init__(self, firmware: Firmware) -> None:
@@ -53,7 +53,7 @@ class Orders:
         """Write, and wake a servo that goals wake."""
         error = self.bank.write(row, address, data, ram_only=ram_only)
         if not error and address + len(data) > self._goals.start and address < self._goals.stop:
-            self.firmware.wake(np.array([row]))
+            self.firmware.enable_by_goal(np.array([row]))
         return error
 
     def _action(self, row: int, params: bytes) -> int:

@@ -11,10 +11,10 @@ from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.plant import Plant
 from snakewalk.sim.servo.bank import TABLE_BYTES
 from snakewalk.sim.servo.bench import BenchPlant
-from snakewalk.sim.servo.event_queue import Agenda
+from snakewalk.sim.servo.event_queue import EventQueue
 from snakewalk.sim.servo.firmware import Firmware
 from snakewalk.sim.servo.mixed_bank import MixedBank
-from snakewalk.sim.servo.protection import Protection, Surroundings
+from snakewalk.sim.servo.protection import Protection, SupplyAndAmbient
 
 _ENTRY = 5
 """Bytes of one servo's goal in a sync write: ID and value."""
@@ -54,14 +54,14 @@ class MixedFirmware(Firmware):
     """Firmware of every part of ``bank``, each on its own plant; rows are those of the chain."""
 
     def __init__(
-        self, bank: MixedBank, plants: Sequence[Plant], around: Surroundings | None = None
+        self, bank: MixedBank, plants: Sequence[Plant], around: SupplyAndAmbient | None = None
     ) -> None:
         self.bank: MixedBank = bank
         self.parts = tuple(
             Firmware(own, plant, around) for own, plant in zip(bank.parts, plants, strict=True)
         )
         self.protection = MixedProtection(bank, [part.protection for part in self.parts])
-        self.agenda = Agenda()
+        self.events = EventQueue()
         self.powered = np.ones(len(bank), bool)
         bounds = [*bank.starts[1:], len(bank)]
         for part, low, high in zip(self.parts, bank.starts, bounds, strict=True):
@@ -69,24 +69,24 @@ class MixedFirmware(Firmware):
 
     def advance(self, until_s: float) -> None:
         """As ``Firmware.advance``, all parts in step wherever something is planned."""
-        while self.agenda.next_s <= until_s:
-            due_s = self.agenda.next_s
+        while self.events.next_s <= until_s:
+            due_s = self.events.next_s
             for part in self.parts:
                 part.advance(due_s)
-            self.agenda.carry_out(due_s)
-            self.changed()
+            self.events.run_due(due_s)
+            self.apply_registers()
         for part in self.parts:
             part.advance(until_s)
 
-    def heard(self, time_s: float) -> None:
+    def on_instruction(self, time_s: float) -> None:
         """As ``Firmware.heard``: a packet is heard along the whole chain."""
         for part in self.parts:
-            part.heard(time_s)
+            part.on_instruction(time_s)
 
-    def changed(self) -> None:
+    def apply_registers(self) -> None:
         """As ``Firmware.changed``."""
         for part in self.parts:
-            part.changed()
+            part.apply_registers()
 
     def write_goals(self, rows: Indices, raw: NDArray[np.uint8], at: int) -> None:
         """As ``Firmware.write_goals``, each part with its own entries."""
@@ -96,10 +96,10 @@ class MixedFirmware(Firmware):
             mine = np.ascontiguousarray(entries[which == part]).ravel()
             self.parts[part].write_goals(own, mine, 0)
 
-    def wake(self, rows: Indices) -> None:
+    def enable_by_goal(self, rows: Indices) -> None:
         """As ``Firmware.wake``."""
         for part, own in self.bank.split(rows):
-            self.parts[part].wake(own)
+            self.parts[part].enable_by_goal(own)
 
     def reboot(self, row: int, factory_keeping: tuple[str, ...] | None = None) -> None:
         """As ``Firmware.reboot``."""
@@ -121,25 +121,25 @@ class MixedFirmware(Firmware):
         part, own = self._own(row)
         return part.clear_error(own)
 
-    def seize(self, rows: Indices) -> None:
+    def block_shafts(self, rows: Indices) -> None:
         """As ``Firmware.seize``."""
         for part, own in self.bank.split(rows):
-            self.parts[part].seize(own)
+            self.parts[part].block_shafts(own)
 
-    def release(self, rows: Indices) -> None:
+    def free_shafts(self, rows: Indices) -> None:
         """As ``Firmware.release``."""
         for part, own in self.bank.split(rows):
-            self.parts[part].release(own)
+            self.parts[part].free_shafts(own)
 
     def cut_power(self, rows: Indices) -> None:
         """As ``Firmware.cut_power``."""
         for part, own in self.bank.split(rows):
             self.parts[part].cut_power(own)
 
-    def give_power(self, rows: Indices) -> None:
-        """As ``Firmware.give_power``."""
+    def restore_power(self, rows: Indices) -> None:
+        """As ``Firmware.restore_power``."""
         for part, own in self.bank.split(rows):
-            self.parts[part].give_power(own)
+            self.parts[part].restore_power(own)
 
     def refresh_motion(self) -> None:
         """As ``Firmware.refresh_motion``."""
@@ -173,8 +173,8 @@ class MixedLine(SimLine):
         super().__init__(bank, self._benches[0], clock, baud)
 
     def _firmware(
-        self, bank: object, plant: Plant, surroundings: Surroundings | None
+        self, bank: object, plant: Plant, supply_and_ambient: SupplyAndAmbient | None
     ) -> MixedFirmware:
         del plant  # the first of the benches
         assert isinstance(bank, MixedBank)
-        return MixedFirmware(bank, self._benches, surroundings)
+        return MixedFirmware(bank, self._benches, supply_and_ambient)

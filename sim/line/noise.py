@@ -13,15 +13,15 @@ DELAY_S, LATE_S = 1e-3, 0.05
 class Noise:
     """The noise faults of a plan; ``chance`` draws and wrong bits come from one seeded source.
 
-    ``speakers`` says who has written an answer.
+    ``senders`` says who has written an answer.
     """
 
     def __init__(
-        self, source: random.Random, start_s: float, speakers: Callable[[bytes], Collection[int]]
+        self, source: random.Random, start_s: float, senders: Callable[[bytes], Collection[int]]
     ) -> None:
         self._random = source
         self._start_s = start_s
-        self._speakers = speakers
+        self._senders = senders
         self._faults: list[plan.Noise] = []
         self.counts: dict[str, int] = {}
         """Packets changed so far, by kind."""
@@ -35,13 +35,13 @@ class Noise:
         """Whether there is anything to do at all."""
         return bool(self._faults)
 
-    def answer(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
-        """What arrives of an answer: packets, each with the time by which it is slow."""
+    def reply(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
+        """Packets that arrive of one reply, each with the time by which it is late."""
         return self._change(data, now_s, "answers")
 
-    def question(self, data: bytes, now_s: float) -> list[bytes]:
-        """What the servos hear of an instruction packet."""
-        return [heard for _, heard in self._change(data, now_s, "questions")]
+    def instruction(self, data: bytes, now_s: float) -> list[bytes]:
+        """Packets that the servos receive of one instruction."""
+        return [packet for _, packet in self._change(data, now_s, "questions")]
 
     def _change(self, data: bytes, now_s: float, of: str) -> list[tuple[float, bytes]]:
         packets = [(0.0, data)]
@@ -58,7 +58,7 @@ class Noise:
             return False
         if fault.for_s is not None and since_s >= fault.for_s:
             return False
-        if fault.ids and not set(fault.ids).intersection(self._speakers(data)):
+        if fault.ids and not set(fault.ids).intersection(self._senders(data)):
             return False
         return fault.chance >= 1.0 or self._random.random() < fault.chance
 
@@ -77,11 +77,11 @@ class Noise:
         return [(slow_s, data)]
 
 
-class Script(Protocol):
+class FaultScript(Protocol):
     """What a fault file does to packets and to the host."""
 
     noise: Noise
 
-    def host_wakes_s(self, now_s: float) -> float:
+    def host_resumes_s(self, now_s: float) -> float:
         """When a host that wants to go on at ``now_s`` does."""
         ...

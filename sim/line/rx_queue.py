@@ -6,7 +6,7 @@ EARLY = 1e-6
 """Share of a byte time by which rounding may make a byte late."""
 
 
-class Arrivals:
+class RxQueue:
     """Packets in the order in which they begin on the wire, taken out byte by byte."""
 
     def __init__(self) -> None:

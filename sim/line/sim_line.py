@@ -9,13 +9,13 @@ from snakewalk.drivers.protocol.packet import BROADCAST_ID, HEADER, Instruction,
 from snakewalk.drivers.protocol.parser import PacketReader
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.group_fast_path import GroupPath
-from snakewalk.sim.line.id_directory import Roll
-from snakewalk.sim.line.instruction_handler import Answer, Service
+from snakewalk.sim.line.id_directory import IdDirectory
+from snakewalk.sim.line.instruction_handler import InstructionHandler, Reply
 from snakewalk.sim.line.wire import Wire
 from snakewalk.sim.plant import Plant
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.firmware import Firmware
-from snakewalk.sim.servo.protection import Surroundings
+from snakewalk.sim.servo.protection import SupplyAndAmbient
 
 Tamper = Callable[[bytes], Sequence[bytes]]
 """What becomes of one answer on the wire: itself, nothing, or other packets, in order."""
@@ -35,24 +35,24 @@ class SimLine(Wire):
         clock: SimClock | None = None,
         baud: int = 1_000_000,
         *,
-        surroundings: Surroundings | None = None,
+        supply_and_ambient: SupplyAndAmbient | None = None,
         tamper: Tamper | None = None,
         usb_latency_s: float = 0.0,
     ) -> None:
         super().__init__(clock if clock is not None else SimClock(plant.time_s), usb_latency_s)
-        self.firmware = self._firmware(bank, plant, surroundings)
+        self.firmware = self._firmware(bank, plant, supply_and_ambient)
         self.bank = bank
         self.tamper = tamper
-        self._service = Service(self.firmware, baud)
-        self._group = GroupPath(self._service)
+        self._handler = InstructionHandler(self.firmware, baud)
+        self._group = GroupPath(self._handler)
         self._reader = PacketReader()
         self._asked = b""
         self.setBaudRate(baud)
 
     @property
-    def roll(self) -> Roll:
+    def directory(self) -> IdDirectory:
         """Who hears which ID."""
-        return self._service.roll
+        return self._handler.directory
 
     # what a fault file needs
 
@@ -65,7 +65,7 @@ class SimLine(Wire):
         """The ID of each row."""
         return [int(each) for each in self.bank["ID"]]
 
-    def speakers(self, answer: bytes) -> Collection[int]:
+    def senders(self, answer: bytes) -> Collection[int]:
         """Who has written an answer: one servo, or all that a fast read has asked."""
         if answer[_ID_AT] != BROADCAST_ID:
             return (answer[_ID_AT],)
@@ -78,11 +78,11 @@ class SimLine(Wire):
 
     def mute(self, rows: NDArray[np.intp], on: bool) -> None:
         """Let servos fall silent, or speak again; they hear and obey."""
-        self.roll.mute[rows] = on
+        self.directory.mute[rows] = on
 
-    def look_again(self) -> None:
-        """Take note that IDs, power or voices have changed by other means than a packet."""
-        self._service.retune()
+    def refresh_ids(self) -> None:
+        """Take note that IDs, power or replies have changed by other means than a packet."""
+        self._handler.refresh_ids()
 
     def shown(self, register: str) -> NDArray[np.signedinteger]:
         """(S,) values of a register as a read now would show them; a copy."""
@@ -92,47 +92,47 @@ class SimLine(Wire):
     # the wire
 
     def _firmware(
-        self, bank: ServoBank, plant: Plant, surroundings: Surroundings | None
+        self, bank: ServoBank, plant: Plant, supply_and_ambient: SupplyAndAmbient | None
     ) -> Firmware:
-        return Firmware(bank, plant, surroundings)
+        return Firmware(bank, plant, supply_and_ambient)
 
     def _advance(self, until_s: float) -> None:
         self.firmware.advance(until_s)
 
-    def _forget(self) -> None:
+    def _reset_parser(self) -> None:
         self._reader.reset()
 
-    def _retune(self, baud: int) -> None:
-        self._service.baud = baud
-        self._service.retune()
+    def _on_baud_change(self, baud: int) -> None:
+        self._handler.baud = baud
+        self._handler.refresh_ids()
 
-    def _obey(self, data: bytes, end_s: float) -> list[Answer]:
+    def _receive(self, data: bytes, end_s: float) -> list[Reply]:
         """Let the servos hear what the host has sent."""
         self._asked = data
         if self._script is None:
             apart = self.tamper is not None or bool(self.taps)
             quick = self._group.execute(data, end_s, whole=not apart)
             return self._one_by_one(data, end_s) if quick is None else quick
-        answers: list[Answer] = []
-        for piece in self._heard(data, end_s):
+        answers: list[Reply] = []
+        for piece in self._instruction_with_faults(data, end_s):
             quick = self._group.execute(piece, end_s, whole=False)
             answers += self._one_by_one(piece, end_s) if quick is None else quick
         return answers
 
-    def _one_by_one(self, data: bytes, end_s: float) -> list[Answer]:
+    def _one_by_one(self, data: bytes, end_s: float) -> list[Reply]:
         return [
             answer
             for packet in self._reader.feed(data)
             if isinstance(packet, InstructionPacket)
-            for answer in self._service.execute(packet, end_s)
+            for answer in self._handler.execute(packet, end_s)
         ]
 
-    def _fate(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:
+    def _reply_with_faults(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:
         if self.tamper is not None:
             return [(0.0, packet) for packet in self.tamper(data)]
-        return ((0.0, data),) if self._script is None else super()._fate(data, now_s)
+        return ((0.0, data),) if self._script is None else super()._reply_with_faults(data, now_s)
 
-    def _frames(self, data: bytes) -> Sequence[bytes]:
+    def _split(self, data: bytes) -> Sequence[bytes]:
         if len(data) >= 7 and data[5] | data[6] << 8 == len(data) - 7:
             return (data,)
         frames, at = [], 0

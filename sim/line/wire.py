@@ -17,9 +17,9 @@ from collections.abc import Callable, Iterable, Sequence
 
 from snakewalk.drivers.errors import PortError
 from snakewalk.sim.line.clock import SimClock
-from snakewalk.sim.line.instruction_handler import BITS_PER_BYTE, Answer
-from snakewalk.sim.line.noise import Script
-from snakewalk.sim.line.rx_queue import Arrivals
+from snakewalk.sim.line.instruction_handler import BITS_PER_BYTE, Reply
+from snakewalk.sim.line.noise import FaultScript
+from snakewalk.sim.line.rx_queue import RxQueue
 
 LATENCY_S = 0.016
 """The SDK's allowance for the adapter's latency timer; a packet may take two of them and 2 ms."""
@@ -29,7 +29,7 @@ INSTANT_S = 1e-9
 """Times closer than this are the same."""
 PATIENT_S = 0.01
 """An answer that is slower than this does not hold up the servos behind it (ours)."""
-Tap = Callable[[float, bool, bytes], None]
+PacketTap = Callable[[float, bool, bytes], None]
 """A listener on the wire: time of a packet's end, whether the host sent it, its bytes."""
 
 
@@ -43,10 +43,10 @@ class Wire(ABC):
         self.clock = clock
         self.usb_latency_s = usb_latency_s
         """By how much the host's adapter hands on bytes later than they are on the wire."""
-        self.taps: list[Tap] = []
+        self.taps: list[PacketTap] = []
         """Told of every packet on the wire: time of its end, from the host or not, bytes."""
-        self._script: Script | None = None
-        self._gone = False
+        self._script: FaultScript | None = None
+        self._disconnected = False
         self.is_using = False
         self.is_open = True
         self.busy_s = 0.0
@@ -54,7 +54,7 @@ class Wire(ABC):
         self.collisions = 0
         """Packets that the host began while servos were still answering."""
         self._sent: deque[tuple[float, bytes]] = deque()
-        self._arriving = Arrivals()
+        self._rx_queue = RxQueue()
         self._sent_until_s = self._quiet_s = self.clock.now_s()
         self._deadline_s = self._heard_until_s = self.clock.now_s()
 
@@ -65,44 +65,44 @@ class Wire(ABC):
         """Bring servos and physics to a time."""
 
     @abstractmethod
-    def _obey(self, data: bytes, end_s: float) -> list[Answer]:
+    def _receive(self, data: bytes, end_s: float) -> list[Reply]:
         """Let the servos hear what the host has sent."""
 
     @abstractmethod
-    def _forget(self) -> None:
+    def _reset_parser(self) -> None:
         """The line was quiet: a packet that has begun will not go on."""
 
     @abstractmethod
-    def _retune(self, baud: int) -> None:
+    def _on_baud_change(self, baud: int) -> None:
         """The host's side has another baud rate."""
 
     @abstractmethod
-    def _frames(self, data: bytes) -> Sequence[bytes]:
+    def _split(self, data: bytes) -> Sequence[bytes]:
         """Cut what is sent at once into packets, each of which counts when its own end arrives."""
 
     # what goes wrong on it
 
-    def attach(self, script: Script) -> None:
+    def attach(self, script: FaultScript) -> None:
         """Let a fault file act on this line."""
         self._script = script
 
-    def _heard(self, data: bytes, now_s: float) -> Sequence[bytes]:
+    def _instruction_with_faults(self, data: bytes, now_s: float) -> Sequence[bytes]:
         """What the servos hear of one packet that ends at ``now_s``."""
         if self._script is None or not self._script.noise.any:
             return (data,)
-        return self._script.noise.question(data, now_s)
+        return self._script.noise.instruction(data, now_s)
 
-    def _fate(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:
+    def _reply_with_faults(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:
         """What becomes of one answer that begins at ``now_s``, and by how much it is slow."""
         if self._script is None or not self._script.noise.any:
             return ((0.0, data),)
-        return self._script.noise.answer(data, now_s)
+        return self._script.noise.reply(data, now_s)
 
     # the byte port
 
     def openPort(self) -> bool:
         self.settle()
-        self.is_open = not self._gone
+        self.is_open = not self._disconnected
         return self.is_open
 
     def closePort(self) -> None:
@@ -111,9 +111,9 @@ class Wire(ABC):
     def setBaudRate(self, baudrate: int) -> bool:
         """Retune the host's side; servos at another rate no longer hear it."""
         self._baud = baudrate
-        self._byte_s = self._arriving.byte_s = BITS_PER_BYTE / baudrate
+        self._byte_s = self._rx_queue.byte_s = BITS_PER_BYTE / baudrate
         self.tx_time_per_byte = self._byte_s * 1e3
-        self._retune(baudrate)
+        self._on_baud_change(baudrate)
         return True
 
     def getBaudRate(self) -> int:
@@ -123,13 +123,13 @@ class Wire(ABC):
         """Drop what has arrived by now; bytes still under way will arrive all the same."""
         now_s = self.clock.now_s()
         self._carry_out(now_s)
-        if self._arriving:
-            self._arriving.take(1 << 30, now_s)
+        if self._rx_queue:
+            self._rx_queue.take(1 << 30, now_s)
 
     def getBytesAvailable(self) -> int:
         """Bytes that have arrived by now."""
         self._carry_out(self.clock.now_s())
-        return self._arriving.count(self.clock.now_s())
+        return self._rx_queue.count(self.clock.now_s())
 
     def writePort(self, packet: bytes | list[int]) -> int:
         """As ``write``; the number of bytes taken."""
@@ -163,7 +163,7 @@ class Wire(ABC):
 
     def write(self, data: bytes) -> None:
         """Put bytes on the wire behind those already there; returns at once."""
-        self._wake_host()
+        self._wait_for_host()
         start_s = max(self.clock.now_s(), self._sent_until_s)
         if self._sent:
             self._carry_out(start_s)
@@ -171,7 +171,7 @@ class Wire(ABC):
         if not clear:
             self._collide(start_s)
         end_s = start_s
-        for frame in self._frames(data):
+        for frame in self._split(data):
             end_s += len(frame) * self._byte_s
             if clear:
                 self._sent.append((end_s, frame))
@@ -180,11 +180,11 @@ class Wire(ABC):
 
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Up to ``count`` bytes; the clock moves to the last of them, or to ``deadline_s``."""
-        clock, arriving, sent = self.clock, self._arriving, self._sent
-        self._wake_host()
+        clock, rx_queue, sent = self.clock, self._rx_queue, self._sent
+        self._wait_for_host()
         limit_s = max(deadline_s, clock.now_s())
         while count > 0:
-            due_s = arriving.due_s(count) if arriving else None
+            due_s = rx_queue.due_s(count) if rx_queue else None
             if due_s is not None:
                 clock.sleep_until_s(min(due_s, limit_s))
                 break
@@ -193,7 +193,7 @@ class Wire(ABC):
                 break
             self._carry_out(sent[0][0])
         self._must_be_open()
-        return arriving.take(count, clock.now_s())
+        return rx_queue.take(count, clock.now_s())
 
     def drain_until_quiet(self, quiet_s: float) -> int:
         """Throw bytes away until none has come for ``quiet_s``; the number thrown away."""
@@ -203,28 +203,28 @@ class Wire(ABC):
             if not byte:
                 return thrown
             seen_s = self.clock.now_s()
-            thrown += 1 + len(self._arriving.take(1 << 30, self.clock.now_s()))
+            thrown += 1 + len(self._rx_queue.take(1 << 30, self.clock.now_s()))
 
     # the wire
 
-    def vanish(self) -> None:
+    def disconnect(self) -> None:
         """Take the port away: reading and writing fail until it is back and opened again."""
-        self._gone, self.is_open = True, False
-        self._arriving.clear()
+        self._disconnected, self.is_open = True, False
+        self._rx_queue.clear()
 
-    def come_back(self) -> None:
+    def reconnect(self) -> None:
         """Give the port back; the host has to open it."""
-        self._gone = False
+        self._disconnected = False
 
     @property
-    def gone(self) -> bool:
+    def disconnected(self) -> bool:
         """Whether the port has vanished."""
-        return self._gone
+        return self._disconnected
 
-    def _wake_host(self) -> None:
+    def _wait_for_host(self) -> None:
         """Let a host go on that wants to use the port, when and if it can."""
         if self._script is not None:
-            self.clock.sleep_until_s(self._script.host_wakes_s(self.clock.now_s()))
+            self.clock.sleep_until_s(self._script.host_resumes_s(self.clock.now_s()))
             self._must_be_open()
         elif not self.is_open:
             self._must_be_open()
@@ -232,7 +232,7 @@ class Wire(ABC):
     def _must_be_open(self) -> None:
         if self._script is not None:
             self.settle()
-        if self._gone:
+        if self._disconnected:
             raise PortError(f"{self.name}: the port has vanished")
         if not self.is_open:
             raise PortError(f"{self.name}: the port is closed")
@@ -245,7 +245,7 @@ class Wire(ABC):
 
     def next_event_s(self) -> float | None:
         """When the next packet ends or the next byte arrives; None while nothing is under way."""
-        times = [self._arriving.due_s(1), self._sent[0][0] if self._sent else None]
+        times = [self._rx_queue.due_s(1), self._sent[0][0] if self._sent else None]
         return min((time_s for time_s in times if time_s is not None), default=None)
 
     def _carry_out(self, until_s: float) -> None:
@@ -254,11 +254,11 @@ class Wire(ABC):
             end_s, data = self._sent.popleft()
             self._advance(end_s)
             if end_s - len(data) * self._byte_s > self._heard_until_s + GAP_S:
-                self._forget()
+                self._reset_parser()
             self._heard_until_s = end_s
             for tap in self.taps:
                 tap(end_s, True, data)
-            answers = self._obey(data, end_s)
+            answers = self._receive(data, end_s)
             if not answers:
                 continue
             if self._sent and end_s + answers[0].delay_s < self._sent_until_s:
@@ -267,11 +267,11 @@ class Wire(ABC):
                 continue
             self._answer(end_s, answers)
 
-    def _answer(self, time_s: float, answers: Iterable[Answer]) -> None:
+    def _answer(self, time_s: float, answers: Iterable[Reply]) -> None:
         for answer in answers:
             time_s += answer.delay_s
-            for slow_s, data in self._fate(answer.data, time_s):
-                end_s = self._arriving.add(time_s + slow_s + self.usb_latency_s, data)
+            for slow_s, data in self._reply_with_faults(answer.data, time_s):
+                end_s = self._rx_queue.add(time_s + slow_s + self.usb_latency_s, data)
                 time_s = max(time_s, end_s - self.usb_latency_s - slow_s * (slow_s > PATIENT_S))
                 self.busy_s += len(data) * self._byte_s
                 for tap in self.taps:
@@ -281,5 +281,5 @@ class Wire(ABC):
     def _collide(self, start_s: float) -> None:
         """Two talk at once: what the servos had not said by then is lost, and so is the packet."""
         self.collisions += 1
-        self._arriving.cut(start_s)
+        self._rx_queue.cut(start_s)
         self._quiet_s = start_s

@@ -34,7 +34,7 @@ class InterpretedSteps:
             force[6:] += drive_shafts(drive, m.data.qpos[7:], rate) - m.gear_drag_n_m_s * rate
             m.data.qfrc_applied[:] = force
             mujoco.mj_step2(m.model, m.data)
-            m.weigh()
+            m.measure_loads()
 
 
 def friction_forces(m: Mechanics) -> Floats:

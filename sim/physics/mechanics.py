@@ -63,12 +63,12 @@ class Mechanics:
         """Length of a step."""
         return float(self.model.opt.timestep)
 
-    def rest(self) -> None:
+    def start_at_rest(self) -> None:
         """Take note of a state that was set, not stepped to; ``mj_forward`` was just called."""
         self.before_m[:] = self.data.xipos[1:] - self.step_s * velocities(self.data)[0]
-        self.weigh()
+        self.measure_loads()
 
-    def weigh(self) -> None:
+    def measure_loads(self) -> None:
         """Read ``load_n`` off the contact forces in the data."""
         d = self.data
         row = np.asarray(d.contact.efc_address)

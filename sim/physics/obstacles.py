@@ -67,7 +67,7 @@ def _middle_m(thing: PoleObstacle | PipeObstacle) -> Floats:
     return np.array([*thing.at_m, height])
 
 
-def place_at(
+def place_at_obstacle(
     m: Mechanics, robot: RobotConfig, world: WorldConfig, heading_rad: float, joint_rad: ArrayLike
 ) -> bool:
     """Put a coiled body round the world's pole, or any body into its pipe; head up, at rest.
@@ -102,7 +102,7 @@ def place_at(
     mujoco.mj_resetData(m.model, m.data)
     m.data.qpos[:3], m.data.qpos[3:7], m.data.qpos[7:] = place, quaternion, q
     mujoco.mj_forward(m.model, m.data)
-    m.rest()
+    m.start_at_rest()
     return True
 
 

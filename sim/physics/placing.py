@@ -50,7 +50,7 @@ def place(
     _settle(m)
     data.qvel[:] = 0.0
     mujoco.mj_forward(model, data)
-    m.rest()
+    m.start_at_rest()
 
 
 def float_at(
@@ -75,7 +75,7 @@ def float_at(
     height = floating_height_m(water, robot.body_radius_m)
     m.data.qpos[2] += height - float(m.data.xipos[1:, 2].mean())
     mujoco.mj_forward(m.model, m.data)
-    m.rest()
+    m.start_at_rest()
     return True
 
 

@@ -17,7 +17,7 @@ from snakewalk.sim.physics.body import ARMATURE_KG_M2, build_model
 from snakewalk.sim.physics.interpreted import InterpretedSteps
 from snakewalk.sim.physics.layout import step_layout
 from snakewalk.sim.physics.mechanics import Mechanics
-from snakewalk.sim.physics.obstacles import place_at
+from snakewalk.sim.physics.obstacles import place_at_obstacle
 from snakewalk.sim.physics.placing import float_at, place
 from snakewalk.sim.plant import ServoDrive
 
@@ -151,9 +151,9 @@ class MujocoPlant:
 
         """
         m = self.mechanics
-        if not place_at(m, self.robot, self.world, heading_rad, joint_rad) and not float_at(
-            m, self.robot, self.world, start_m, heading_rad, joint_rad
-        ):
+        if not place_at_obstacle(
+            m, self.robot, self.world, heading_rad, joint_rad
+        ) and not float_at(m, self.robot, self.world, start_m, heading_rad, joint_rad):
             place(m, self.robot, self.ground, start_m, heading_rad, joint_rad)
         self._count = 0
         self._data.time = 0.0
@@ -168,14 +168,14 @@ class MujocoPlant:
     @property
     def link_positions_m(self) -> Floats:
         """(L, 3) centres of the links."""
-        self._look()
+        self._update_kinematics()
         copy: Floats = self._data.xipos[1:].copy()
         return copy
 
     @property
     def link_rotations(self) -> Floats:
         """(L, 3, 3) columns: each link's forward, left and up axes in the world."""
-        self._look()
+        self._update_kinematics()
         copy: Floats = self._data.xmat[1:].reshape(-1, 3, 3).copy()
         return copy
 
@@ -193,7 +193,7 @@ class MujocoPlant:
     def energy_j(self) -> tuple[float, float]:
         """Potential (zero at z = 0) and kinetic energy, rotors included."""
         m, d = self.mechanics.model, self._data
-        self._look()
+        self._update_kinematics()
         mujoco.mj_energyPos(m, d)
         mujoco.mj_energyVel(m, d)
         return float(d.energy[0]), float(d.energy[1])
@@ -202,7 +202,7 @@ class MujocoPlant:
     def momentum(self) -> tuple[Floats, Floats]:
         """Linear, N s, and angular about the centre of mass, N m s; (3,) each."""
         m, d = self.mechanics.model, self._data
-        self._look()
+        self._update_kinematics()
         mujoco.mj_comVel(m, d)
         mujoco.mj_subtreeVel(m, d)
         return m.body_subtreemass[1] * d.subtree_linvel[1], d.subtree_angmom[1].copy()
@@ -223,7 +223,7 @@ class MujocoPlant:
         copy: Floats = self._data.qpos.copy()
         return copy
 
-    def _look(self) -> None:
+    def _update_kinematics(self) -> None:
         """Bring positions and axes up to the state: a step leaves those it started from."""
         m, d = self.mechanics.model, self._data
         mujoco.mj_kinematics(m, d)

@@ -11,21 +11,21 @@ from snakewalk.sim.ax12.table import CELLS
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.mixed_bank import MixedBank
-from snakewalk.sim.sniff.decode import Decoder, Line
+from snakewalk.sim.sniff.decode import DecodedPacket, Decoder
 
 Rows = list[dict[str, object]]
 SHOWN = 8
 """Packets kept."""
 
 
-class Traffic:
-    """A ``Tap`` that counts and remembers; ``registers`` reads those worth looking at."""
+class LiveTable:
+    """A ``PacketTap`` that counts and remembers; ``registers`` reads those worth looking at."""
 
     def __init__(self, look: Callable[[], Rows], decoder: Decoder | Decoder1) -> None:
         self.registers = look
         self._decoder = decoder
         self.questions = self.answers = self.bytes = 0
-        self.recent: deque[Line] = deque(maxlen=SHOWN)
+        self.recent: deque[DecodedPacket] = deque(maxlen=SHOWN)
 
     def __call__(self, time_s: float, from_host: bool, data: bytes) -> None:
         """Take note of one packet."""
@@ -35,7 +35,7 @@ class Traffic:
         self.recent.extend(self._decoder.feed(time_s, data))
 
 
-def look_at(line: SimLine) -> Rows:
+def servo_rows(line: SimLine) -> Rows:
     """One row a servo of Protocol 2.0: what it is, where it is, how it fares."""
     line.firmware.refresh()
     if not isinstance(line.bank, MixedBank):
@@ -71,7 +71,7 @@ def _look_at(bank: ServoBank) -> Rows:
     return rows
 
 
-def look_at_ax12(servos: Ax12Servos) -> Rows:
+def ax12_rows(servos: Ax12Servos) -> Rows:
     """One row an AX-12A."""
     servos.refresh()
     shown = ("ID", "Goal Position", *(name for name in CELLS if name.startswith("Present")))

@@ -94,7 +94,7 @@ class PtyServer:
         if not self.path:
             select.select([], [], [], wait_s)
             self._catch_up()
-            if not line.gone:
+            if not line.disconnected:
                 line.openPort()
                 self._open()
             return
@@ -103,7 +103,7 @@ class PtyServer:
             wait_s = min(wait_s, max(0.0, due_s - self._now_s()) / self._pace)
         ready, _, _ = select.select([self._master], [], [], wait_s)
         self._catch_up()
-        if line.gone:
+        if line.disconnected:
             self.close()
             return
         if ready:

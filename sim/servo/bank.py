@@ -95,7 +95,7 @@ class ServoBank:
         """All registers of the model."""
         return tuple(self._registers)
 
-    def listeners(self, baud: int) -> Indices:
+    def tuned_to(self, baud: int) -> Indices:
         """Rows of the servos that are tuned to ``baud``."""
         index = BAUDS.index(baud) if baud in BAUDS else -1
         return np.flatnonzero(self["Baud Rate"] == index)

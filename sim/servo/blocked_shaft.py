@@ -1,7 +1,8 @@
-"""Shafts that something holds: a jammed gear, or a body in the way.
+"""Shafts that something holds: a blocked gear, or a body in the way.
 
-Plants know no jam, so a jammed servo's drive becomes a stiff brake at the place, and what its
-registers show is what the real one would: the output its error asks for, and the stall current.
+A plant has no blocked shafts, so the drive of a blocked servo becomes a stiff brake at the place
+where it was blocked. Its registers show what those of the real servo would: the output that its
+error asks for, and the stall current.
 """
 
 import numpy as np
@@ -15,8 +16,8 @@ STRENGTH = 4.0
 """Brake over stall torque."""
 
 
-class Jam:
-    """The jammed servos of a bus."""
+class BlockedShaft:
+    """The blocked servos of a bus."""
 
     def __init__(self, drive: ServoDrive) -> None:
         self._drive = drive
@@ -28,9 +29,9 @@ class Jam:
         self._on, self._limit = np.zeros(servos), np.ones(servos)
         self._limit_a = np.full(servos, np.inf)
         self.any = False
-        """Whether a servo is jammed."""
+        """Whether a servo is blocked."""
 
-    def seize(self, row: int, at_rad: float) -> None:
+    def block(self, row: int, at_rad: float) -> None:
         """Hold a shaft where it is; the firmware then takes over its registers again."""
         self._rows[row], self._at_rad[row], self.any = True, at_rad, True
 
@@ -40,7 +41,7 @@ class Jam:
         self.any = bool(self._rows.any())
 
     def hold(self, fresh: Bools | None = None) -> None:
-        """Turn the jammed servos' drive, as registers or loops have just set it, into a brake.
+        """Turn the blocked servos' drive, as registers or loops have just set it, into a brake.
 
         ``fresh`` (S,) are the servos whose goal has just been set; None: all.
         """

@@ -29,7 +29,7 @@ FAINT = 1e-9
 _FORWARD = ("Feedforward 1st Gain", "Feedforward 2nd Gain")
 
 
-class Loops:
+class ControlLoops:
     """Control loops of all servos of a bank; idle, and free of cost, in the plain case."""
 
     def __init__(self, bank: ServoBank, drive: ServoDrive, motor: MotorModel) -> None:

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from snakewalk.sim.plant import Plant
 from snakewalk.sim.servo.bank import TABLE_BYTES, ServoBank
-from snakewalk.sim.servo.blocked_shaft import Jam
-from snakewalk.sim.servo.control_loops import CONTROL_S, Loops
-from snakewalk.sim.servo.event_queue import Agenda
+from snakewalk.sim.servo.blocked_shaft import BlockedShaft
+from snakewalk.sim.servo.control_loops import CONTROL_S, ControlLoops
+from snakewalk.sim.servo.event_queue import EventQueue
 from snakewalk.sim.servo.motor import MOTORS, PWM_FULL, TICKS_PER_RAD, TICKS_PER_REV, make_drive
-from snakewalk.sim.servo.motor_output import Effort
-from snakewalk.sim.servo.present_values import PRESENT, SUPPLY, Readout
-from snakewalk.sim.servo.protection import SLICE_S, Protection, Surroundings
+from snakewalk.sim.servo.motor_output import MotorOutput
+from snakewalk.sim.servo.present_values import PRESENT, SUPPLY, PresentValues
+from snakewalk.sim.servo.protection import SLICE_S, Protection, SupplyAndAmbient
 from snakewalk.sim.servo.register_rules import (
     CURRENT_MODE,
     CURRENT_POSITION_MODE,
@@ -24,7 +24,7 @@ from snakewalk.sim.servo.register_rules import (
     PWM_MODE,
     WATCHDOG_TRIPPED,
 )
-from snakewalk.sim.servo.servo_loops import take_goals
+from snakewalk.sim.servo.servo_loops import accept_goals
 from snakewalk.sim.servo.watchdog import Watchdog
 
 CENTRE_TICKS = 2048
@@ -43,17 +43,17 @@ class Firmware:
     """Servos of ``bank`` on the shafts of ``plant``, in the order of the bank's rows."""
 
     def __init__(
-        self, bank: ServoBank, plant: Plant, surroundings: Surroundings | None = None
+        self, bank: ServoBank, plant: Plant, supply_and_ambient: SupplyAndAmbient | None = None
     ) -> None:
         joints = len(bank)
         self.bank = bank
         self.plant = plant
         self.motor = MOTORS[bank.model]
-        around = surroundings or Surroundings(supply_v=self.motor.nominal_v)
+        around = supply_and_ambient or SupplyAndAmbient(supply_v=self.motor.nominal_v)
         self.drive = make_drive([self.motor] * joints, around.supply_v)
-        self.jam = Jam(self.drive)
-        self._effort = Effort(self.drive, self.jam)
-        self.protection = Protection(bank, self.drive, self.motor, around, self._effort)
+        self.blocked_shaft = BlockedShaft(self.drive)
+        self._motor_output = MotorOutput(self.drive, self.blocked_shaft)
+        self.protection = Protection(bank, self.drive, self.motor, around, self._motor_output)
         self._time_s = plant.time_s
         self._slice_s = self._time_s + SLICE_S
         self._watchdog = Watchdog(bank, self._time_s)
@@ -63,17 +63,25 @@ class Firmware:
         self._held = np.zeros(joints, bool)
         self.powered = np.ones(joints, bool)
         """(S,) False while a servo has no supply: it hears nothing and lets go."""
-        self.agenda = Agenda()
+        self.events = EventQueue()
         """What happens to the servos at a time of its own, whoever talks."""
-        self.loops = Loops(bank, self.drive, self.motor)
+        self.control_loops = ControlLoops(bank, self.drive, self.motor)
         self._goal = self.drive.goal_rad.copy()
         self._control_s = self._time_s + CONTROL_S
         self._goal_address = bank.register("Goal Position").address
-        self._readout = Readout(
-            *(bank, plant, self.drive, self.motor, self._effort, self.loops, self.protection)
+        self._present_values = PresentValues(
+            *(
+                bank,
+                plant,
+                self.drive,
+                self.motor,
+                self._motor_output,
+                self.control_loops,
+                self.protection,
+            )
         )
         self._taken = np.zeros(joints, bool)
-        self.changed()
+        self.apply_registers()
         self.power_up(np.arange(joints))
 
     # time
@@ -82,34 +90,34 @@ class Firmware:
         """Step physics, watchdog, heat and protections to ``until_s``."""
         plant, drive, protection, dog = self.plant, self.drive, self.protection, self._watchdog
         while self._time_s < until_s:
-            stop_s = min(until_s, self._slice_s, dog.due_s, self.agenda.next_s)
-            if self.loops.active:
+            stop_s = min(until_s, self._slice_s, dog.due_s, self.events.next_s)
+            if self.control_loops.active:
                 stop_s = min(stop_s, self._control_s)
             plant.advance(stop_s, drive)
             protection.pass_time(stop_s - self._time_s)
             self._time_s = stop_s
-            if self.loops.active and stop_s >= self._control_s:
+            if self.control_loops.active and stop_s >= self._control_s:
                 self._control_s = stop_s + CONTROL_S
-                self.loops.tick(plant, self._goal, self._sign, self._held)
-                self.jam.hold(self.loops.position | self.loops.velocity)
-            if stop_s >= self.agenda.next_s:
-                self.agenda.carry_out(stop_s)
-                self.changed()
+                self.control_loops.tick(plant, self._goal, self._sign, self._held)
+                self.blocked_shaft.hold(self.control_loops.position | self.control_loops.velocity)
+            if stop_s >= self.events.next_s:
+                self.events.run_due(stop_s)
+                self.apply_registers()
             if stop_s >= dog.due_s:
                 self._stop(dog.trip(stop_s))
             if stop_s >= self._slice_s:
                 if protection.look(plant):
-                    self.changed()
+                    self.apply_registers()
                 self._slice_s += SLICE_S
 
-    def heard(self, time_s: float) -> None:
+    def on_instruction(self, time_s: float) -> None:
         """Feed the watchdogs: any instruction packet does, whoever it is for (e-manual)."""
         dog = self._watchdog
-        dog.heard_s, dog.due_s = time_s, time_s + dog.patience_s
+        dog.fed_s, dog.due_s = time_s, time_s + dog.timeout_s
 
     # registers to motors
 
-    def changed(self) -> None:
+    def apply_registers(self) -> None:
         """Take over registers after a write of anything but goal positions alone."""
         bank, drive = self.bank, self.drive
         mode = bank["Operating Mode"]
@@ -121,20 +129,20 @@ class Firmware:
         again = (mode == POSITION_MODE) & ((on & ~self._was_on) | (mode != self._was_mode))
         self._sign = np.where(bank["Drive Mode"] & REVERSE, -1.0, 1.0)
         if again.any():
-            self._forget_turns(again)
+            self._reset_turns(again)
         offset = bank["Homing Offset"].astype(np.int64)
         offset[(mode == POSITION_MODE) & (np.abs(offset) > HOMING_LIMIT_TICKS)] = 0
         self._zero = CENTRE_TICKS + offset - TICKS_PER_REV * self._turns
         self._frame = np.stack([self._sign, self._zero])
         self._was_on, self._was_mode = on, mode.copy()
-        self._woken_by_goals = bool((bank["Drive Mode"] & TORQUE_ON_BY_GOAL).any())
+        self._enabled_by_goals = bool((bank["Drive Mode"] & TORQUE_ON_BY_GOAL).any())
         tripped = bank["Bus Watchdog"] == WATCHDOG_TRIPPED
         self._held &= tripped
         self._holding = bool(self._held.any())
         drive.torque_on[:] = on
-        self._was_active = self.loops.active
-        self.loops.take_over(on, self.plant.position_rad)
-        if self.loops.active and not self._was_active:
+        self._was_active = self.control_loops.active
+        self.control_loops.take_over(on, self.plant.position_rad)
+        if self.control_loops.active and not self._was_active:
             self._control_s = self._time_s + CONTROL_S
         full = np.abs(bank["Goal PWM"].astype(float)) / PWM_FULL
         drive.pwm_limit[:] = full
@@ -149,7 +157,7 @@ class Firmware:
         if bank.measures_current:
             goal_a = np.abs(bank["Goal Current"].astype(float)) * self.motor.current_unit_a
             drive.current_limit_a[:] = np.where(limited, goal_a, np.inf)
-            self._effort.limited = bool(limited.any())
+            self._motor_output.limited = bool(limited.any())
         single = mode == POSITION_MODE
         low = np.where(single, bank["Min Position Limit"].astype(int), -EXTENDED_RANGE_TICKS)
         high = np.where(single, bank["Max Position Limit"].astype(int), EXTENDED_RANGE_TICKS)
@@ -163,23 +171,25 @@ class Firmware:
 
         Values out of limits are refused.
         """
-        plain = not (self._holding or self._pushed or self.loops.active or self.jam.any)
+        plain = not (
+            self._holding or self._pushed or self.control_loops.active or self.blocked_shaft.any
+        )
         goal_rad = self.drive.goal_rad if plain else np.empty(len(self.bank))
         table, address, taken = self.bank.table, self._goal_address, self._taken
         limits, frame = self._limits, self._frame
-        take_goals(raw, rows, table, at, address, limits, frame, TICKS_PER_RAD, goal_rad, taken)
-        if self._woken_by_goals:
-            self.wake(np.flatnonzero(taken))
+        accept_goals(raw, rows, table, at, address, limits, frame, TICKS_PER_RAD, goal_rad, taken)
+        if self._enabled_by_goals:
+            self.enable_by_goal(np.flatnonzero(taken))
         if not plain:
             self._aim()
 
-    def wake(self, rows: NDArray[np.intp]) -> None:
+    def enable_by_goal(self, rows: NDArray[np.intp]) -> None:
         """Torque on by goal update (Drive Mode(10), bit 3), unless an error holds it off."""
         for row in rows:
             asks = self.bank["Drive Mode"][row] & TORQUE_ON_BY_GOAL
             if asks and not self.bank.shut_down(int(row)) and not self.bank["Torque Enable"][row]:
                 self.bank["Torque Enable"][row] = 1
-                self.changed()
+                self.apply_registers()
 
     def reboot(self, row: int, factory_keeping: tuple[str, ...] | None = None) -> None:
         """Restart one servo; with ``factory_keeping``, first reset all but these registers."""
@@ -192,28 +202,28 @@ class Firmware:
 
     def power_up(self, rows: NDArray[np.intp]) -> None:
         """After power-on or reboot: one turn of position, goal = present, protections cleared."""
-        self._forget_turns(np.isin(np.arange(len(self.bank)), rows))
+        self._reset_turns(np.isin(np.arange(len(self.bank)), rows))
         self.protection.restart(rows)
         self._was_on[rows] = False
         start = self.bank["Startup Configuration"]
         for row in rows:
             if start[row] & STARTUP_RAM_RESTORE:
                 self.bank.restore_ram(int(row))
-        self.changed()
+        self.apply_registers()
         self.refresh()
         self.bank["Goal Position"][rows] = self.bank["Present Position"][rows]
         self._aim()
         eager = rows[(start[rows] & STARTUP_TORQUE_ON) != 0]
         if len(eager):
             self.bank["Torque Enable"][eager] = 1
-            self.changed()
+            self.apply_registers()
 
     def clear_turns(self, row: int) -> bool:
         """Clear instruction: position back into one turn; refused (False) while moving."""
-        if self._readout.turning()[row]:
+        if self._present_values.turning()[row]:
             return False
-        self._forget_turns(np.arange(len(self.bank)) == row)
-        self.changed()
+        self._reset_turns(np.arange(len(self.bank)) == row)
+        self.apply_registers()
         return True
 
     def clear_error(self, row: int) -> bool:
@@ -221,27 +231,27 @@ class Firmware:
         self.bank["Hardware Error Status"][row] = 0
         self.protection.restart(np.array([row]))
         self.protection.look(self.plant)
-        self.changed()
+        self.apply_registers()
         return not self.bank["Hardware Error Status"][row]
 
-    def seize(self, rows: NDArray[np.intp]) -> None:
-        """Jam shafts where they are."""
+    def block_shafts(self, rows: NDArray[np.intp]) -> None:
+        """Block shafts where they are."""
         for row in rows:
-            self.jam.seize(int(row), float(self.plant.position_rad[row]))
-        self.changed()
+            self.blocked_shaft.block(int(row), float(self.plant.position_rad[row]))
+        self.apply_registers()
 
-    def release(self, rows: NDArray[np.intp]) -> None:
-        """Free jammed shafts."""
+    def free_shafts(self, rows: NDArray[np.intp]) -> None:
+        """Free blocked shafts."""
         for row in rows:
-            self.jam.free(int(row))
-        self.changed()
+            self.blocked_shaft.free(int(row))
+        self.apply_registers()
 
     def cut_power(self, rows: NDArray[np.intp]) -> None:
         """Take the supply away: shafts go limp, and all that is not EEPROM is lost."""
         self.powered[rows] = False
-        self.changed()
+        self.apply_registers()
 
-    def give_power(self, rows: NDArray[np.intp]) -> None:
+    def restore_power(self, rows: NDArray[np.intp]) -> None:
         """Give the supply back: the servos start anew, their turns forgotten."""
         self.powered[rows] = True
         self.bank.reset(rows, keep=(), ram_only=True)
@@ -251,7 +261,7 @@ class Firmware:
 
     def refresh_motion(self) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
-        self._readout.motion(self._frame)
+        self._present_values.motion(self._frame)
 
     def refresh(self, address: int = 0, length: int = TABLE_BYTES) -> None:
         """Present values, those at least that a read of this block shows."""
@@ -260,9 +270,9 @@ class Firmware:
         stop = address + length
         if gather or (address < SUPPLY.start and stop > PRESENT.start):
             self.refresh_motion()
-            self._readout.path(self._frame, self._time_s)
+            self._present_values.path(self._frame, self._time_s)
         if gather or (address < SUPPLY.stop and stop > SUPPLY.start):
-            self._readout.supply()
+            self._present_values.supply()
         if gather:
             indirect.gather()
 
@@ -274,15 +284,15 @@ class Firmware:
             goal = np.where(self._held, self._goal, goal)
         self._goal = goal
         drive_goal = np.where(self._push != 0.0, self._push, goal) if self._pushed else goal
-        loops, told = self.loops, None
-        if loops.active:
-            loops.aim(goal)
-            run = loops.position | loops.velocity
+        control_loops, told = self.control_loops, None
+        if control_loops.active:
+            control_loops.aim(goal)
+            run = control_loops.position | control_loops.velocity
             drive_goal, told = np.where(run, self.drive.goal_rad, drive_goal), ~run
         self.drive.goal_rad[:] = drive_goal
-        self.jam.hold(told)
+        self.blocked_shaft.hold(told)
 
-    def _forget_turns(self, which: NDArray[np.bool_]) -> None:
+    def _reset_turns(self, which: NDArray[np.bool_]) -> None:
         ticks = np.rint(self.plant.position_rad * self._sign * TICKS_PER_RAD) + CENTRE_TICKS
         self._turns[which] = np.floor(ticks / TICKS_PER_REV)[which]
 
@@ -290,4 +300,4 @@ class Firmware:
         """Hold where they are the servos whose watchdog has run out."""
         self._held |= late
         self._goal[late] = self.plant.position_rad[late]
-        self.changed()
+        self.apply_registers()

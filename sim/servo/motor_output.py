@@ -1,8 +1,8 @@
-"""What the servos themselves see of their motors: output and current, in a jam and at a limit.
+"""Output and current of the motors as the servos themselves measure them.
 
-Plants say what the bridge was asked for. Where a current limit cuts that down, or something holds
-the shaft, a servo's registers show what is left: so a gripper that closes with little current is
-not taken for one that pushes with all it has.
+A plant reports the output that the bridge was asked for. Where a current limit cuts the output, or
+something holds the shaft, a servo's registers show what is left: so a gripper that closes with
+little current is not taken for one that pushes with all it has.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.sim.plant import ServoDrive
-from snakewalk.sim.servo.blocked_shaft import Jam
+from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 
 AT_LIMIT = 0.999
 """Share of its limit from which on a current is taken to be cut."""
@@ -19,23 +19,23 @@ FAINT_V = 0.1
 """Less supply than this is none."""
 
 
-class Effort:
+class MotorOutput:
     """Output and current of all servos of a bus."""
 
-    def __init__(self, drive: ServoDrive, jam: Jam) -> None:
-        self._drive, self._jam = drive, jam
+    def __init__(self, drive: ServoDrive, blocked_shaft: BlockedShaft) -> None:
+        self._drive, self._blocked_shaft = drive, blocked_shaft
         self.limited = False
         """Whether the mode of any servo limits its current."""
-        self.current_a: Callable[[], Floats] = jam.current_a
+        self.current_a: Callable[[], Floats] = blocked_shaft.current_a
         """(S,) as measured."""
 
     def pwm(self, velocity_rad_s: Floats) -> Floats:
         """(S,) fraction of the supply that the bridges put out, at these shaft speeds."""
-        pwm = self._jam.pwm()
+        pwm = self._blocked_shaft.pwm()
         if not self.limited:
             return pwm
-        drive, amps = self._drive, self._jam.current_a()
-        cut = (np.abs(amps) >= AT_LIMIT * self._jam.limit_a()) & (drive.torque_on > 0.0)
+        drive, amps = self._drive, self._blocked_shaft.current_a()
+        cut = (np.abs(amps) >= AT_LIMIT * self._blocked_shaft.limit_a()) & (drive.torque_on > 0.0)
         volts = amps * drive.resistance_ohm + drive.back_emf_v_s * velocity_rad_s
         left = volts / np.maximum(drive.supply_v, FAINT_V)
         return np.where(cut, np.clip(left, -1.0, 1.0), pwm)

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
-from snakewalk.sim.servo.control_loops import Loops
+from snakewalk.sim.servo.control_loops import ControlLoops
 from snakewalk.sim.servo.motor import PWM_FULL, TICKS_PER_RAD, MotorModel
-from snakewalk.sim.servo.motor_output import Effort
+from snakewalk.sim.servo.motor_output import MotorOutput
 from snakewalk.sim.servo.profile import VELOCITY_UNIT_RAD_S
 from snakewalk.sim.servo.protection import Protection
 from snakewalk.sim.servo.register_rules import CURRENT_MODE, PWM_MODE, VELOCITY_MODE
-from snakewalk.sim.servo.servo_loops import show_motion
+from snakewalk.sim.servo.servo_loops import write_motion
 
 IN_POSITION_TICKS, FOLLOWING_TICKS = 20, 100
 """Deviations behind the flags of Moving Status(123), "predefined" in the e-manual: ours."""
@@ -23,7 +23,7 @@ PRESENT, SUPPLY = range(120, 144), range(144, 147)
 IN_POSITION, PROFILE_ONGOING, FOLLOWING_ERROR = 0x01, 0x02, 0x08
 
 
-class Readout:
+class PresentValues:
     """The present values of all servos of a bank.
 
     A ``frame`` (2, S) is how registers count: sign of the shaft, and ticks where it is straight.
@@ -35,13 +35,17 @@ class Readout:
         plant: Plant,
         drive: ServoDrive,
         motor: MotorModel,
-        effort: Effort,
-        loops: Loops,
+        motor_output: MotorOutput,
+        control_loops: ControlLoops,
         protection: Protection,
     ) -> None:
         self._start_s = plant.time_s
         self._bank, self._plant, self._drive = bank, plant, drive
-        self._effort, self._loops, self._protection = effort, loops, protection
+        self._motor_output, self._control_loops, self._protection = (
+            motor_output,
+            control_loops,
+            protection,
+        )
         # Without a sensor load is "inferred from the internal output": in tenths of a per cent
         shown = "Present Current" if bank.measures_current else "Present Load"
         names = (shown, "Present Velocity", "Present Position")
@@ -54,10 +58,10 @@ class Readout:
     def motion(self, frame: Floats) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
         plant = self._plant
-        show_motion(
+        write_motion(
             self._bank.table,
             self._shown_at,
-            self._effort.current_a(),
+            self._motor_output.current_a(),
             plant.velocity_rad_s,
             plant.position_rad,
             frame,
@@ -66,25 +70,25 @@ class Readout:
 
     def path(self, frame: Floats, time_s: float) -> None:
         """Bring up output, trajectories, flags of motion and clock (120 to 143) at ``time_s``."""
-        bank, loops, (sign, zero) = self._bank, self._loops, frame
-        path = loops.trajectory
-        output = self._effort.pwm(self._plant.velocity_rad_s) * sign
+        bank, control_loops, (sign, zero) = self._bank, self._control_loops, frame
+        path = control_loops.trajectory
+        output = self._motor_output.pwm(self._plant.velocity_rad_s) * sign
         bank["Present PWM"][:] = np.rint(output * PWM_FULL)
         bank["Realtime Tick"][:] = int((time_s - self._start_s) * 1e3) % 32_768
         goal, present = bank["Goal Position"].astype(float), bank["Present Position"]
-        shown = np.where(loops.position, path.position * sign * TICKS_PER_RAD + zero, goal)
+        shown = np.where(control_loops.position, path.position * sign * TICKS_PER_RAD + zero, goal)
         bank["Position Trajectory"][:] = np.rint(shown)
-        run = loops.position | loops.velocity
+        run = control_loops.position | control_loops.velocity
         bank["Velocity Trajectory"][:] = np.rint(
             np.where(run, path.velocity * sign / VELOCITY_UNIT_RAD_S, 0.0)
         )
-        ongoing = loops.position & path.ongoing
+        ongoing = control_loops.position & path.ongoing
         bank["Moving"][:] = self.turning() | ongoing
         placed = ~np.isin(bank["Operating Mode"], (CURRENT_MODE, VELOCITY_MODE, PWM_MODE))
         status = IN_POSITION * (np.abs(goal - present) <= IN_POSITION_TICKS)
         status |= FOLLOWING_ERROR * (np.abs(shown - present) > FOLLOWING_TICKS)
         status = np.where(placed, status, 0) | PROFILE_ONGOING * ongoing
-        bank["Moving Status"][:] = status | np.where(loops.position, path.kind, 0)
+        bank["Moving Status"][:] = status | np.where(control_loops.position, path.kind, 0)
 
     def turning(self) -> NDArray[np.bool_]:
         """(S,) faster than Moving Threshold(24)."""

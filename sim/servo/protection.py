@@ -16,8 +16,14 @@ from snakewalk.drivers.protocol.registers import Alarm
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.motor import MotorModel
-from snakewalk.sim.servo.motor_output import Effort
-from snakewalk.sim.servo.servo_loops import add_loss, count_blocked, drawn, out_of_range, warm_up
+from snakewalk.sim.servo.motor_output import MotorOutput
+from snakewalk.sim.servo.servo_loops import (
+    add_loss,
+    count_blocked,
+    out_of_range,
+    supply_current_a,
+    warm_up,
+)
 from snakewalk.sim.servo.supply import Supply
 
 SLICE_S = 0.05
@@ -41,7 +47,7 @@ ALARMS_330: Mapping[str, int] = {kind: bit for kind, bit in ALARMS.items() if ki
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
+class SupplyAndAmbient:
     """Supply and air."""
 
     supply_v: float
@@ -58,11 +64,11 @@ class Protection:
         bank: ServoBank,
         drive: ServoDrive,
         motor: MotorModel,
-        around: Surroundings,
-        effort: Effort,
+        around: SupplyAndAmbient,
+        motor_output: MotorOutput,
     ) -> None:
         self._bank, self._drive, self._motor, self._around = bank, drive, motor, around
-        self._effort = effort
+        self._motor_output = motor_output
         self._supply = Supply(len(bank), around.supply_v)
         self.temperature_c = np.full(len(bank), around.ambient_c)
         """(S,) at the sensor: first order in the winding's loss."""
@@ -99,13 +105,13 @@ class Protection:
 
     def pass_time(self, seconds: float) -> None:
         """Add up the windings' loss at the present currents."""
-        add_loss(self._heat_j, self._effort.current_a(), seconds * self._ohm)
+        add_loss(self._heat_j, self._motor_output.current_a(), seconds * self._ohm)
 
     def look(self, plant: Plant) -> bool:
         """Judge one slice of ``SLICE_S``; whether registers have changed."""
         self._warm_up()
         drive = self._drive
-        pwm = self._effort.pwm(plant.velocity_rad_s)
+        pwm = self._motor_output.pwm(plant.velocity_rad_s)
         volts = self._sag(pwm)
         apart = self._supply.apart
         longest_s = count_blocked(
@@ -145,7 +151,7 @@ class Protection:
 
     def _sag(self, pwm: Floats) -> float:
         drive = self._drive
-        servos_a = float(drawn(pwm, self._effort.current_a()))
+        servos_a = float(supply_current_a(pwm, self._motor_output.current_a()))
         drawn_a = servos_a + self._motor.standby_a * len(self._bank)
         drop_v = self._around.supply_ohm * drawn_a
         volts = self._supply.volts - drop_v

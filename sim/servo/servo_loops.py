@@ -28,14 +28,14 @@ def crc_of(data: Bytes, start: int, stop: int, crc: int, crc_table: NDArray[np.u
 
 
 @compiled("void(uint8[::1], int64, int64, int64)")
-def put(data: Bytes, at: int, value: int, size: int) -> None:
+def write_le(data: Bytes, at: int, value: int, size: int) -> None:
     """Write a signed number, little-endian."""
     for k in range(size):
         data[at + k] = (value >> (8 * k)) & 0xFF
 
 
 @compiled(f"void({_TABLE}, {_PLACES}, {_SEEN}, {_SEEN}, {_SEEN}, {_FRAME}, {_SEEN})")
-def show_motion(
+def write_motion(
     table: Bytes,
     places: Ints,
     current_a: Floats,
@@ -61,14 +61,14 @@ def show_motion(
     for row in range(len(table)):
         sign, zero = frame[0, row], frame[1, row]
         shown = np.rint(current_a[row] * (sign / ampere))
-        put(table[row], at_current, int(min(max(shown, -limit), limit)), 2)
-        put(table[row], at_velocity, int(np.rint(velocity_rad_s[row] * (sign / rad_s))), 4)
+        write_le(table[row], at_current, int(min(max(shown, -limit), limit)), 2)
+        write_le(table[row], at_velocity, int(np.rint(velocity_rad_s[row] * (sign / rad_s))), 4)
         ticks = np.rint(position_rad[row] * (sign * ticks_per_rad) + zero)
-        put(table[row], at_position, int(ticks), 4)
+        write_le(table[row], at_position, int(ticks), 4)
 
 
 @compiled(f"void(uint8[::1], {_PLACES}, {_TABLE}, {_PLACES}, {_PLACES}, {_CRC})")
-def compose(
+def fill_replies(
     packet: Bytes,
     shape: Ints,
     table: Bytes,
@@ -107,7 +107,7 @@ def compose(
     f"void({_READ}, {_PLACES}, {_TABLE}, int64, int64, {seen('int64', 2, 'C')},"
     f" {_FRAME}, float64, float64[::1], boolean[::1])"
 )
-def take_goals(
+def accept_goals(
     raw: Bytes,
     rows: Indices,
     table: Bytes,
@@ -128,7 +128,7 @@ def take_goals(
         at: place of the first entry in ``raw``.
         address: of the register.
         limits: (2, S) least and greatest goal, ticks.
-        frame: as in ``show_motion``.
+        frame: as in ``write_motion``.
         ticks_per_rad: its unit.
         goal_rad: (S,) set to the goals in the shafts' frame, where taken.
         taken: (S,) set to whether a servo has taken one.
@@ -143,7 +143,7 @@ def take_goals(
         if ticks >= 1 << 31:
             ticks -= 1 << 32
         if limits[0, row] <= ticks <= limits[1, row]:
-            put(table[row], address, ticks, 4)
+            write_le(table[row], address, ticks, 4)
             goal_rad[row] = (ticks - frame[1, row]) * (frame[0, row] / ticks_per_rad)
             taken[row] = True
 
@@ -190,7 +190,7 @@ def out_of_range(
 
 
 @compiled(f"float64({_SEEN}, {_SEEN})")
-def drawn(pwm: Floats, current_a: Floats) -> float:
+def supply_current_a(pwm: Floats, current_a: Floats) -> float:
     """Current that the bridges take from the supply, A."""
     sum_a = 0.0
     for row in range(len(pwm)):

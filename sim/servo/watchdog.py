@@ -20,9 +20,9 @@ class Watchdog:
 
     def __init__(self, bank: ServoBank, time_s: float) -> None:
         self._bank = bank
-        self.heard_s = time_s
+        self.fed_s = time_s
         """When they were last fed."""
-        self.patience_s = np.inf
+        self.timeout_s = np.inf
         """How long the most impatient of them waits."""
         self._watched = np.zeros(len(bank), bool)
         self.due_s = np.inf
@@ -33,12 +33,12 @@ class Watchdog:
         dog = self._bank["Bus Watchdog"]
         self._watched = (dog > 0) & (dog < WATCHDOG_TRIPPED) & on
         watched = self._watched
-        self.patience_s = UNIT_S * float(dog[watched].min()) if watched.any() else np.inf
-        self.due_s = self.heard_s + self.patience_s
+        self.timeout_s = UNIT_S * float(dog[watched].min()) if watched.any() else np.inf
+        self.due_s = self.fed_s + self.timeout_s
 
     def trip(self, time_s: float) -> Bools:
         """Put those that have run out by ``time_s`` into the error state; which (S,) they are."""
         dog = self._bank["Bus Watchdog"]
-        late = self._watched & (self.heard_s + UNIT_S * dog <= time_s + ROUNDING_S)
+        late = self._watched & (self.fed_s + UNIT_S * dog <= time_s + ROUNDING_S)
         dog[late] = WATCHDOG_TRIPPED
         return late

@@ -28,7 +28,7 @@ _GROUP_READS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class DecodedPacket:
     """One packet, or bytes that are none."""
 
     time_s: float
@@ -72,7 +72,7 @@ class Decoder:
         self._crc = self._dropped = 0
         self._last: int = Instruction.PING
 
-    def feed(self, time_s: float, data: bytes) -> Iterator[Line]:
+    def feed(self, time_s: float, data: bytes) -> Iterator[DecodedPacket]:
         """Lines of the packets that ``data`` completes."""
         packets = self._reader.feed(data)
         damaged = self._reader.crc_errors - self._crc
@@ -80,14 +80,14 @@ class Decoder:
         self._crc, self._dropped = self._reader.crc_errors, self._reader.dropped_bytes
         if damaged or lost:
             name = "wrong CRC" if damaged else "no packet"
-            yield Line(time_s, "noise", -1, name, {"bytes": lost}, data.hex(" "))
+            yield DecodedPacket(time_s, "noise", -1, name, {"bytes": lost}, data.hex(" "))
         for packet in packets:
             if isinstance(packet, InstructionPacket):
                 yield self._question(time_s, packet)
             else:
                 yield self._answer(time_s, packet)
 
-    def _question(self, time_s: float, packet: InstructionPacket) -> Line:
+    def _question(self, time_s: float, packet: InstructionPacket) -> DecodedPacket:
         code, params, servo_id = packet.instruction, packet.params, packet.servo_id
         known = code in Instruction.__members__.values()
         name = Instruction(code).name.lower().replace("_", " ") if known else f"0x{code:02X}"
@@ -110,7 +110,7 @@ class Decoder:
         elif code == Instruction.BULK_WRITE:
             values = self._bulk_write(params)
         raw = encode_instruction(packet).hex(" ")
-        return Line(time_s, "question", servo_id, name, values, raw)
+        return DecodedPacket(time_s, "question", servo_id, name, values, raw)
 
     def _group_read(self, code: int, params: bytes) -> dict[str, object]:
         if code in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
@@ -140,10 +140,12 @@ class Decoder:
             at += 5 + size
         return values
 
-    def _answer(self, time_s: float, packet: StatusPacket) -> Line:
+    def _answer(self, time_s: float, packet: StatusPacket) -> DecodedPacket:
         raw = encode_status(packet).hex(" ")
         if packet.servo_id == BROADCAST_ID:
-            return Line(time_s, "answer", BROADCAST_ID, "ok", self._fast_parts(packet), raw)
+            return DecodedPacket(
+                time_s, "answer", BROADCAST_ID, "ok", self._fast_parts(packet), raw
+            )
         values: dict[str, object] = {}
         if self._last == Instruction.PING and len(packet.params) == 3:
             number = _word(packet.params, 0)
@@ -153,7 +155,7 @@ class Decoder:
             values = {"model": model, "firmware": packet.params[2]}
         elif packet.servo_id in self._asked and packet.params:
             values = self._values(packet.servo_id, self._asked[packet.servo_id][0], packet.params)
-        return Line(time_s, "answer", packet.servo_id, _outcome(packet.error), values, raw)
+        return DecodedPacket(time_s, "answer", packet.servo_id, _outcome(packet.error), values, raw)
 
     def _fast_parts(self, packet: StatusPacket) -> dict[str, object]:
         said = bytes((packet.error,)) + packet.params

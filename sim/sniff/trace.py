@@ -9,7 +9,7 @@ from snakewalk.config.errors import InputError
 
 
 class TraceWriter:
-    """A ``Tap`` that writes one JSON line a packet: ``t`` in s, ``from``, ``hex``."""
+    """A ``PacketTap`` that writes one JSON line a packet: ``t`` in s, ``from``, ``hex``."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out

@@ -5,7 +5,7 @@ import pytest
 
 from snakewalk.config.faults import FaultPlan
 from snakewalk.drivers.types import JointState
-from snakewalk.sim.line.rx_queue import Arrivals
+from snakewalk.sim.line.rx_queue import RxQueue
 
 from .campaign import Tally, campaign, run_scenario
 from .report import table
@@ -43,7 +43,7 @@ def test_the_same_seed_gives_the_same_campaign() -> None:
 
 def test_bytes_are_due_in_the_order_of_the_wire_and_not_before_they_are_there() -> None:
     """Else a client that waits for them spins for ever in simulated time (late and clash)."""
-    arrivals = Arrivals()
+    arrivals = RxQueue()
     arrivals.add(0.5, b"slow")
     arrivals.add(0.1, b"quick")
     for count in range(1, 10):

@@ -58,7 +58,7 @@ def simulated(
     from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
     from snakewalk.sim.physics.plant import MujocoPlant  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
-    from snakewalk.sim.servo.protection import Surroundings  # noqa: PLC0415
+    from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
     plant = MujocoPlant(robot, world, ground, run.physics_step_s, compiled=compiled)
     plant.reset(run.start_m, laid.heading_rad, laid.joint_rad)
@@ -67,7 +67,7 @@ def simulated(
         ServoBank(robot.servo_ids, servo.model, servo.baud),
         plant,
         baud=servo.baud,
-        surroundings=Surroundings(supply_v=servo.supply_v),
+        supply_and_ambient=SupplyAndAmbient(supply_v=servo.supply_v),
     )
     chain = ServoChain(DynamixelBus(line, servo.model), robot, watchdog_s=run.safety.watchdog_s)
     return Backend(

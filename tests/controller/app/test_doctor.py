@@ -27,7 +27,7 @@ def line() -> Recorder:
 
 def doctor(line: SimLine, rate_hz: float = 50.0, timer_ms: int | None = None) -> list[Finding]:
     line.setBaudRate(line.getBaudRate())
-    line.firmware.changed()
+    line.firmware.apply_registers()
     return examine(
         line,
         ROBOT,
@@ -122,10 +122,12 @@ def test_a_bad_line_shows_in_the_group_reads(line: Recorder) -> None:
 @pytest.mark.parametrize(("volts", "grade"), [(8.9, "fail"), (12.0, "ok"), (15.4, "fail")])
 def test_supply(volts: float, grade: str) -> None:
     from snakewalk.sim.servo.bench import BenchPlant
-    from snakewalk.sim.servo.protection import Surroundings
+    from snakewalk.sim.servo.protection import SupplyAndAmbient
 
     line = SimLine(
-        ServoBank(ROBOT.servo_ids), BenchPlant(4), surroundings=Surroundings(supply_v=volts)
+        ServoBank(ROBOT.servo_ids),
+        BenchPlant(4),
+        supply_and_ambient=SupplyAndAmbient(supply_v=volts),
     )
     assert of(doctor(line), "supply").grade == grade
 

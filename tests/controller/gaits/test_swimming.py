@@ -139,7 +139,7 @@ def test_a_straight_body_is_braked_by_the_water_as_written() -> None:
         plant = MujocoPlant(YAW16, load_world("pool"), step_s=0.001)
         plant.mechanics.data.qvel[axis] = 1.0
         start = plant.link_positions_m.mean(axis=0)[axis]
-        plant.mechanics.rest()
+        plant.mechanics.start_at_rest()
         plant.advance(1.0, a_still_drive(YAW16))
         k = per_m * YAW16.link_length_m / YAW16.link_mass_kg
         way = plant.link_positions_m.mean(axis=0)[axis] - start

@@ -92,7 +92,7 @@ class Rig:
     def alter(self, register: str, servo: int, value: int) -> None:
         self.line.bank[register][servo] = value
         self.line.setBaudRate(self.line.getBaudRate())
-        self.line.firmware.changed()
+        self.line.firmware.apply_registers()
 
 
 @pytest.fixture
@@ -177,7 +177,7 @@ def test_a_servo_that_is_away_for_a_while(rig: Rig) -> None:
 def test_a_tripped_watchdog_is_noticed_though_the_host_talks(rig: Rig) -> None:
     rig.line.settle()
     rig.line.bank["Bus Watchdog"][2] = 0xFF
-    rig.line.firmware.changed()
+    rig.line.firmware.apply_registers()
     rig.cycles(16)
     assert "servo 3: its bus watchdog has stopped it" in rig.said[0]
     assert rig.line.bank["Bus Watchdog"].tolist() == [10] * 4

@@ -10,11 +10,11 @@ from snakewalk.sim.ax12.decode import Decoder1
 from snakewalk.sim.ax12.line import Ax12Line
 from snakewalk.sim.ax12.protocol1 import BROADCAST_ID, Error1, Instruction1, frame
 from snakewalk.sim.servo.bench import BenchPlant
-from snakewalk.sim.sniff.decode import Line
+from snakewalk.sim.sniff.decode import DecodedPacket
 from snakewalk.sim.sniff.trace import TraceWriter
 
 
-def heard(*questions: bytes, alarm: int = 0, to: object = None) -> list[Line]:
+def decoded(*questions: bytes, alarm: int = 0, to: object = None) -> list[DecodedPacket]:
     line = Ax12Line(Ax12Servos((1, 2), BenchPlant(2)))
     if alarm:
         line.servos.protection.detect([0], alarm)
@@ -29,7 +29,7 @@ def heard(*questions: bytes, alarm: int = 0, to: object = None) -> list[Line]:
 
 
 def test_a_read_and_its_answer_are_told_with_their_register() -> None:
-    question, answer = heard(frame(1, Instruction1.READ, bytes((36, 4))))
+    question, answer = decoded(frame(1, Instruction1.READ, bytes((36, 4))))
     assert (question.kind, question.servo_id, question.name) == ("question", 1, "read")
     assert list(question.values) == ["Present Position", "Present Speed"]
     assert (answer.kind, answer.name) == ("answer", "ok")
@@ -38,7 +38,7 @@ def test_a_read_and_its_answer_are_told_with_their_register() -> None:
 
 
 def test_pings_of_one_and_of_all() -> None:
-    lines = heard(frame(1, Instruction1.PING), frame(BROADCAST_ID, Instruction1.PING))
+    lines = decoded(frame(1, Instruction1.PING), frame(BROADCAST_ID, Instruction1.PING))
     kinds = [(line.kind, line.servo_id, line.name) for line in lines]
     assert kinds == [
         *(("question", 1, "ping"), ("answer", 1, "ok")),
@@ -47,7 +47,7 @@ def test_pings_of_one_and_of_all() -> None:
 
 
 def test_writes_alarms_and_errors() -> None:
-    lines = heard(
+    lines = decoded(
         frame(1, Instruction1.WRITE, bytes((25, 1))),
         frame(1, Instruction1.WRITE, bytes((36, 1, 0))),
         frame(BROADCAST_ID, Instruction1.SYNC_WRITE, bytes((30, 2, 1, 0, 2, 2, 16, 0))),
@@ -71,7 +71,7 @@ def test_noise_and_half_packets_do_not_hide_what_follows() -> None:
 def test_sniff_reads_a_recording(tmp_path: Path) -> None:
     path = tmp_path / "exchange.jsonl"
     with path.open("w", encoding="utf-8") as out:
-        heard(frame(2, Instruction1.READ, bytes((43, 1))), to=out)
+        decoded(frame(2, Instruction1.READ, bytes((43, 1))), to=out)
     code = "from snakewalk.controller.app.cli.main import main; main()"
     words = ("bus", "sniff", str(path), "--model", "ax-12a", "--json")
     done = subprocess.run(

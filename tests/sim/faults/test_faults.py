@@ -43,27 +43,27 @@ def wait(line: SimLine, seconds: float) -> None:
     line.settle()
 
 
-def heard(line: SimLine) -> list[int]:
+def replying_ids(line: SimLine) -> list[int]:
     return [status.servo_id for status in PacketReader().feed(exchange(line, READ_ALL))]
 
 
 def test_noise_acts_in_its_window_on_its_servos() -> None:
     line = scripted(fault("drop", at_s=1.0, for_s=1.0, ids=[2, 3]))
-    assert heard(line) == [1, 2, 3, 4]
+    assert replying_ids(line) == [1, 2, 3, 4]
     wait(line, 1.0)
-    assert heard(line) == [1, 4]
+    assert replying_ids(line) == [1, 4]
     wait(line, 1.0)
-    assert heard(line) == [1, 2, 3, 4]
+    assert replying_ids(line) == [1, 2, 3, 4]
 
 
 @pytest.mark.parametrize("kind", ["corrupt", "truncate"])
 def test_damaged_answers_are_none(kind: str) -> None:
     line = scripted(fault(kind, ids=[2]))
-    assert heard(line) == [1, 3, 4]
+    assert replying_ids(line) == [1, 3, 4]
 
 
 def test_duplicates_come_twice() -> None:
-    assert heard(scripted(fault("duplicate", ids=[3]))) == [1, 2, 3, 3, 4]
+    assert replying_ids(scripted(fault("duplicate", ids=[3]))) == [1, 2, 3, 3, 4]
 
 
 def test_a_late_answer_comes_after_the_time_out_into_the_next_exchange() -> None:
@@ -199,10 +199,10 @@ def test_two_servos_with_one_id_garble_what_differs() -> None:
 def test_a_cable_out_in_mid_chain_takes_all_behind_it() -> None:
     line = scripted(fault("unplug", behind=2, at_s=0.5, for_s=0.5))
     wait(line, 0.5)
-    assert heard(line) == [1, 2]
+    assert replying_ids(line) == [1, 2]
     assert line.firmware.powered.tolist() == [True, True, False, False]
     wait(line, 0.5)
-    assert heard(line) == [1, 2, 3, 4]
+    assert replying_ids(line) == [1, 2, 3, 4]
 
 
 def test_a_stalled_host_sends_late() -> None:
@@ -216,7 +216,7 @@ def test_a_stalled_host_sends_late() -> None:
 
 def test_a_port_vanishes_and_comes_back() -> None:
     line = scripted(fault("port", at_s=0.5, for_s=0.5))
-    assert heard(line) == [1, 2, 3, 4]
+    assert replying_ids(line) == [1, 2, 3, 4]
     line.write(READ_ALL)
     with pytest.raises(PortError, match="vanished"):
         line.read_until(999, 0.7)

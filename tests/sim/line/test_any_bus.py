@@ -44,7 +44,7 @@ def make(servos: str, faults: str = "") -> SimLine:
     line = bench_line(parse_chain(servos))
     assert isinstance(line, SimLine)
     line.bank["Return Delay Time"][:] = 0
-    line.look_again()
+    line.refresh_ids()
     FaultPlayer(line, checked(FaultPlan, tomllib.loads(faults), "test"))
     return line
 
@@ -193,7 +193,7 @@ def test_backup_outlives_a_factory_reset_and_a_power_cut(line: SimLine) -> None:
         assert ask(line, servo, 0x20, b"\x02CTRL")[0].error == 0
         assert line.shown("Temperature Limit")[row] == 40 + servo
     line.firmware.cut_power(np.array([3]))
-    line.firmware.give_power(np.array([3]))
+    line.firmware.restore_power(np.array([3]))
     assert line.shown("Position P Gain").tolist() == [100, 200, 300, 400]
     write(line, 2, 64, 1, 1)
     assert ask(line, 2, 0x20, b"\x02CTRL")[0].result == ResultError.RESULT_FAIL
@@ -232,7 +232,7 @@ def test_watchdog_of_all_is_fed_by_any_packet_and_trips_all(line: SimLine) -> No
 # faults
 
 
-def heard(line: SimLine) -> list[int]:
+def replying_ids(line: SimLine) -> list[int]:
     return of_each(ask(line, ALL, Instruction.SYNC_READ, group_params(132, 4, IDS)))
 
 
@@ -253,12 +253,12 @@ def test_a_fault_of_the_third_servo(
     servos: str, kind: str, keys: dict[str, object], wanted: list[int]
 ) -> None:
     line = make(servos, fault(kind, ids=[3], at_s=0.2, for_s=0.2, **keys))
-    assert heard(line) == [1, 2, 3, 4]
+    assert replying_ids(line) == [1, 2, 3, 4]
     wait(line, 0.2)
-    assert heard(line) == wanted
+    assert replying_ids(line) == wanted
     wait(line, 0.3)
     exchange(line, b"")  # what was late
-    assert heard(line) == [1, 2, 3, 4]
+    assert replying_ids(line) == [1, 2, 3, 4]
 
 
 @pytest.mark.parametrize("code", [Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ])
@@ -303,10 +303,10 @@ def test_reboot_heat_and_unplug(servos: str) -> None:
     assert line.shown("Hardware Error Status").tolist() == [0, 0, 4, 0]
     assert line.shown("Present Temperature")[2] == 99
     wait(line, 0.6)
-    assert heard(line) == [1, 2]
+    assert replying_ids(line) == [1, 2]
     assert line.firmware.powered.tolist() == [True, True, False, False]
     wait(line, 0.6)
-    assert heard(line) == [1, 2, 3, 4]
+    assert replying_ids(line) == [1, 2, 3, 4]
     assert line.shown("Torque Enable").tolist() == [1, 0, 0, 0]
 
 
@@ -350,9 +350,9 @@ def test_one_id_on_two_servos(servos: str) -> None:
     wait(line, 0.1)
     assert ask(line, 1, Instruction.READ, bytes((24, 0, 4, 0))) == []
     assert ask(line, 4, Instruction.PING) == []
-    assert line._service.collisions >= 1
+    assert line._handler.collisions >= 1
     wait(line, 0.5)
-    assert heard(line) == [1, 2, 3, 4]
+    assert replying_ids(line) == [1, 2, 3, 4]
 
 
 def test_the_same_file_gives_the_same_bytes(servos: str) -> None:

@@ -170,7 +170,7 @@ def test_a_secondary_id_from_253_on_is_none() -> None:
     line = a_line(1)
     for each in (252, 253):
         write(line, 1, 12, each, 1)
-        assert line.roll.secondary(each) == ([0] if each == 252 else [])
+        assert line.directory.secondary(each) == ([0] if each == 252 else [])
 
 
 # factory reset
@@ -291,7 +291,7 @@ def twins() -> SimLine:
     line = a_line(3)
     line.bank["ID"][2] = 2
     line.bank["Moving Threshold"][2] = 99
-    line.look_again()
+    line.refresh_ids()
     return line
 
 

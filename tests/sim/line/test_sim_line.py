@@ -171,7 +171,7 @@ def test_group_path_says_what_the_general_one_says(
 def test_a_header_in_the_data_is_stuffed_in_plain_answers_and_not_in_fast_ones() -> None:
     line = a_line(2)
     line.bank["Operating Mode"][:] = 4
-    line.firmware.changed()
+    line.firmware.apply_registers()
     block = bytes((0xFF, 0xFF, 0xFD, 0x00))
     line.bank.table[0, 116:120] = np.frombuffer(block, np.uint8)
     plain = exchange(line, sync_read(PLAIN, 2, 116, 4))

@@ -16,7 +16,7 @@ def throw(body, forward_m_s: float = 0.0, left_m_s: float = 0.0) -> None:
     """Give a body at rest a velocity."""
     mechanics = body.mechanics
     mechanics.data.qvel[:2] = forward_m_s, left_m_s
-    mechanics.rest()
+    mechanics.start_at_rest()
 
 
 def swim(step_s: float) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 from snakewalk.sim.servo.motor import MOTORS, TICKS_PER_RAD, make_drive, p_gain_per_rad
-from snakewalk.sim.servo.protection import Surroundings
+from snakewalk.sim.servo.protection import SupplyAndAmbient
 from tests.helpers.bus import a_line, ask, rad, read, write
 
 XM430 = MOTORS["XM430-W350"]
@@ -24,7 +24,9 @@ def pause(line: SimLine, seconds: float) -> None:
 def held_line(load_n_m: float, **around: float) -> SimLine:
     """One servo, torque on, against a constant load."""
     plant = BenchPlant(1, dry_n_m=0.0, load_n_m=lambda q: np.full_like(q, load_n_m))
-    line = SimLine(ServoBank([1]), plant, surroundings=Surroundings(**{"supply_v": 12.0} | around))
+    line = SimLine(
+        ServoBank([1]), plant, supply_and_ambient=SupplyAndAmbient(**{"supply_v": 12.0} | around)
+    )
     write(line, 1, 9, 0, 1)
     write(line, 1, 64, 1, 1)
     return line

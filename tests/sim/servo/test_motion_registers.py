@@ -201,7 +201,7 @@ def test_startup_configuration_says_how_it_wakes_up(configuration: int) -> None:
     assert ask(line, 1, Instruction.CONTROL_TABLE_BACKUP, b"\x01CTRL")[0].error == 0
     line.firmware.cut_power(np.array([0]))
     wait(line, 0.1)
-    line.firmware.give_power(np.array([0]))
+    line.firmware.restore_power(np.array([0]))
     restored = bool(configuration & 2)
     assert (read(line, 1, 84, 2), read(line, 1, 112, 4)) == ((321, 30) if restored else (800, 0))
     assert read(line, 1, 64, 1) == configuration & 1

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from snakewalk.drivers.protocol.crc import TABLE, crc16
 from snakewalk.drivers.protocol.packet import encode_fast, fast_head
-from snakewalk.sim.servo import servo_loops as kernel
+from snakewalk.sim.servo import servo_loops
 
 
 def plain(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -25,7 +25,7 @@ BOTH = [pytest.param(lambda f: f, id="compiled"), pytest.param(plain, id="plain"
 @given(data=st.binary(max_size=60), cut=st.integers(0, 60))
 def test_crc_goes_on_from_where_it_stopped(data: bytes, cut: int) -> None:
     raw, cut = np.frombuffer(data, np.uint8), min(cut, len(data))
-    for crc_of in (kernel.crc_of, plain(kernel.crc_of)):
+    for crc_of in (servo_loops.crc_of, plain(servo_loops.crc_of)):
         head = crc_of(raw, 0, cut, 0, TABLE)
         assert crc_of(raw, cut, len(raw), head, TABLE) == crc16(data)
 
@@ -38,7 +38,7 @@ def test_a_fast_answer_is_what_servos_write_one_after_the_other(how: Any) -> Non
     shares = b"".join(bytes((9, i)) + bytes(8) for i in ids)
     packet = np.frombuffer(fast_head(len(shares)) + shares, np.uint8).copy()
     shape, block = np.array([8, 10, 0, 2]), np.array([20, 6, 7])
-    how(kernel.compose)(packet, shape, table, rows, block, TABLE)
+    how(servo_loops.fill_replies)(packet, shape, table, rows, block, TABLE)
     parts = [
         (0x80 if table[row, 7] else 0, i, table[row, 20:26].tobytes())
         for row, i in zip(rows, ids, strict=True)
@@ -52,7 +52,7 @@ def test_motion_is_shown_in_the_registers_units_little_endian(how: Any) -> None:
     shafts = (np.array([1.0, -9.0]), np.array([-0.5, 0.25]), np.array([0.5, -2.0]))
     frame = np.array([[1.0, -1.0], [2048.0, 100.0]])
     places, units = np.array([0, 4, 8]), np.array([0.01, 500.0, 0.25, 1000.0])
-    how(kernel.show_motion)(table, places, *shafts, frame, units)
+    how(servo_loops.write_motion)(table, places, *shafts, frame, units)
     assert table[:, 0:2].copy().view("<i2")[:, 0].tolist() == [100, 500]  # the second at its limit
     assert table[:, 4:8].copy().view("<i4")[:, 0].tolist() == [-2, -1]
     assert table[:, 8:12].copy().view("<i4")[:, 0].tolist() == [2548, 2100]
@@ -71,7 +71,7 @@ def test_goals_within_limits_are_taken_and_others_leave_no_trace(how: Any) -> No
         np.array([[-10, 0, 0], [10, 4095, 4095]]),
         np.array([[1.0, 1, -1], [0.0, 0, 1000]]),
     )
-    how(kernel.take_goals)(
+    how(servo_loops.accept_goals)(
         np.frombuffer(b"xx" + entries, np.uint8),
         np.array(ids),
         table,
@@ -91,14 +91,14 @@ def test_goals_within_limits_are_taken_and_others_leave_no_trace(how: Any) -> No
 @pytest.mark.parametrize("how", BOTH)
 def test_loss_grows_with_the_square_of_the_current(how: Any) -> None:
     heat_j = np.array([1.0, 1.0])
-    how(kernel.add_loss)(heat_j, np.array([2.0, -3.0]), 0.5)
+    how(servo_loops.add_loss)(heat_j, np.array([2.0, -3.0]), 0.5)
     assert heat_j.tolist() == [3.0, 5.5]
 
 
 @pytest.mark.parametrize("how", BOTH)
 def test_a_sensor_goes_its_share_of_the_way_and_the_heat_is_used_up(how: Any) -> None:
     celsius, heat_j = np.array([25.0, 40.0]), np.array([0.5, 0.0])
-    how(kernel.warm_up)(celsius, heat_j, 0.05, np.array([25.0, 6.0, 0.1]))
+    how(servo_loops.warm_up)(celsius, heat_j, 0.05, np.array([25.0, 6.0, 0.1]))
     assert celsius.tolist() == pytest.approx([25.0 + 0.1 * 60.0, 40.0 - 0.1 * 15.0])
     assert not heat_j.any()
 
@@ -111,14 +111,14 @@ def test_only_full_output_without_motion_counts_as_blocked(how: Any) -> None:
     limit = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.5])
     on = np.array([1.0, 1.0, 1.0, 1.0, 0.0, 1.0])
     velocity = np.array([0.0, 2.0, 2.0, 0.0, 0.0, 0.0])
-    longest_s = how(kernel.count_blocked)(blocked_s, 0.05, pwm, limit, on, velocity, 0.2)
+    longest_s = how(servo_loops.count_blocked)(blocked_s, 0.05, pwm, limit, on, velocity, 0.2)
     assert blocked_s.tolist() == pytest.approx([0.35, 0.0, 0.35, 0.0, 0.0, 0.35])
     assert longest_s == pytest.approx(0.35)
 
 
 @pytest.mark.parametrize("how", BOTH)
 def test_bridges_draw_current_whichever_way_they_push(how: Any) -> None:
-    assert how(kernel.drawn)(np.array([0.5, -0.5]), np.array([2.0, 1.0])) == 1.5
+    assert how(servo_loops.supply_current_a)(np.array([0.5, -0.5]), np.array([2.0, 1.0])) == 1.5
 
 
 @pytest.mark.parametrize("how", BOTH)
@@ -131,4 +131,4 @@ def test_heat_and_supply_are_judged_in_the_registers_units(
 ) -> None:
     sensors, hottest = np.array([20.0, celsius]), np.array([80, 80], np.uint8)
     least, most = np.array([95, 95], np.uint16), np.array([160, 160], np.uint16)
-    assert how(kernel.out_of_range)(sensors, hottest, tenths, least, most) == wrong
+    assert how(servo_loops.out_of_range)(sensors, hottest, tenths, least, most) == wrong

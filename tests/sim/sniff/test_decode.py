@@ -8,12 +8,12 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket, encode_instruction
 from snakewalk.sim.serve.chain_spec import parse_chain
-from snakewalk.sim.sniff.decode import Decoder, Line
+from snakewalk.sim.sniff.decode import DecodedPacket, Decoder
 from snakewalk.sim.sniff.trace import TraceWriter, read_trace
 from tests.helpers.bus import a_line, exchange, group_params
 
 
-def heard(*exchanges: tuple[int, int, bytes], model: str = "XM430-W350") -> list[Line]:
+def decoded(*exchanges: tuple[int, int, bytes], model: str = "XM430-W350") -> list[DecodedPacket]:
     line = a_line(2, model=model)
     decoder, lines = Decoder(), []
     line.taps.append(lambda t, _, data: lines.extend(decoder.feed(t, data)))
@@ -23,7 +23,7 @@ def heard(*exchanges: tuple[int, int, bytes], model: str = "XM430-W350") -> list
 
 
 def test_a_read_is_told_with_its_register() -> None:
-    question, answer = heard((1, Instruction.READ, bytes((132, 0, 4, 0))))
+    question, answer = decoded((1, Instruction.READ, bytes((132, 0, 4, 0))))
     assert (question.kind, question.name, question.servo_id) == ("question", "read", 1)
     assert list(question.values) == ["Present Position"]
     assert (answer.kind, answer.name, answer.values) == ("answer", "ok", {"Present Position": 2048})
@@ -32,10 +32,10 @@ def test_a_read_is_told_with_its_register() -> None:
 
 
 def test_pings_tell_the_models_and_with_them_the_registers() -> None:
-    ping, *pongs = heard((0xFE, Instruction.PING, b""), model="XL330-M288")[:3]
+    ping, *pongs = decoded((0xFE, Instruction.PING, b""), model="XL330-M288")[:3]
     assert ping.name == "ping"
     assert [pong.values["model"] for pong in pongs] == ["XL330-M288"] * 2
-    lines = heard(
+    lines = decoded(
         (1, Instruction.PING, b""), (1, Instruction.READ, bytes((62, 0, 1, 0))), model="XL330-M288"
     )
     assert lines[-1].values == {"PWM Slope": 140}
@@ -43,7 +43,7 @@ def test_pings_tell_the_models_and_with_them_the_registers() -> None:
 
 @pytest.mark.parametrize("code", [Instruction.SYNC_READ, Instruction.FAST_SYNC_READ])
 def test_group_reads_are_told_servo_by_servo(code: int) -> None:
-    lines = heard((0xFE, code, group_params(132, 4, [1, 2])))
+    lines = decoded((0xFE, code, group_params(132, 4, [1, 2])))
     values: dict[str, object] = {}
     for line in lines[1:]:
         for key, value in line.values.items():
@@ -53,7 +53,7 @@ def test_group_reads_are_told_servo_by_servo(code: int) -> None:
 
 def test_writes_errors_and_noise() -> None:
     goal = bytes((116, 0)) + (9_000).to_bytes(4, "little")
-    question, answer = heard((2, Instruction.WRITE, goal))
+    question, answer = decoded((2, Instruction.WRITE, goal))
     assert question.values == {"Goal Position": 9_000}
     assert answer.name == "data limit"
     (noise,) = Decoder().feed(0.0, bytes.fromhex("FF FF FD 00 01 03 00 01 19 4F 00 00 00 00"))
@@ -87,7 +87,7 @@ def test_a_wrong_recording_names_its_line(tmp_path: Path) -> None:
 
 
 def test_lines_go_to_json() -> None:
-    for line in heard((1, Instruction.READ, bytes((132, 0, 4, 0)))):
+    for line in decoded((1, Instruction.READ, bytes((132, 0, 4, 0)))):
         assert json.loads(json.dumps(line.as_dict()))["servo_id"] == 1
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from snakewalk.sim.line.sim_line import SimLine
     from snakewalk.sim.line.wire import Wire
     from snakewalk.sim.serve.chain_spec import ChainSpec
-    from snakewalk.sim.serve.live_table import Traffic
+    from snakewalk.sim.serve.live_table import LiveTable
     from snakewalk.sim.serve.pty import PtyServer
 
 LOOK_S = 0.25
@@ -120,7 +120,7 @@ def sniff(
 
 def _simulated(
     servos: str | None, robot: str | None, baud: int | None, faults: Path | None
-) -> tuple["ChainSpec", "Wire", "Traffic"]:
+) -> tuple["ChainSpec", "Wire", "LiveTable"]:
     """What is served, its line, and who looks at it."""
     from snakewalk.config.faults import FaultPlan  # noqa: PLC0415
     from snakewalk.config.loader import load  # noqa: PLC0415
@@ -129,7 +129,7 @@ def _simulated(
     from snakewalk.sim.faults.fault_player import FaultPlayer  # noqa: PLC0415
     from snakewalk.sim.serve.bench_line import bench_line  # noqa: PLC0415
     from snakewalk.sim.serve.chain_spec import ChainSpec, parse_chain  # noqa: PLC0415
-    from snakewalk.sim.serve.live_table import Traffic, look_at, look_at_ax12  # noqa: PLC0415
+    from snakewalk.sim.serve.live_table import LiveTable, ax12_rows, servo_rows  # noqa: PLC0415
     from snakewalk.sim.sniff.decode import Decoder  # noqa: PLC0415
 
     spec = parse_chain(servos or "1-4")
@@ -141,9 +141,9 @@ def _simulated(
     if faults is not None:
         FaultPlayer(line, load(faults, FaultPlan), str(faults))
     if isinstance(line, Ax12Line):
-        return spec, line, Traffic(lambda: look_at_ax12(line.servos), Decoder1())
+        return spec, line, LiveTable(lambda: ax12_rows(line.servos), Decoder1())
     models = dict(zip(spec.ids, spec.models, strict=True))
-    return spec, line, Traffic(lambda: look_at(line), Decoder(spec.kinds[0], models))
+    return spec, line, LiveTable(lambda: servo_rows(line), Decoder(spec.kinds[0], models))
 
 
 def _robot_line(name: str, baud: int | None) -> "SimLine":
@@ -177,7 +177,7 @@ def _announce(server: "PtyServer", what: "ChainSpec", line: "Wire", as_json: boo
         print(f"{what.model}: {ids} at {line.getBaudRate()} baud; ^C ends", flush=True)
 
 
-def _run(server: "PtyServer", traffic: "Traffic", stopped: "Stop", as_json: bool) -> None:
+def _run(server: "PtyServer", traffic: "LiveTable", stopped: "Stop", as_json: bool) -> None:
     """Serve; draw the table on a terminal, nothing elsewhere."""
     from rich.console import Console  # noqa: PLC0415
     from rich.live import Live  # noqa: PLC0415
