@@ -1,0 +1,164 @@
+"""What a wheel installs, in an environment of its own, beside a user's project.
+
+The user's project has packages ``config``, ``drivers``, ``sim`` and ``controller`` of its own, as many
+projects do; they stay theirs, and the pytest plugin loads beside them.
+"""
+
+import shutil
+import site
+import subprocess
+import sys
+import tarfile
+import venv
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+ROOMS = ("config", "drivers", "sim", "controller")
+BUILD = "import sys; from setuptools import build_meta as b; b.build_{kind}(sys.argv[1])"
+
+USERS_TEST = """
+import config, controller, drivers, sim
+import dynamixel_sdk
+
+
+def test_packages_of_the_same_names_are_the_users():
+    assert [p.OWNER for p in (config, controller, drivers, sim)] == ["user"] * 4
+
+
+def test_the_bus_answers(servo_bus):
+    bus = servo_bus("1-2:XL330-M288")
+    packets = dynamixel_sdk.PacketHandler(2.0)
+    model, result, error = packets.ping(bus.line, 2)
+    assert (model, result, error) == (1200, 0, 0)
+"""
+
+
+@dataclass(frozen=True)
+class Installed:
+    """A wheel in an environment of its own."""
+
+    bin: Path
+    packages: Path
+    """Where it is installed."""
+    project: Path
+    """The user's project, from which commands run."""
+
+    def run(self, *command: str) -> str:
+        """Output of a command of the environment, started in the user's project."""
+        # loops run as they stand: to compile them takes half a minute, and is tested elsewhere
+        environment = {"PATH": str(self.bin), "NUMBA_DISABLE_JIT": "1", "TERM": "dumb"}
+        done = subprocess.run(
+            [str(self.bin / command[0]), *command[1:]],
+            cwd=self.project,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+
+def build(kind: str, source: Path, folder: Path) -> Path:
+    """Build a wheel or an sdist without network and return its file."""
+    done = subprocess.run(
+        [sys.executable, "-c", BUILD.format(kind=kind), str(folder)],
+        cwd=source,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    (made,) = folder.glob("*.whl" if kind == "wheel" else "*.tar.gz")
+    return made
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Copy of what is shipped, links as links, so that nothing is built in this clone."""
+    copy = tmp_path_factory.mktemp("source")
+    for folder in (*ROOMS, "snakewalk"):
+        rubbish = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / folder, copy / folder, symlinks=True, ignore=rubbish)
+    for file in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / file, copy / file)
+    return copy
+
+
+@pytest.fixture(scope="module")
+def wheel(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build("wheel", source, tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installed:
+    """Install the wheel alone; what it depends on is taken from the environment of this test."""
+    home = tmp_path_factory.mktemp("environment")
+    venv.create(home, with_pip=False, symlinks=True)
+    (packages,) = home.glob("lib/python*/site-packages")
+    # a folder named in a .pth is searched last, and its own .pth (an editable install) is not read
+    (packages / "dependencies.pth").write_text("\n".join(site.getsitepackages()))
+    pip = [sys.executable, "-m", "pip", "--python", str(home / "bin" / "python"), "install"]
+    quiet = ["--quiet", "--no-deps", "--no-index", "--force-reinstall", "--no-compile"]
+    subprocess.run([*pip, *quiet, "--prefix", str(home), str(wheel)], check=True, timeout=120)
+
+    project = tmp_path_factory.mktemp("project")
+    for name in ROOMS:
+        (project / name).mkdir()
+        (project / name / "__init__.py").write_text('OWNER = "user"\n')
+    (project / "test_user.py").write_text(USERS_TEST)
+    return Installed(home / "bin", packages, project)
+
+
+def shipped(source: Path) -> set[str]:
+    """Every file that a wheel has to hold, as it is named in it."""
+    kinds = {".py", ".toml", ".typed"}
+    rooms = [file for room in ROOMS for file in (source / room).rglob("*")]
+    own = [file for file in (source / "snakewalk").iterdir() if not file.is_symlink()]
+    files = {file.relative_to(source) for file in rooms if file.suffix in kinds}
+    return {f"snakewalk/{file}" for file in files} | {f"snakewalk/{file.name}" for file in own}
+
+
+def names_in_wheel(wheel: Path) -> set[str]:
+    with zipfile.ZipFile(wheel) as file:
+        return set(file.namelist())
+
+
+def test_a_wheel_holds_every_file_and_one_top_level_name(source: Path, wheel: Path) -> None:
+    names = names_in_wheel(wheel)
+    assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"snakewalk"}
+    assert {name for name in names if ".dist-info/" not in name} == shipped(source)
+
+
+def test_a_wheel_built_from_the_sdist_is_the_same(
+    source: Path, wheel: Path, tmp_path: Path
+) -> None:
+    sdist = build("sdist", source, tmp_path)
+    with tarfile.open(sdist) as file:
+        file.extractall(tmp_path / "unpacked", filter="data")
+    (unpacked,) = (tmp_path / "unpacked").iterdir()
+    (tmp_path / "again").mkdir()
+    assert names_in_wheel(build("wheel", unpacked, tmp_path / "again")) == names_in_wheel(wheel)
+
+
+def test_what_is_installed_at_the_top(installed: Installed) -> None:
+    ours = {path.name for path in installed.packages.iterdir() if path.suffix != ".pth"}
+    assert {name for name in ours if not name.startswith("snakewalk-")} == {"snakewalk"}
+
+
+def test_the_command_runs_in_a_users_project(installed: Installed) -> None:
+    assert "Usage: snakewalk" in installed.run("snakewalk", "--help")
+    assert "flat-slalom" in installed.run("snakewalk", "list", "--json")
+
+
+def test_a_users_suite_keeps_its_packages_and_has_the_fixture(installed: Installed) -> None:
+    # started as a module, the user's project comes first on the path, also for our plugin
+    found = installed.run("python", "-c", "import snakewalk; print(snakewalk.__file__)")
+    assert Path(found.strip()).is_relative_to(installed.packages)
+    assert "2 passed" in installed.run("python", "-m", "pytest", "-q", "-p", "no:cacheprovider")
