@@ -1,7 +1,7 @@
 """What a wheel installs, in an environment of its own, beside a user's project.
 
-The user's project has packages ``config``, ``drivers``, ``sim`` and ``controller`` of its own, as many
-projects do; they stay theirs, and the pytest plugin loads beside them.
+The user's project has packages ``config``, ``drivers``, ``sim`` and ``controller`` of its own, as
+many projects do. They stay the user's, and the pytest plugin loads beside them.
 """
 
 import shutil
