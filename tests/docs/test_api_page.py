@@ -1,0 +1,28 @@
+"""The page of the library's names: complete, and its examples run."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import snakewalk
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "api.md").read_text(encoding="utf-8")
+
+
+def test_the_page_describes_every_public_name_and_no_other() -> None:
+    described = re.findall(r"^\| `(\w+)` \| \S", PAGE, re.MULTILINE)
+    assert sorted(described) == sorted(snakewalk.__all__)
+
+
+def test_the_examples_run_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    groups = re.findall(r"^## ", PAGE, re.MULTILINE)
+    assert len(blocks) == len(groups)
+    names: dict[str, object] = {}
+    for block in blocks:
+        exec(block, names)
+    assert (tmp_path / "out" / "log.mcap").is_file()
