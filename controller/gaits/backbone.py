@@ -14,13 +14,24 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.gaits.space_curve import SAMPLES_A_LINK, SpaceCurve
-from snakewalk.controller.kinematics.chain import chain_points_m, chain_slopes
+from snakewalk.controller.kinematics.links import (
+    BodyView,
+    body_in_world,
+    chain_axes,
+    chain_jacobian,
+    chain_points_m,
+)
 from snakewalk.controller.kinematics.rotations import rotation_by
+from snakewalk.drivers.types import BodyPose
 
+SAMPLES_A_LINK = 24
+"""Of the curve, over the length of a link."""
 ROUNDS = 40
 STEP_RAD = 0.3
 """The most that an angle moves in a round."""
@@ -28,6 +39,45 @@ STIFF_M_RAD = 1e-5
 """Distance that is given up rather than bend a joint by a radian: picks one of many fits."""
 DONE = 1e-7
 """Metres and radians of a round that is the last."""
+
+
+class SpaceCurve:
+    """A curve by arc length, densely sampled."""
+
+    def __init__(self, robot: RobotConfig, curve_m: ArrayLike) -> None:
+        points = np.asarray(curve_m, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4:
+            raise InputError(f"a backbone curve has four points (x, y, z) or more: {points.shape}")
+        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        if not np.isfinite(points).all() or steps.min() <= 0.0:
+            raise InputError("a backbone curve's points are finite, no two in a row the same")
+        spline = CubicSpline(np.concatenate([[0.0], steps.cumsum()]), points)
+        fine = np.linspace(0.0, spline.x[-1], 20 * len(points) + 2000)
+        way = np.linalg.norm(np.diff(spline(fine), axis=0), axis=1)
+        run = np.concatenate([[0.0], way.cumsum()])
+        if run[-1] < robot.length_m * (1.0 - 1e-6):
+            raise InputError(
+                f"the curve is {run[-1]:.3f} m long; robot {robot.name} has {robot.length_m:.3f} m"
+            )
+        count = int(np.ceil(run[-1] / robot.link_length_m * SAMPLES_A_LINK)) + 1
+        self.run_m = np.linspace(0.0, run[-1], count)
+        at = np.interp(self.run_m, run, fine)
+        self.points_m: Floats = np.asarray(spline(at))
+        self._by_run = CubicSpline(self.run_m, self.points_m)
+        tangents = self._by_run(self.run_m, 1)
+        self.tangents: Floats = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
+        self._tree = cKDTree(self.points_m)
+
+    def nearest(self, points: Floats) -> tuple[Floats, Floats]:
+        """Nearest points of the curve to points (N, 3), and the tangents there, (N, 3) each."""
+        run = self.run_m[self._tree.query(points)[1]]
+        for _ in range(2):
+            along = self._by_run(run, 1)
+            run = run + ((points - self._by_run(run)) * along).sum(axis=1)
+            run = np.clip(run, 0.0, self.run_m[-1])
+        along = self._by_run(run, 1)
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        return np.asarray(self._by_run(run)), np.asarray(along)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,13 +122,15 @@ def fit_backbone(
     joints = np.clip(joints, -limit, limit)
     tip = curve.points_m[0].copy()
     for _ in range(ROUNDS if refine else 0):
-        points, axes = chain_points_m(robot, joints, tip, rotation)
+        body = _body(robot, joints, tip, rotation)
+        points = chain_points_m(robot, body)
         near_m, along = curve.nearest(points)
         away = points - near_m
         across = np.eye(3) - along[:, :, None] * along[:, None, :]
         across[0] = np.eye(3)  # the head's tip stays at the curve's beginning
         miss = np.einsum("nij,nj->ni", across, away).ravel()
-        slopes = np.einsum("nij,njk->nik", across, chain_slopes(points, axes))
+        slopes = chain_jacobian(points, chain_axes(robot, body))
+        slopes = np.einsum("nij,njk->nik", across, slopes)
         slopes = slopes.reshape(len(miss), -1)
         free = np.ones(slopes.shape[1], dtype=bool)
         rows = np.vstack([slopes, STIFF_M_RAD * np.eye(len(free))[6:]])
@@ -86,11 +138,11 @@ def fit_backbone(
         for _ in range(3):  # joints that would pass their limit stop there, the others go on
             right = np.concatenate([-miss, -STIFF_M_RAD * joints]) - rows[:, ~free] @ change[~free]
             change[free] = np.linalg.lstsq(rows[:, free], right, rcond=None)[0]
-            wanted = joints + change[6:]
-            beyond = np.abs(wanted) > limit
+            bends = joints + change[6:]
+            beyond = np.abs(bends) > limit
             if not beyond.any():
                 break
-            change[6:][beyond] = np.clip(wanted, -limit, limit)[beyond] - joints[beyond]
+            change[6:][beyond] = np.clip(bends, -limit, limit)[beyond] - joints[beyond]
             free[6:] &= ~beyond
         change *= min(1.0, STEP_RAD / max(float(np.abs(change[3:]).max()), 1e-12))
         tip = tip + change[:3]
@@ -98,9 +150,15 @@ def fit_backbone(
         joints = np.clip(joints + change[6:], -limit, limit)
         if np.abs(change).max() < DONE:
             break
-    points, _ = chain_points_m(robot, joints, tip, rotation)
+    points = chain_points_m(robot, _body(robot, joints, tip, rotation))
     away_m = np.linalg.norm(points - curve.nearest(points)[0], axis=1)
     return BackboneFit(joints, tip, rotation, points, away_m)
+
+
+def _body(robot: RobotConfig, joint_rad: Floats, tip_m: Floats, rotation: Floats) -> BodyView:
+    """Forward kinematics from the head's tip (3,) and axes (3, 3)."""
+    head_m = tip_m - 0.5 * robot.link_length_m * rotation[:, 0]
+    return body_in_world(robot, BodyPose(0.0, head_m, rotation), joint_rad)
 
 
 def _seed(robot: RobotConfig, curve: SpaceCurve, roll_rad: float) -> tuple[Floats, Floats]:

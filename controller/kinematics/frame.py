@@ -10,9 +10,9 @@ from snakewalk.config.arrays import Floats
 UP = (0.0, 0.0, 1.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """A body's place and axes in the world."""
+    """A place and three axes in the world."""
 
     rotation: Floats
     """(3, 3) columns: forward, left, up. [YT]'s R."""
@@ -24,19 +24,19 @@ class Frame:
         """Return a level frame."""
         c, s = np.cos(heading_rad), np.sin(heading_rad)
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return Frame(rotation, np.array([x_m, y_m, z_m]))
+        return Frame(rotation=rotation, origin_m=np.array([x_m, y_m, z_m]))
 
     @property
     def heading_rad(self) -> float:
-        """Direction of x in the horizontal plane."""
+        """Direction of x in the horizontal plane, rad, in (-pi, pi]."""
         return float(np.arctan2(self.rotation[1, 0], self.rotation[0, 0]))
 
-    def world_m(self, points_m: Floats) -> Floats:
-        """(..., 3) points of the body frame in the world."""
+    def to_world_m(self, points_m: Floats) -> Floats:
+        """(..., 3) points of this frame in the world."""
         return np.asarray(points_m @ self.rotation.T + self.origin_m)
 
-    def body_m(self, points_m: Floats) -> Floats:
-        """(..., 3) points of the world in the body frame."""
+    def to_local_m(self, points_m: Floats) -> Floats:
+        """(..., 3) points of the world in this frame."""
         return np.asarray((points_m - self.origin_m) @ self.rotation)
 
 
@@ -61,4 +61,4 @@ def body_frame(link_m: Floats, up: ArrayLike = UP) -> Frame:
     if width < 1e-9:
         raise ValueError("the body stands upright: no left axis")
     y = side / width
-    return Frame(np.column_stack([x, y, np.cross(x, y)]), origin)
+    return Frame(rotation=np.column_stack([x, y, np.cross(x, y)]), origin_m=origin)

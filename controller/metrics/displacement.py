@@ -6,7 +6,8 @@ import numpy as np
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.gaits.registry import make_gait
-from snakewalk.controller.kinematics.virtual_chassis import Frame, virtual_chassis
+from snakewalk.controller.kinematics.frame import Frame
+from snakewalk.controller.kinematics.virtual_chassis import virtual_chassis
 from snakewalk.controller.motion.gait_cycle import Cycle
 from snakewalk.controller.motion.stop_profile import STOP_S
 from snakewalk.controller.runlog.record import RunRecord

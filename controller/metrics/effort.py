@@ -7,9 +7,12 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.metrics.ground_contact import CLEAR_M
 from snakewalk.controller.motion.stop_profile import STOP_S
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.drivers.types import BodyPose
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +68,7 @@ def _slip(record: RunRecord, steady: NDArray[np.bool_]) -> float:
         return float("nan")
     links, centre = pose.links_m[steady], pose.centre_m[steady]
     joints = record.cycle.measured_rad[np.searchsorted(record.cycle.time_s, pose.time_s[steady])]
-    frames = link_rotations(header.robot.joint_axes, pose.rotation[steady], joints)
+    frames = _link_rotations(header.robot, pose.rotation[steady], joints)
     # the turn from one cycle to the next as a vector: half the skew part of R' R^T, for small turns
     turned = frames[1:] @ np.swapaxes(frames[:-1], -1, -2)
     skew = 0.5 * (turned - np.swapaxes(turned, -1, -2))
@@ -81,19 +84,8 @@ def _slip(record: RunRecord, steady: NDArray[np.bool_]) -> float:
     return slid_m / gone_m if gone_m > 1e-3 else float("nan")
 
 
-def link_rotations(joint_axes: str, head: Floats, joint_rad: Floats) -> Floats:
-    """(T, L, 3, 3) frames of all links from the head's (T, 3, 3) and joint angles (T, J).
-
-    Yaw turns the link behind by ``-q`` about its up axis, pitch by ``+q`` about its left axis.
-    """
-    found = [head]
-    cos, sin = np.cos(joint_rad), np.sin(joint_rad)
-    for j, axis in enumerate(joint_axes):
-        forward, left, up = (found[-1][..., k] for k in range(3))
-        c, s = cos[:, j, None], sin[:, j, None]
-        if axis == "y":
-            columns = (c * forward - s * left, s * forward + c * left, up)
-        else:
-            columns = (c * forward - s * up, left, s * forward + c * up)
-        found.append(np.stack(columns, axis=-1))
-    return np.stack(found, axis=1)
+def _link_rotations(robot: RobotConfig, head: Floats, joint_rad: Floats) -> Floats:
+    """(T, L, 3, 3) axes of all links from the head's (T, 3, 3) and joint angles (T, J)."""
+    poses = (BodyPose(0.0, np.zeros(3), rotation) for rotation in head)
+    bodies = (body_in_world(robot, *row) for row in zip(poses, joint_rad, strict=True))
+    return np.array([body.rotation for body in bodies])

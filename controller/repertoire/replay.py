@@ -25,7 +25,7 @@ class Replayed:
     @property
     def end(self) -> Frame:
         """The last body frame."""
-        return Frame(self.rotation[-1], self.origin_m[-1])
+        return Frame(rotation=self.rotation[-1], origin_m=self.origin_m[-1])
 
 
 def replay(segment: Segment, start: Frame, scale: float = 1.0) -> Replayed:
@@ -57,7 +57,7 @@ def replay_all(
             if count:
                 still = np.repeat(at.rotation[None], count, axis=0)
                 stays = np.repeat(at.origin_m[None], count, axis=0)
-                parts.append(Replayed(still, stays, at.world_m(shapes)))
+                parts.append(Replayed(still, stays, at.to_world_m(shapes)))
         parts.append(replay(segment, at, scale))
         at = parts[-1].end
     return Replayed(

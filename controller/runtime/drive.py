@@ -108,7 +108,7 @@ class Drive:
                     break
                 pose = self._pose(state)
                 view = body_in_world(self._robot, pose, state.position_rad)
-                self._way_m = view.way_since_m(self._last) if self._last is not None else 0.0
+                self._way_m = view.advance_since_m(self._last) if self._last is not None else 0.0
                 if clock.now_s() < walk_s:
                     goal = ramp.at(clock.now_s() - start_s)
                 else:

@@ -5,8 +5,6 @@ from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
 
-import numpy as np
-
 from snakewalk.config.arrays import Floats
 from snakewalk.config.ground import build_ground
 from snakewalk.config.loader import checked
@@ -14,7 +12,6 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.runs.backend import simulated
-from snakewalk.controller.kinematics.frame import Frame, body_frame
 from snakewalk.controller.kinematics.links import BodyView, body_in_world, mean_heading_rad
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.record import Laid
@@ -100,16 +97,6 @@ class PhysicsBody:
         assert pose is not None, "a simulated robot has a pose"
         return body_in_world(self.robot, pose(), self.joint_rad)
 
-    def body_frame(self) -> Frame:
-        """The body's frame."""
-        return body_frame(self.view().link_m)
-
-    def link_rotation(self) -> Floats:
-        """(L, 3, 3) axes of the links in the world."""
-        pose = self._backend.pose
-        assert pose is not None, "a simulated robot has a pose"
-        return link_rotations(self.robot.joint_axes, pose().rotation, self.joint_rad)
-
     def play(self, source: MotionSource, told: Callable[[int], None] = lambda _: None) -> None:
         """Send what ``source`` yields until it is done; ``told`` counts the frames."""
         count = 0
@@ -117,16 +104,3 @@ class PhysicsBody:
             self.frame(source.step(FRAME_S, self.view()))
             count += 1
             told(count)
-
-
-def link_rotations(joint_axes: str, head: Floats, joint_rad: Floats) -> Floats:
-    """(L, 3, 3) of a chain whose head has axes ``head`` (3, 3); joints (J,) as everywhere."""
-    found = [np.asarray(head, dtype=float)]
-    for axis, angle in zip(joint_axes, joint_rad, strict=True):
-        c, s = np.cos(angle), np.sin(angle)
-        if axis == "y":  # what is behind turns by the negative angle about up
-            turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        else:  # and by the positive one about left
-            turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-        found.append(found[-1] @ turn)
-    return np.array(found)

@@ -11,6 +11,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.studies.repertoire_physics import FRAME_S, PhysicsBody
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.gaits.wave import TURN
+from snakewalk.controller.kinematics.frame import body_frame
 from snakewalk.controller.motion.gait_cycle import Cycle
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
@@ -82,9 +83,9 @@ def record_action(
             body.frame(motion.step(FRAME_S, body.view()))
         for k in range(count + 1):
             view = body.view()
-            frames.append(body.body_frame())
+            frames.append(body_frame(view.link_m))
             links.append(view.link_m)
-            rotations.append(body.link_rotation())
+            rotations.append(view.rotation)
             joints.append(body.joint_rad)
             if k < count:
                 goals.append(motion.goal_rad())

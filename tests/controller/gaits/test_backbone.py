@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.gaits.backbone import fit_backbone
-from snakewalk.controller.kinematics.chain import chain_points_m
+from snakewalk.controller.kinematics.links import body_in_world, chain_axes, chain_points_m
 from snakewalk.sim.physics.plant import MujocoPlant
 
 Floats = NDArray[np.float64]
@@ -126,8 +126,9 @@ def test_the_chain_is_that_of_the_physics() -> None:
     data = plant.mechanics.data
     data.qpos[7:] = q
     links, turns = plant.link_positions_m, plant.link_rotations
-    tip = links[0] + 0.5 * robot.link_length_m * turns[0][:, 0]
-    points, axes = chain_points_m(robot, q, tip, turns[0])
+    body = body_in_world(robot, plant.head_pose(), q)
+    points, axes = chain_points_m(robot, body), chain_axes(robot, body)
+    np.testing.assert_allclose(body.rotation, turns, atol=1e-9)
     np.testing.assert_allclose(0.5 * (points[:-1] + points[1:]), links, atol=1e-9)
     np.testing.assert_allclose(axes, data.xaxis[1:], atol=1e-9)
 

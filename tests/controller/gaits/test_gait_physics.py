@@ -7,8 +7,9 @@ import pytest
 
 from snakewalk.config.loader import load_gait, load_robot, load_world
 from snakewalk.controller.gaits.registry import make_gait
+from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.links import body_in_world
-from snakewalk.controller.kinematics.virtual_chassis import Frame, virtual_chassis
+from snakewalk.controller.kinematics.virtual_chassis import virtual_chassis
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.head_steering import HeadSteering, Look
 from snakewalk.controller.motion.source import MotionSource

@@ -2,9 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.kinematics.links import (
+    body_in_world,
+    chain_axes,
+    chain_jacobian,
+    chain_points_m,
+)
 from snakewalk.drivers.types import BodyPose
 
 YAW = load_robot("yaw16")
@@ -51,3 +58,36 @@ def test_neighbouring_links_meet_at_the_joint() -> None:
         front = view.link_m[1:] + half * view.forward[1:]
         np.testing.assert_allclose(rear, front, atol=1e-12)
         np.testing.assert_allclose(np.linalg.norm(view.forward, axis=1), 1.0)
+
+
+def test_the_axes_of_every_link_are_those_of_the_joints_turned_one_by_one() -> None:
+    robot = RobotConfig(name="r", joint_axes="ypypyyp")
+    rng = np.random.default_rng(0)
+    head, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+    head[:, 0] *= np.sign(np.linalg.det(head))
+    joints = rng.uniform(-1.0, 1.0, 7)
+    view = body_in_world(robot, BodyPose(0.0, np.zeros(3), head), joints)
+    frame = head
+    for axis, angle, found in zip(robot.joint_axes, joints, view.rotation[1:], strict=True):
+        turn = Rotation.from_rotvec([0, 0, -angle] if axis == "y" else [0, angle, 0])
+        frame = frame @ turn.as_matrix()
+        np.testing.assert_allclose(found, frame, atol=1e-12)
+    np.testing.assert_array_equal(view.forward, view.rotation[:, :, 0])
+
+
+def test_the_jacobian_is_the_slope_of_the_points() -> None:
+    rng = np.random.default_rng(2)
+    joints, step = rng.uniform(-1.0, 1.0, 16), 1e-6
+    body = body_in_world(BOTH, pose(0.3), joints)
+    points = chain_points_m(BOTH, body)
+    jacobian = chain_jacobian(points, chain_axes(BOTH, body))
+    tip = points[0]
+    for j in range(16):
+        bent = joints + step * (np.arange(16) == j)
+        moved = chain_points_m(BOTH, body_in_world(BOTH, pose(0.3), bent))
+        np.testing.assert_allclose(jacobian[:, :, 6 + j], (moved - points) / step, atol=1e-5)
+    for k in range(3):
+        turn = Rotation.from_rotvec(step * np.eye(3)[k]).as_matrix()
+        moved = (points - tip) @ turn.T + tip
+        np.testing.assert_allclose(jacobian[:, :, 3 + k], (moved - points) / step, atol=1e-5)
+        np.testing.assert_array_equal(jacobian[:, :, k], np.tile(np.eye(3)[k], (18, 1)))

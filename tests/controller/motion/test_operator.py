@@ -17,7 +17,7 @@ from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.operator import Operator
 
-VIEW = BodyView(np.zeros((17, 3)), np.zeros((17, 3)), np.zeros(3))
+VIEW = BodyView(np.zeros((17, 3)), np.zeros((17, 3, 3)), np.zeros(3))
 
 
 class Hands:

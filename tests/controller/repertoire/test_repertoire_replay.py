@@ -25,15 +25,19 @@ def turned(axis: Floats, angle: float) -> Floats:
     return np.asarray(np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k)
 
 
+def posed(rotation: Floats, origin_m: Floats) -> Frame:
+    return Frame(rotation=rotation, origin_m=origin_m)
+
+
 def swimmer(seed: int, frames: int = 12, links: int = 5) -> tuple[list[Frame], Floats]:
     """A body that goes any way in space, and its links in the world."""
     random = np.random.default_rng(seed)
-    at = [Frame(turned(random.normal(size=3), 1.0), random.normal(size=3))]
+    at = [posed(turned(random.normal(size=3), 1.0), random.normal(size=3))]
     for _ in range(frames):
         step = turned(random.normal(size=3), 0.3)
-        at.append(Frame(at[-1].rotation @ step, at[-1].origin_m + random.normal(size=3)))
+        at.append(posed(at[-1].rotation @ step, at[-1].origin_m + random.normal(size=3)))
     shapes = random.normal(size=(frames + 1, links, 3))
-    return at, np.array([frame.world_m(shape) for frame, shape in zip(at, shapes, strict=True)])
+    return at, np.array([frame.to_world_m(shape) for frame, shape in zip(at, shapes, strict=True)])
 
 
 def recorded(seed: int) -> tuple[Segment, list[Frame], Floats]:
@@ -50,11 +54,11 @@ def recorded(seed: int) -> tuple[Segment, list[Frame], Floats]:
 def test_replay_from_any_pose_is_the_recording_moved_there(seed: int, scale: float) -> None:
     segment, frames, links = recorded(seed)
     random = np.random.default_rng(seed + 1)
-    start = Frame(turned(random.normal(size=3), random.uniform(-3, 3)), random.normal(size=3))
+    start = posed(turned(random.normal(size=3), random.uniform(-3, 3)), random.normal(size=3))
     found = replay(segment, start, scale)
     for k in range(segment.frames):
-        inside = scale * frames[0].body_m(links[k + 1])
-        np.testing.assert_allclose(found.link_m[k], start.world_m(inside), atol=1e-9)
+        inside = scale * frames[0].to_local_m(links[k + 1])
+        np.testing.assert_allclose(found.link_m[k], start.to_world_m(inside), atol=1e-9)
         turn = frames[0].rotation.T @ frames[k + 1].rotation
         np.testing.assert_allclose(found.rotation[k], start.rotation @ turn, atol=1e-9)
 
@@ -74,7 +78,7 @@ def test_the_printed_world_rotation_holds_for_the_recorded_pose_and_goes_astray_
     segment, frames, _ = recorded(3)
     same = printed(segment, frames, frames[0])
     np.testing.assert_allclose(same[:, :3], frames[-1].rotation, atol=1e-9)
-    start = Frame(turned(np.array([0.3, 0.5, 1.0]), 2.0), np.zeros(3))
+    start = posed(turned(np.array([0.3, 0.5, 1.0]), 2.0), np.zeros(3))
     ours = replay(segment, start).end
     astray = printed(segment, frames, start)
     assert np.abs(astray[:, :3] - ours.rotation).max() > 0.3
@@ -87,15 +91,15 @@ def test_a_body_that_heads_another_way_on_a_slope_leaves_the_ground_with_the_pri
     # a turn on the spot on a plane that leans: recorded uphill, replayed across
     lean = turned(np.array([0.0, 1.0, 0.0]), -0.4)
     frames = [Frame(lean @ Frame.flat(0, 0, a).rotation, np.zeros(3)) for a in (0.0, 0.5, 1.0)]
-    links = np.array([frame.world_m(np.eye(3)) for frame in frames])
+    links = np.array([frame.to_world_m(np.eye(3)) for frame in frames])
     axes, joints = np.tile(np.eye(3), (3, 3, 1, 1)), np.zeros((3, 2))
     segment = cut("turn", "left", 0.1, frames, links, axes, joints[:-1], joints)
     other = turned(np.array([1.0, 0.0, 0.0]), 0.4)  # a plane that leans to the side
     normal = other[:, 2]
-    assert replay(segment, Frame(other, np.zeros(3))).end.rotation[:, 0] @ normal == pytest.approx(
+    assert replay(segment, posed(other, np.zeros(3))).end.rotation[:, 0] @ normal == pytest.approx(
         0
     )
-    assert abs(printed(segment, frames, Frame(other, np.zeros(3)))[:, 0] @ normal) > 0.1
+    assert abs(printed(segment, frames, posed(other, np.zeros(3)))[:, 0] @ normal) > 0.1
 
 
 def test_printed_y_is_shorter_than_one_where_up_leans_and_ours_is_not() -> None:

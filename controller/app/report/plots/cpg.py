@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.gaits.registry import GAITS
-from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.motion.cpg_motion import CpgMotion
 
 ROBOT = "alternating16"
@@ -27,8 +27,7 @@ def draw(out: Path) -> None:
     from matplotlib import pyplot as plt  # noqa: PLC0415  after the choice of backend
 
     robot = load_robot(ROBOT)
-    links = np.zeros((robot.joint_count + 1, 3))
-    nowhere = BodyView(links, links, links[0])
+    nowhere = body_in_world(robot, pose_at(np.zeros(2), 0.0), np.zeros(robot.joint_count))
     motion = CpgMotion(robot, np.zeros(robot.joint_count))
     angles: list[NDArray[np.float64]] = []
     speeds: list[NDArray[np.float64]] = []

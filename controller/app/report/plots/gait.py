@@ -7,8 +7,9 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait
+from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.links import body_in_world
-from snakewalk.controller.kinematics.virtual_chassis import Frame, virtual_chassis
+from snakewalk.controller.kinematics.virtual_chassis import virtual_chassis
 from snakewalk.drivers.types import BodyPose
 
 PHASES = 6
@@ -25,7 +26,7 @@ def bodies_m(gait: Gait, robot: RobotConfig, phases: int = PHASES) -> Floats:
         link_m = body_in_world(robot, pose, row).link_m
         frame = virtual_chassis(link_m, np.array([0.0, 0.0, 1.0]), frame)
         if k % 12 == 0:
-            shown.append(frame.inside(link_m))
+            shown.append(frame.to_local_m(link_m))
     bodies = np.array(shown)
     reach = np.abs(joints).max(axis=0)
     sideways, upwards = (reach[list(j)].max(initial=0.0) for j in (yaw, robot.pitch_joints))

@@ -26,7 +26,7 @@ def draw_actions(repertoire: Repertoire, path: Path) -> None:
         one = replay(segment, begin)
         two = replay(segment, one.end)
         way = np.concatenate([one.origin_m, two.origin_m])
-        first = begin.world_m(segment.link_m[-1])
+        first = begin.to_world_m(segment.link_m[-1])
         for shape, shade in zip((first, one.link_m[-1], two.link_m[-1]), SHADES, strict=True):
             axis.plot(shape[:, 0], shape[:, 1], color=shade, lw=2.5, solid_capstyle="round")
             axis.plot(*shape[0, :2], "o", color=shade, ms=5)

@@ -2,28 +2,11 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.app.studies.sweep_measure import Row, measure
 from snakewalk.controller.app.studies.sweep_points import Point
 from snakewalk.controller.app.studies.tune import Task, loss
-from snakewalk.controller.kinematics.links import body_in_world
-from snakewalk.controller.metrics.effort import link_rotations
-from snakewalk.drivers.types import BodyPose
-
-
-def test_link_frames_agree_with_the_chain() -> None:
-    robot = RobotConfig(name="r", joint_axes="ypypyyp")
-    rng = np.random.default_rng(0)
-    head, _ = np.linalg.qr(rng.standard_normal((3, 3)))
-    head[:, 0] *= np.sign(np.linalg.det(head))
-    joints = rng.uniform(-1.0, 1.0, 7)
-    frames = link_rotations(robot.joint_axes, head[None], joints[None])[0]
-    view = body_in_world(robot, BodyPose(0.0, np.zeros(3), head), joints)
-    assert np.allclose(frames[:, :, 0], view.forward)
-    assert np.allclose(frames @ np.swapaxes(frames, -1, -2), np.eye(3))
 
 
 def test_undulation_advances_costs_and_slips_less_than_it_goes() -> None:
