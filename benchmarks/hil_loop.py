@@ -63,7 +63,7 @@ def run() -> list[Row]:
                 all_of_one.append(one)
     bare, *others = (float(np.min(each, axis=0).mean()) for each in costs)
     names = (
-        ("servo motors, friction, body" + ("" if robot.plant.compiled else ", in numpy"), None),
+        ("servo motors, friction, body", None),
         ("safety, bytes, servos, body", None),
         ("the whole loop: that and the pilot", LIMIT),
         ("the whole loop and its log", None),

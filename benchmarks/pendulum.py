@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.sim.servo.bench import BenchPlant
 from snakewalk.sim.servo.gearbox import GEARBOXES, Gearbox
 from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
@@ -39,7 +40,7 @@ def simulate(gain: int, log: dict[str, Floats], gear: Gearbox | None) -> Floats:
         1,
         inertia_kg_m2=MASS_KG * ARM_M**2,
         dry_n_m=0.0,
-        load_n_m=lambda q: -MASS_KG * 9.81 * ARM_M * np.sin(q),
+        load_n_m=lambda q: -MASS_KG * GRAVITY_M_S2 * ARM_M * np.sin(q),
         start_rad=log["position"][0],
         gear=gear,
     )

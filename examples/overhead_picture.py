@@ -20,7 +20,7 @@ def main(file: Path) -> None:
     view = TopView(robot, world, camera, (0.0, 0.0))
     model = CameraModel.straight_down(camera, (0.0, 0.0))
     eye = OverheadEye(model, view.empty_floor(), robot.body_radius_m, camera.shade)
-    plant = MujocoPlant(robot, world, compiled=False)
+    plant = MujocoPlant(robot, world)
     plant.reset((0.9, 0.3), 0.4, 0.45 * np.sin(0.5 + 0.55 * np.arange(robot.joint_count)))
     image = view.picture(plant.qpos)
     view.close()

@@ -1,8 +1,8 @@
 """The seam between servos and mechanics.
 
-Servos (``sim.bus``) own a ``ServoDrive``: one array per quantity, one entry per joint, written when
-registers change. A ``Plant`` (``sim.physics``, or a bench model in tests) owns shafts, reads the
-drive in every step, and writes back what the motors did.
+Servos (``sim.servo``) own a ``ServoDrive``: one array per quantity, one entry per joint, written
+when registers change. A ``Plant`` (``sim.physics``, or a bench of bare shafts) owns the shafts,
+reads the drive in every step, and writes back the motors' output.
 """
 
 from dataclasses import dataclass, field
@@ -58,6 +58,28 @@ class ServoDrive:
             *(self.resistance_ohm, self.torque_constant_n_m_a, self.back_emf_v_s),
             *(self.current_limit_a, self.current_a, self.torque_n_m, self.pwm),
         )
+
+
+def shaft_torque(
+    position_rad: float,
+    velocity_rad_s: float,
+    torque_on: float,
+    goal_rad: float,
+    p_gain_per_rad: float,
+    pwm_limit: float,
+    supply_v: float,
+    resistance_ohm: float,
+    torque_constant_n_m_a: float,
+    back_emf_v_s: float,
+    current_limit_a: float,
+) -> tuple[float, float, float]:
+    """PWM fraction, current in A and torque in N m of one servo: the law of ``ServoDrive``."""
+    if torque_on <= 0.0:
+        return 0.0, 0.0, 0.0
+    pwm = min(max(p_gain_per_rad * (goal_rad - position_rad), -pwm_limit), pwm_limit)
+    current = (pwm * supply_v - back_emf_v_s * velocity_rad_s) / resistance_ohm
+    current = min(max(current, -current_limit_a), current_limit_a)
+    return pwm, current, torque_constant_n_m_a * current
 
 
 class Plant(Protocol):

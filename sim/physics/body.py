@@ -9,6 +9,7 @@ MuJoCo's own cone knows no direction along a body. Links do not touch each other
 import mujoco
 import numpy as np
 
+from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import ElevationGround, WorldConfig
@@ -31,17 +32,12 @@ def build_model(
     world: WorldConfig,
     ground: HeightField | None,
     step_s: float,
-    *,
-    armature_kg_m2: float = ARMATURE_KG_M2,
-    gravity_m_s2: float = 9.81,
 ) -> mujoco.MjModel:
     """Compile the model; ``ground`` None is the level floor at z = 0.
 
     Body ``1 + i`` is link i, joint ``1 + j`` is joint j (joint 0 is free), body ``1`` the head.
     """
-    spec = mujoco.MjSpec.from_string(
-        mjcf(robot, world, ground, step_s, armature_kg_m2=armature_kg_m2, gravity_m_s2=gravity_m_s2)
-    )
+    spec = mujoco.MjSpec.from_string(mjcf(robot, world, ground, step_s))
     return finish(spec.compile(), ground)
 
 
@@ -64,9 +60,6 @@ def mjcf(
     world: WorldConfig,
     ground: HeightField | None,
     step_s: float,
-    *,
-    armature_kg_m2: float = ARMATURE_KG_M2,
-    gravity_m_s2: float = 9.81,
 ) -> str:
     """Write the model as MJCF text (a height field's samples are filled in by ``finish``)."""
     soft = f'solref="{max(CONTACT_TIME_S, 2.0 * step_s)} 1" solimp="0.9 0.95 0.001"'
@@ -74,11 +67,11 @@ def mjcf(
     options, obstacle = obstacle_mjcf(world)
     return f"""<mujoco model="{robot.name}">
   <compiler angle="radian" autolimits="true"/>
-  <option timestep="{step_s!r}" gravity="0 0 {-gravity_m_s2!r}" integrator="Euler" solver="Newton"
+  <option timestep="{step_s!r}" gravity="0 0 {-GRAVITY_M_S2!r}" integrator="Euler" solver="Newton"
     {options}/>
   <asset>{asset}</asset>
   <default>
-    <joint type="hinge" armature="{armature_kg_m2!r}"/>
+    <joint type="hinge" armature="{ARMATURE_KG_M2!r}"/>
     <geom condim="1" {soft}/>
   </default>
   <worldbody>

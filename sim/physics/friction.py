@@ -8,8 +8,6 @@ the link within the step, so a link comes to rest without chatter at any step.
 
 import math
 
-import numpy as np
-
 from snakewalk.config.arrays import Floats
 
 STOP_SHARE = 1.8
@@ -65,26 +63,4 @@ def ellipse_force(
     return (
         -normal_n * mu_along * mu_along * along_m_s / slow_along,
         -normal_n * mu_across * mu_across * across_m_s / slow_across,
-    )
-
-
-def ellipse_forces(
-    normal_n: Floats,
-    along_m_s: Floats,
-    across_m_s: Floats,
-    mu_along: float,
-    mu_across: float,
-    still_n_s_m: float,
-    link_normal_n: Floats,
-) -> tuple[Floats, Floats]:
-    """``ellipse_force`` of C contacts at once; all arrays (C,)."""
-    gauge = np.hypot(mu_along * along_m_s, mu_across * across_m_s)
-    floor = link_normal_n / still_n_s_m
-    slow_along = np.maximum(gauge, mu_along**2 * floor)
-    slow_across = np.maximum(gauge, mu_across**2 * floor)
-    slow_along[slow_along <= 0.0] = np.inf
-    slow_across[slow_across <= 0.0] = np.inf
-    return (
-        -normal_n * mu_along**2 * along_m_s / slow_along,
-        -normal_n * mu_across**2 * across_m_s / slow_across,
     )

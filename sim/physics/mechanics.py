@@ -1,4 +1,4 @@
-"""What both steppers share: the model, live views of its state, and the constants of friction."""
+"""A robot's MuJoCo model and data, and what friction and water need beside them."""
 
 from dataclasses import dataclass, field
 
@@ -12,6 +12,10 @@ from snakewalk.sim.physics.water import water_constants
 
 LEAST_DEPTH_M = 1e-9
 """Contacts of one link share its load by depth; this is the depth of one that just touches."""
+
+
+class PhysicsError(RuntimeError):
+    """The physics cannot go on: its state diverged, or this MuJoCo is not the one it knows."""
 
 
 @dataclass(slots=True)
@@ -42,14 +46,13 @@ class Mechanics:
         robot: RobotConfig,
         world: WorldConfig,
         gear_drag_n_m_s: float,
-        gravity_m_s2: float = 9.81,
     ) -> "Mechanics":
         """Gather what the steps need."""
         mu = world.friction
         load, before = np.zeros(robot.joint_count + 1), np.zeros((robot.joint_count + 1, 3))
         data = mujoco.MjData(model)
         mass, radius = robot.link_mass_kg, robot.body_radius_m
-        water = water_constants(world, robot, gravity_m_s2)
+        water = water_constants(world, robot)
         grip = mu.along, mu.across, mass, radius, gear_drag_n_m_s
         return cls(model, data, *grip, load, before, water)
 

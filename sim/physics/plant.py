@@ -1,4 +1,4 @@
-"""The plant of ``sim.plant`` in MuJoCo: stepped, placed, and looked at."""
+"""A ``sim.plant.Plant`` in MuJoCo: the body is placed, stepped and measured here."""
 
 import math
 from typing import Protocol
@@ -11,14 +11,13 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.drivers.compiling import COMPILES, compiled
+from snakewalk.drivers.compiling import compiled
 from snakewalk.drivers.types import BodyPose
-from snakewalk.sim.physics.body import ARMATURE_KG_M2, build_model
-from snakewalk.sim.physics.interpreted import InterpretedSteps
-from snakewalk.sim.physics.layout import step_layout
-from snakewalk.sim.physics.mechanics import Mechanics
+from snakewalk.sim.physics.body import build_model
+from snakewalk.sim.physics.mechanics import Mechanics, PhysicsError
 from snakewalk.sim.physics.obstacles import place_at_obstacle
 from snakewalk.sim.physics.placing import float_at, place
+from snakewalk.sim.physics.stepper import CompiledSteps
 from snakewalk.sim.plant import ServoDrive
 
 GEAR_DRAG_N_M_S = 0.03
@@ -46,17 +45,11 @@ class Steps(Protocol):
         ...
 
 
-class PhysicsError(RuntimeError):
-    """The physics has lost its state (it diverged), and nothing after it would mean anything."""
-
-
 class MujocoPlant:
     """A chain on its ground; starts straight at the origin, heading along x, at rest.
 
-    ``compiled`` None takes numba where it is installed; False insists on numpy.
-
     Raises:
-        RuntimeError: ``compiled`` True, and numba is missing or does not know this MuJoCo.
+        PhysicsError: the memory layout of the installed MuJoCo cannot be verified.
 
     """
 
@@ -66,11 +59,6 @@ class MujocoPlant:
         world: WorldConfig,
         ground: HeightField | None = None,
         step_s: float = 0.002,
-        *,
-        compiled: bool | None = None,
-        armature_kg_m2: float = ARMATURE_KG_M2,
-        gear_drag_n_m_s: float = GEAR_DRAG_N_M_S,
-        gravity_m_s2: float = 9.81,
     ) -> None:
         self.robot = robot
         self.world = world
@@ -81,22 +69,16 @@ class MujocoPlant:
             world,
             ground,
             step_s,
-            armature_kg_m2=armature_kg_m2,
-            gravity_m_s2=gravity_m_s2,
         )
-        self.mechanics = Mechanics.of(model, robot, world, gear_drag_n_m_s, gravity_m_s2)
+        self.mechanics = Mechanics.of(model, robot, world, GEAR_DRAG_N_M_S)
         self._data = self.mechanics.data
         self._place: Floats = self._data.qpos[:7]
         self._position_rad: Floats = self._data.qpos[7:]
         self._velocity_rad_s: Floats = self._data.qvel[6:]
         self._count = 0
         self.reset((0.0, 0.0), 0.0, np.zeros(robot.joint_count))
-        self._steps = _steps(self.mechanics, compiled)
-
-    @property
-    def compiled(self) -> bool:
-        """Whether the steps run without Python between them."""
-        return not isinstance(self._steps, InterpretedSteps)
+        self.steps: Steps = CompiledSteps(self.mechanics)
+        """The loop that advances the body."""
 
     @property
     def time_s(self) -> float:
@@ -125,7 +107,7 @@ class MujocoPlant:
             return
         count = self._count + steps
         try:
-            self._steps.run(steps, drive)
+            self.steps.run(steps, drive)
             self._count = count
         except BaseException:
             # A signal may end it anywhere; on the way out the body is stepped on from there.
@@ -229,16 +211,3 @@ class MujocoPlant:
         mujoco.mj_kinematics(m, d)
         mujoco.mj_comPos(m, d)
         mujoco.mj_crb(m, d)
-
-
-def _steps(mechanics: Mechanics, compiled: bool | None) -> Steps:
-    if compiled is False:
-        return InterpretedSteps(mechanics)
-    layout = step_layout() if COMPILES else None
-    if layout is not None:
-        from snakewalk.sim.physics.stepper import CompiledSteps  # noqa: PLC0415  numba is optional and slow
-
-        return CompiledSteps(mechanics, layout)
-    if compiled:
-        raise RuntimeError("compiled steps need numba, and a MuJoCo whose layout it can verify")
-    return InterpretedSteps(mechanics)

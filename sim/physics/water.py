@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WaterGround, WorldConfig
 
@@ -23,7 +24,7 @@ GAUSS = 0.5 / math.sqrt(3.0)
 """Of a link's length, from its middle."""
 
 
-def water_constants(world: WorldConfig, robot: RobotConfig, gravity_m_s2: float = 9.81) -> Floats:
+def water_constants(world: WorldConfig, robot: RobotConfig) -> Floats:
     """Drag across and along of half a link, kg/m; a Gauss point's arm, radius and surface, m; lift.
 
     The lift is that of a link under water, N. All zero where the world is dry.
@@ -39,7 +40,7 @@ def water_constants(world: WorldConfig, robot: RobotConfig, gravity_m_s2: float 
             GAUSS * robot.link_length_m,
             r,
             water.depth_m,
-            water.buoyancy * robot.link_mass_kg * gravity_m_s2,
+            water.buoyancy * robot.link_mass_kg * GRAVITY_M_S2,
         ]
     )
 

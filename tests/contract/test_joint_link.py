@@ -76,7 +76,7 @@ def bench() -> Plant:
 def mujoco() -> Plant:
     from snakewalk.sim.physics.plant import MujocoPlant
 
-    plant = MujocoPlant(TRIO, WorldConfig(name="flat"), compiled=False)
+    plant = MujocoPlant(TRIO, WorldConfig(name="flat"))
     plant.reset((0.0, 0.0), 0.0, START_RAD)
     return plant
 

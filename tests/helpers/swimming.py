@@ -1,5 +1,6 @@
 """A robot on the physics that follows a gait."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,13 +45,13 @@ def follow(
     *,
     hold_s: float = 0.0,
     grow_s: float = 0.0,
-    compiled: bool | None = None,
+    make_plant: Callable[..., MujocoPlant] = MujocoPlant,
 ) -> Followed:
     """Run a gait; joints are held for ``hold_s`` first, or grow from straight in ``grow_s``."""
     robot = load_robot(robot_name)
     cycle = Cycle(gait, robot)
     place = load_world(world) if isinstance(world, str) else world
-    plant = MujocoPlant(robot, place, compiled=compiled)
+    plant = make_plant(robot, place)
     plant.reset((0.0, 0.0), 0.0, cycle.goal_rad() * float(grow_s <= 0.0))
     motor = MOTORS[robot.servo.model]
     drive = make_drive([motor] * robot.joint_count, 12.0)

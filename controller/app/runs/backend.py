@@ -40,8 +40,6 @@ def simulated(
     world: WorldConfig,
     ground: HeightField | None,
     laid: Laid,
-    *,
-    compiled: bool | None = None,
 ) -> Backend:
     """Servos on a simulated line that turn a MuJoCo body with its head at the start.
 
@@ -51,7 +49,6 @@ def simulated(
         world: friction and ground.
         ground: the world's height field, where it has one.
         laid: heading of the head link, and joint angles to begin with.
-        compiled: None takes numba where it is installed.
 
     """
     # The simulation is an extra: a robot's small computer has none.
@@ -60,7 +57,7 @@ def simulated(
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
     from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
-    plant = MujocoPlant(robot, world, ground, run.physics_step_s, compiled=compiled)
+    plant = MujocoPlant(robot, world, ground, run.physics_step_s)
     plant.reset(run.start_m, laid.heading_rad, laid.joint_rad)
     servo = robot.servo
     line = SimLine(

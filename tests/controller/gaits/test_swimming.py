@@ -11,6 +11,7 @@ from snakewalk.controller.gaits.spine import Anguilliform, SpineParameters, offs
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.physics.water import floating_height_m, immersed
 from tests.helpers.swimming import a_still_drive, follow
+from tests.oracles.numpy_steps import numpy_plant
 from tests.oracles.planar_swimmer import swim
 
 YAW16 = load_robot("yaw16")
@@ -148,9 +149,9 @@ def test_a_straight_body_is_braked_by_the_water_as_written() -> None:
         assert plant.friction_loss_j == pytest.approx(lost, rel=0.03)
 
 
-def test_compiled_and_interpreted_water_agree() -> None:
+def test_compiled_and_numpy_water_agree() -> None:
     ends = [
-        follow(Anguilliform(), "yaw16", "pool", 1.0, grow_s=0.5, compiled=flag).centre_m
-        for flag in (None, False)
+        follow(Anguilliform(), "yaw16", "pool", 1.0, grow_s=0.5, make_plant=make).centre_m
+        for make in (MujocoPlant, numpy_plant)
     ]
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)

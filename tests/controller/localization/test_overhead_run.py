@@ -88,7 +88,7 @@ def test_the_rendered_view_agrees_with_the_camera_model() -> None:
     prepared = short()
     camera = CameraConfig(turn_rad=0.6, field_width_m=4.0, height_m=3.0)
     view = TopView(prepared.robot, prepared.world, camera, (1.0, -0.5))
-    plant = MujocoPlant(prepared.robot, prepared.world, compiled=False)
+    plant = MujocoPlant(prepared.robot, prepared.world)
     plant.reset((2.0, 0.3), 0.9, np.zeros(16))
     model = CameraModel.straight_down(camera, (1.0, -0.5))
     change = cv2.absdiff(view.picture(plant.qpos), view.empty_floor()).max(axis=2)

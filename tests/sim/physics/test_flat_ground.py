@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.heightfield import HeightField
 from tests.helpers.physics import ROBOT, a_body, a_drive, serpenoid
 
@@ -40,13 +41,15 @@ def test_on_a_ramp_it_holds_below_the_friction_angle_and_slides_above() -> None:
     held = a_body((mu, mu), ground=slope(0.15))
     x0 = held.link_positions_m[0, 0]
     held.advance(0.5, drive)
-    crept = 9.81 * np.sin(np.arctan(0.15)) * held.step_s / 0.6 * 0.5  # the drag of a straight body
+    crept = (
+        GRAVITY_M_S2 * np.sin(np.arctan(0.15)) * held.step_s / 0.6 * 0.5
+    )  # the drag of a straight body
     np.testing.assert_allclose(x0 - held.link_positions_m[0, 0], crept, rtol=0.03)
     slid = a_body((mu, mu), ground=slope(0.4))
     start = slid.link_positions_m.mean(axis=0)
     slid.advance(0.5, drive)
     angle = np.arctan(0.4)
-    pull = 9.81 * (np.sin(angle) - mu * np.cos(angle))
+    pull = GRAVITY_M_S2 * (np.sin(angle) - mu * np.cos(angle))
     way = np.linalg.norm(slid.link_positions_m.mean(axis=0) - start)
     np.testing.assert_allclose(way, 0.5 * pull * 0.5**2, rtol=0.03)
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from snakewalk.sim.physics.friction import MOST_SHARE, ellipse_force, ellipse_forces, stop_drag
+from snakewalk.sim.physics.friction import MOST_SHARE, ellipse_force, stop_drag
+from tests.oracles.numpy_steps import ellipse_forces
 
 MU = (0.1, 0.7)
 LOAD_N = 1.1

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.sim.physics.plant import GEAR_DRAG_N_M_S
 from tests.helpers.physics import ROBOT, a_body, a_drive, serpenoid
 
@@ -52,7 +53,7 @@ def test_thrown_along_itself_it_stops_after_the_way_that_coulomb_gives(step_s: f
     throw(body, forward_m_s=1.0)
     body.advance(1.0, a_drive(torque_on=False))
     way = body.link_positions_m[0, 0] - x0
-    assert way == pytest.approx(1.0 / (2.0 * mu * 9.81), abs=1.0 * step_s)
+    assert way == pytest.approx(1.0 / (2.0 * mu * GRAVITY_M_S2), abs=1.0 * step_s)
     assert body.energy_j[1] < 1e-6
 
 

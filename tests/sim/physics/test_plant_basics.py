@@ -6,8 +6,8 @@ import pytest
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.world import FrictionConfig
 from snakewalk.sim.physics.plant import MujocoPlant
-from snakewalk.sim.physics.servo_drive import drive_shafts
 from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
+from tests.oracles.numpy_steps import drive_shafts, numpy_plant
 
 ROBOT = load_robot("yaw16")
 FLAT = load_world("flat")
@@ -56,9 +56,8 @@ def test_the_wave_drives_forward_with_grip_across_and_backwards_without() -> Non
     assert back[0] < 0.0
 
 
-def test_compiled_and_interpreted_steps_agree() -> None:
-    pytest.importorskip("numba")
-    one, two = plant(compiled=True), plant(compiled=False)
+def test_compiled_and_numpy_steps_agree() -> None:
+    one, two = plant(), numpy_plant(ROBOT, FLAT, None, 0.002)
     np.testing.assert_allclose(crawl(one, 0.5), crawl(two, 0.5), atol=1e-9)
     np.testing.assert_allclose(one.position_rad, two.position_rad, atol=1e-9)
 
@@ -71,7 +70,7 @@ def test_the_same_run_twice_is_the_same_bit_for_bit() -> None:
 
 
 def test_steps_that_a_signal_ended_can_be_gone_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
-    body, servo, calls = plant(compiled=False), drive(), []
+    body, servo, calls = numpy_plant(ROBOT, FLAT, None, 0.002), drive(), []
 
     def interrupted(*given):
         calls.append(given)
@@ -79,7 +78,7 @@ def test_steps_that_a_signal_ended_can_be_gone_on_with(monkeypatch: pytest.Monke
             raise KeyboardInterrupt
         return drive_shafts(*given)
 
-    monkeypatch.setattr("snakewalk.sim.physics.interpreted.drive_shafts", interrupted)
+    monkeypatch.setattr("tests.oracles.numpy_steps.drive_shafts", interrupted)
     with pytest.raises(KeyboardInterrupt):
         body.advance(0.02, servo)
     assert body.time_s == pytest.approx(0.006)

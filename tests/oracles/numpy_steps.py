@@ -1,24 +1,26 @@
-"""The steps of a plant in numpy: where numba is absent, and to check the compiled ones against.
+"""The steps of ``sim.physics.stepper`` once more in numpy: a check of the compiled ones."""
 
-Friction acts at the contacts of now under the load of the last step, which the contacts of a link
-share by depth. A link slides at the rate at which it *moved* in the last step. Its generalised
-velocity is not that rate: Euler's step moves the head along its velocity and leaves out the turning
-of the links within the step, which reads as 1 mm/s of phantom motion per millisecond of step, and
-as a loss of 6 % of speed under isotropic friction at 2 ms.
-"""
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.sim.physics.friction import ellipse_forces, stop_drag
+from snakewalk.sim.physics.friction import stop_drag
 from snakewalk.sim.physics.mechanics import LEAST_DEPTH_M, Mechanics, velocities
-from snakewalk.sim.physics.servo_drive import drive_shafts
+from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.physics.water import add_water
 from snakewalk.sim.plant import ServoDrive
 
 
-class InterpretedSteps:
+def numpy_plant(*given: Any, **options: Any) -> MujocoPlant:
+    """Make a ``MujocoPlant`` whose steps run in numpy."""
+    plant = MujocoPlant(*given, **options)
+    plant.steps = NumpySteps(plant.mechanics)
+    return plant
+
+
+class NumpySteps:
     """Drive, friction and MuJoCo's step, one Python pass a step."""
 
     def __init__(self, mechanics: Mechanics) -> None:
@@ -77,3 +79,39 @@ def friction_forces(m: Mechanics) -> Floats:
     out[:3] = behind[0, :3]
     out[3:6] = (behind[0, 3:] - np.cross(centre[0], behind[0, :3])) @ d.xmat[1].reshape(3, 3)
     return out
+
+
+def ellipse_forces(
+    normal_n: Floats,
+    along_m_s: Floats,
+    across_m_s: Floats,
+    mu_along: float,
+    mu_across: float,
+    still_n_s_m: float,
+    link_normal_n: Floats,
+) -> tuple[Floats, Floats]:
+    """``ellipse_force`` of C contacts at once; all arrays (C,)."""
+    gauge = np.hypot(mu_along * along_m_s, mu_across * across_m_s)
+    floor = link_normal_n / still_n_s_m
+    slow_along = np.maximum(gauge, mu_along**2 * floor)
+    slow_across = np.maximum(gauge, mu_across**2 * floor)
+    slow_along[slow_along <= 0.0] = np.inf
+    slow_across[slow_across <= 0.0] = np.inf
+    return (
+        -normal_n * mu_along**2 * along_m_s / slow_along,
+        -normal_n * mu_across**2 * across_m_s / slow_across,
+    )
+
+
+def drive_shafts(drive: ServoDrive, position_rad: Floats, velocity_rad_s: Floats) -> Floats:
+    """``shaft_torque`` of J servos at once: fills the drive's outputs, returns torque (J,), N m."""
+    on = drive.torque_on > 0.0
+    pwm = np.clip(
+        drive.p_gain_per_rad * (drive.goal_rad - position_rad), -drive.pwm_limit, drive.pwm_limit
+    )
+    volts = pwm * drive.supply_v - drive.back_emf_v_s * velocity_rad_s
+    limit = drive.current_limit_a
+    drive.pwm[:] = np.where(on, pwm, 0.0)
+    drive.current_a[:] = np.where(on, np.clip(volts / drive.resistance_ohm, -limit, limit), 0.0)
+    drive.torque_n_m[:] = drive.torque_constant_n_m_a * drive.current_a
+    return drive.torque_n_m
