@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 
 from benchmarks.rows import Row, cpu_s
-from snakewalk.controller.capture.body_detector import Eye, open_eye
+from snakewalk.controller.capture.body_detector import BodyDetector, make_detector
 from snakewalk.controller.capture.capture import capture
 from snakewalk.controller.capture.image.equipartition import equipartition
-from snakewalk.controller.capture.image.silhouette import Look
-from tests.oracles.rendered_snake import Scene, empty, film, true_midlines
+from snakewalk.controller.capture.image.silhouette import Polarity
+from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import distance, point_error, swapped
 
 TITLE = "Capture: image to skeleton on one core, and its error on rendered films"
@@ -27,7 +27,7 @@ _SMALL_PX = 100.0  # longer bodies swim in a larger picture
 SIZES_PX = (20.0, 35.0, 50.0, 100.0, 150.0, 400.0)
 _WANTED = 0.01
 _SILENT = 1.5  # times what is wanted: further off, a frame that is called good misleads
-PLAIN = Scene(rows=240, columns=320, frames=30, wave_hz=0.6)
+PLAIN = SnakeScene(rows=240, columns=320, frames=30, wave_hz=0.6)
 CONDITIONS: dict[str, dict[str, Any]] = {
     "plain": {},
     "noise 8": {"noise": 8.0},
@@ -59,16 +59,20 @@ def run() -> list[Row]:
 def _times() -> list[Row]:
     found = []
     for name, scene, wanted in (
-        ("1.6 megapixels", Scene(rows=1080, columns=1480, length_px=700.0, frames=1), WANTED_S),
-        ("640 x 480", Scene(length_px=250.0, frames=1), CAMERA_S),
+        (
+            "1.6 megapixels",
+            SnakeScene(rows=1080, columns=1480, length_px=700.0, frames=1),
+            WANTED_S,
+        ),
+        ("640 x 480", SnakeScene(length_px=250.0, frames=1), CAMERA_S),
     ):
         image, ground = next(film(scene)), empty(scene)
         for kind in ("grey", "colour"):
             seen, behind = image, ground
             if kind == "colour":
                 seen, behind = np.dstack([image] * 3), np.dstack([ground] * 3)
-            eye = Eye(behind, Look.DARK, "given")
-            spent_s = cpu_s(partial(eye.see, seen), 5)
+            detector = BodyDetector(behind, Polarity.DARK, "given")
+            spent_s = cpu_s(partial(detector.detect, seen), 5)
             against = f"{wanted * 1e3:.0f} ms"
             found.append(
                 Row(f"{name}, {kind}", spent_s * 1e3, "ms", against, spent_s / wanted, 1.0)
@@ -91,7 +95,7 @@ def _errors() -> list[Row]:
                 scene = replace(scene, rows=480, columns=640)
             truth = true_midlines(scene)
             images = list(film(scene))
-            seen = capture(images, open_eye(images[::3]), scene.rate_hz)
+            seen = capture(images, make_detector(images[::3]), scene.rate_hz)
             used = np.flatnonzero(seen.used)
             pairs = [(seen.points_px[k], truth[k]) for k in used]
             off = np.array([point_error(*pair) for pair in pairs]) / length_px

@@ -12,9 +12,9 @@ import numpy as np
 from benchmarks.rows import Row, cpu_s
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.kinematics.links import pose_at
-from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadEye
+from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadDetector
 from snakewalk.controller.localization.pose_fit import both_ways
 from tests.oracles.overhead_scene import DrawnView
 
@@ -38,7 +38,7 @@ def _rows() -> list[Row]:
     robot, camera = load_robot("yaw16"), CameraConfig()
     model = CameraModel.straight_down(camera, (0.0, 0.0))
     view = DrawnView(robot, model, (camera.width_px, camera.height_px))
-    eye = OverheadEye(model, view.empty_floor(), robot.body_radius_m, camera.shade)
+    detector = OverheadDetector(model, view.empty_floor(), robot.body_radius_m, camera.shade)
     chance = np.random.default_rng(1)
     scenes = []
     for k in range(FRAMES):
@@ -51,8 +51,8 @@ def _rows() -> list[Row]:
         scenes.append((pose, bend, view.picture(pose, bend, k + 1)))
     off_m, off_rad, used = [], [], 0
     for pose, bend, image in scenes:
-        sighting = eye.see(image, 0.0)
-        if sighting.verdict is not Verdict.GOOD:
+        sighting = detector.detect(image, 0.0)
+        if sighting.status is not FrameStatus.GOOD:
             continue
         used += 1
         # which end leads is known from the frame before; here from the truth
@@ -65,11 +65,11 @@ def _rows() -> list[Row]:
 
     def frame() -> None:
         _, bend, image = next(endless)
-        line_m = eye.see(image, 0.0).line_m
+        line_m = detector.detect(image, 0.0).line_m
         if np.isfinite(line_m).all():
             both_ways(robot, line_m, bend)
 
-    sight_s = cpu_s(partial(eye.see, scenes[0][2], 0.0), 10)
+    sight_s = cpu_s(partial(detector.detect, scenes[0][2], 0.0), 10)
     whole_s = cpu_s(frame, FRAMES)
     metre_px = camera.field_width_m / camera.width_px
     head_m = float(np.sqrt(np.mean(np.square(off_m))))

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot, load_world
-from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadEye
+from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadDetector
 from snakewalk.controller.localization.pose_fit import both_ways
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.rendering.top_view import TopView
@@ -19,12 +19,12 @@ def main(file: Path) -> None:
     robot, world, camera = load_robot("yaw16"), load_world("flat"), CameraConfig()
     view = TopView(robot, world, camera, (0.0, 0.0))
     model = CameraModel.straight_down(camera, (0.0, 0.0))
-    eye = OverheadEye(model, view.empty_floor(), robot.body_radius_m, camera.shade)
+    detector = OverheadDetector(model, view.empty_floor(), robot.body_radius_m, camera.shade)
     plant = MujocoPlant(robot, world)
     plant.reset((0.9, 0.3), 0.4, 0.45 * np.sin(0.5 + 0.55 * np.arange(robot.joint_count)))
     image = view.picture(plant.qpos)
     view.close()
-    shape, line_m = eye.look(image).silhouette, eye.see(image, 0.0).line_m
+    shape, line_m = detector.detect_px(image).silhouette, detector.detect(image, 0.0).line_m
     fits = both_ways(robot, line_m, plant.position_rad)
     fit = min(fits, key=lambda one: one.error_m)
     links = model.in_image(fit.links_m, robot.body_radius_m)

@@ -1,32 +1,28 @@
-"""A whole recording: every frame seen, judged beside the others, and followed."""
+"""A whole recording captured: bodies detected, outliers marked, head and tail kept."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.body_detector import Eye
-from snakewalk.controller.capture.frame_status import Verdict
-from snakewalk.controller.capture.identity import follow, margins, taper_of, travel_of
+from snakewalk.controller.capture.body_detector import BodyDetector
+from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.capture.identity import align_ends, margins, taper_score, travel_score
 from snakewalk.controller.capture.image.medial_axis import Skeleton
-from snakewalk.controller.capture.outlier_frames import beside_the_others
-from snakewalk.controller.capture.small_body.blur_estimate import (
-    axis_error_px,
-    blur_of,
-    softness_px,
-)
-from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Glimpse, glimpse
-from snakewalk.controller.capture.small_body.fit import refine
+from snakewalk.controller.capture.outlier_frames import mark_outliers
+from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
+from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Crop, crop_body
+from snakewalk.controller.capture.small_body.fit import fit_film
 from snakewalk.controller.capture.track import track_from_points
 from snakewalk.controller.capture.wave import measure_wave
 
-_COMPANY = 0.08  # of the body: more than dirt and noise
-_FOLLOWED = 5  # frames for which a small body that was lost may be where it was
+_DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
+_LOST_FRAMES = 5  # for so many frames a lost small body is searched where it was last
 _STILL = 0.02  # of the length: less change than that is no motion
-_TRAVEL = 0.2  # from which the way it travels says which end is the head
+_TRAVEL = 0.2  # travel score from which the travel decides which end is the head
 _TRAVEL_S = 0.25
 
 
@@ -40,130 +36,192 @@ class Capture:
     """(T, 101) half the body's thickness."""
     length_px: Floats
     """(T,)"""
-    verdict: tuple[Verdict, ...]
+    status: tuple[FrameStatus, ...]
     expected_px: Floats
     """(T,) expected mean error of a point; NaN where there is none. Above a hundredth of the length
-    the verdict is ``rough``: the points are there, but not as good as is wanted."""
-    company: Floats
-    """(T,) size of the next largest thing that stands out, of the body's."""
+    the status is ``rough``: the frame has points, but they are less accurate than wanted."""
+    distractors: Floats
+    """(T,) area of the next largest object that stands out, over the body's."""
     margin: Floats
-    """(T,) how surely the head is where it was in the frame before: ``identity.Followed``."""
+    """(T,) how surely the head is where it was in the frame before: ``identity.margins``."""
     rate_hz: float
     head_by: str
     """How the head was told from the tail: ``given``, ``travel``, ``wave`` or ``taper``."""
     head_sure: float
-    """0 to 1, of that."""
+    """How surely, 0 to 1."""
 
     @property
-    def good(self) -> NDArray[np.bool_]:
+    def good(self) -> Bools:
         """(T,) frames whose points are expected within a hundredth of the length."""
-        return np.array([one is Verdict.GOOD for one in self.verdict])
+        return np.array([one is FrameStatus.GOOD for one in self.status])
 
     @property
-    def used(self) -> NDArray[np.bool_]:
+    def used(self) -> Bools:
         """(T,) frames that hold a skeleton, good or rough."""
         return np.asarray(np.isfinite(self.length_px))
 
     @property
-    def accompanied(self) -> NDArray[np.bool_]:
-        """(T,) frames in which something else stands out, no speck: perhaps a small animal."""
-        return self.company > _COMPANY
+    def with_distractors(self) -> Bools:
+        """(T,) frames in which another object, larger than a speck, stands out: a small animal."""
+        return np.asarray(self.distractors > _DISTRACTOR)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Frames of each verdict that occurs."""
-        return {str(v): self.verdict.count(v) for v in Verdict if v in self.verdict}
+        """Frames of each status that occurs."""
+        return {str(v): self.status.count(v) for v in FrameStatus if v in self.status}
 
 
 def capture(
     frames: Iterable[Image],
-    eye: Eye,
+    detector: BodyDetector,
     rate_hz: float,
     *,
     name: str = "recording",
     head_px: tuple[float, float] | None = None,
     fixed: bool = True,
-    seen: Callable[[], None] | None = None,
+    on_progress: Callable[[], None] | None = None,
 ) -> Capture:
-    """See every frame, in order.
+    """Find the animal in every frame, in order.
 
     Args:
         frames: (H, W) or (H, W, 3), 8 bit.
-        eye: from ``open_eye``.
+        detector: from ``make_detector``.
         rate_hz: frames a second.
         name: for faults.
         head_px: a place near the head in the first frame that can be used.
-        fixed: whether the camera stands still; images cropped to the animal tell no travel.
-        seen: called after each frame.
+        fixed: whether the camera stands still; images cropped to the animal show no travel.
+        on_progress: called after each frame.
 
     Raises:
         InputError: fewer than 2 frames can be used, or nothing moves.
 
     """
-    found: list[Skeleton] = []
-    area: list[float] = []
-    company: list[float] = []
-    expected: list[float] = []
-    glimpses: dict[int, Glimpse] = {}
-    last, points = -_FOLLOWED - 1, np.empty((0, 2))
-    for number, frame in enumerate(frames):
-        look = eye.see(frame)
-        body = look.skeleton
-        found.append(body)
-        area.append(look.silhouette.area_px)
-        company.append(look.silhouette.company)
-        expected.append(np.nan)
-        if body.length_px <= LONGEST_PX:
-            last, points = number, body.points_px
-            glimpses[number] = glimpse(frame, look.ground, points)
-        elif body.verdict is Verdict.GOOD:
-            soft = softness_px(look.silhouette.level, look.silhouette.threshold)
-            expected[-1] = axis_error_px(blur_of(soft), body.length_px)
-        elif body.verdict is Verdict.BLOB and number - last <= _FOLLOWED:
-            glimpses[number] = glimpse(frame, look.ground, points)
-        if seen is not None:
-            seen()
-    judged = beside_the_others(follow(found).skeletons, np.array(area))
-    if sum(one.verdict is Verdict.GOOD for one in judged) < 2:
-        raise InputError(f"{name}: {_fault(judged)}")
-    followed = follow(judged)
-    points = np.stack([one.points_px for one in followed.skeletons])
-    radius = np.stack([one.radius_px for one in followed.skeletons])
+    found = _detect_all(frames, detector, on_progress)
+    checked = mark_outliers(align_ends(found.skeletons).skeletons, np.array(found.area_px))
+    if sum(one.status is FrameStatus.GOOD for one in checked) < 2:
+        raise InputError(f"{name}: {_fault(checked)}")
+    aligned = align_ends(checked)
+    points = np.stack([one.points_px for one in aligned.skeletons])
+    radius = np.stack([one.radius_px for one in aligned.skeletons])
     if _change(points) < _STILL:
         raise InputError(
             f"{name}: no motion: the body changes by less than {_STILL:.0%} of its length in "
             f"{len(points)} frames"
         )
     score, by = _head_first(points, radius, rate_hz, head_px, fixed=fixed)
-    skeletons = [one.reversed() if score < 0.0 else one for one in followed.skeletons]
-    refined = refine(skeletons, glimpses, followed.margin, np.array(expected), fixed=fixed)
+    skeletons = [one.reversed() if score < 0.0 else one for one in aligned.skeletons]
+    expected = np.array(found.expected_px)
+    fitted = fit_film(skeletons, found.crops, aligned.margin, expected, fixed=fixed)
     return Capture(
-        points_px=np.stack([one.points_px for one in refined.skeletons]),
-        radius_px=np.stack([one.radius_px for one in refined.skeletons]),
-        length_px=np.array([one.length_px for one in refined.skeletons]),
-        verdict=tuple(one.verdict for one in refined.skeletons),
-        expected_px=refined.expected_px,
-        company=np.array(company),
-        margin=margins(refined.skeletons),
+        points_px=np.stack([one.points_px for one in fitted.skeletons]),
+        radius_px=np.stack([one.radius_px for one in fitted.skeletons]),
+        length_px=np.array([one.length_px for one in fitted.skeletons]),
+        status=tuple(one.status for one in fitted.skeletons),
+        expected_px=fitted.expected_px,
+        distractors=np.array(found.distractors),
+        margin=margins(fitted.skeletons),
         rate_hz=rate_hz,
         head_by=by,
         head_sure=min(1.0, abs(score)),
     )
 
 
-def _fault(judged: list[Skeleton]) -> str:
-    said = [one.verdict for one in judged if one.verdict is not Verdict.GOOD]
-    if not said:
-        return f"{len(judged)} frame: two or more are needed"
-    worst = max(dict.fromkeys(said), key=said.count)
+def save_capture(
+    path: Path,
+    captured: Capture,
+    *,
+    name: str,
+    m_per_px: float | None = None,
+    source: str = "not stated",
+    licence: str = "not stated",
+) -> None:
+    """Write an .npz that ``load_track`` reads, with the data of every frame beside the track.
+
+    ``points`` (T, 101, 2) head first, m (pixels where there is no scale), y upwards; ``rate_hz``,
+    ``length_m`` (NaN: no scale), ``name``, ``source``, ``licence`` are the track. Of every frame,
+    used or not: ``verdict`` (T,) its status in words, ``points_px`` (T, 101, 2) as in the image,
+    ``radius_px`` (T, 101), ``length_px`` (T,), ``head_margin`` (T,), ``expected_px`` (T,), the
+    error of a point, ``company`` (T,), the size of the next largest object. Once: ``m_per_px``
+    (NaN: no scale), ``head_by``, ``head_sure``.
+    """
+    scale = 1.0 if m_per_px is None else m_per_px
+    length_m = np.nan if m_per_px is None else float(np.nanmedian(captured.length_px)) * scale
+    with path.open("wb") as stream:
+        np.savez_compressed(
+            stream,
+            points=captured.points_px * [scale, -scale],
+            rate_hz=captured.rate_hz,
+            length_m=length_m,
+            name=name,
+            source=source,
+            licence=licence,
+            verdict=np.array([str(one) for one in captured.status]),
+            points_px=captured.points_px,
+            radius_px=captured.radius_px,
+            length_px=captured.length_px,
+            head_margin=captured.margin,
+            expected_px=captured.expected_px,
+            company=captured.distractors,
+            m_per_px=np.nan if m_per_px is None else m_per_px,
+            head_by=captured.head_by,
+            head_sure=captured.head_sure,
+        )
+
+
+@dataclass(slots=True)
+class _Detections:
+    """One entry a frame, as the detector found it."""
+
+    skeletons: list[Skeleton] = field(default_factory=list)
+    area_px: list[float] = field(default_factory=list)
+    distractors: list[float] = field(default_factory=list)
+    expected_px: list[float] = field(default_factory=list)
+    """Of long bodies, whose medial axis is kept; NaN for all others."""
+    crops: dict[int, Crop] = field(default_factory=dict)
+    """By frame: small bodies, and where a small body was lost its last place."""
+
+
+def _detect_all(
+    frames: Iterable[Image], detector: BodyDetector, on_progress: Callable[[], None] | None
+) -> _Detections:
+    """Run the detector on every frame, and keep crops of small bodies for the fit."""
+    out = _Detections()
+    last, points = -_LOST_FRAMES - 1, np.empty((0, 2))
+    for number, frame in enumerate(frames):
+        detection = detector.detect(frame)
+        body, silhouette = detection.skeleton, detection.silhouette
+        out.skeletons.append(body)
+        out.area_px.append(silhouette.area_px)
+        out.distractors.append(silhouette.distractors)
+        expected = np.nan
+        if body.length_px <= LONGEST_PX:
+            last, points = number, body.points_px
+            out.crops[number] = crop_body(frame, detection.background, points)
+        elif body.status is FrameStatus.GOOD:
+            blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
+            expected = axis_error_px(blur_px, body.length_px)
+        elif body.status is FrameStatus.BLOB and number - last <= _LOST_FRAMES:
+            out.crops[number] = crop_body(frame, detection.background, points)
+        out.expected_px.append(expected)
+        if on_progress is not None:
+            on_progress()
+    return out
+
+
+def _fault(checked: list[Skeleton]) -> str:
+    """Say why too few frames can be used: the commonest reason, and what would help."""
+    reasons = [one.status for one in checked if one.status is not FrameStatus.GOOD]
+    if not reasons:
+        return f"{len(checked)} frame: two or more are needed"
+    worst = max(dict.fromkeys(reasons), key=reasons.count)
     advice = {
-        Verdict.NOTHING: "no contrast or no motion: nothing stands out from the background; give "
-        "--background, or better light",
-        Verdict.SEVERAL: "several animals: cut the film so that one is in view",
-        Verdict.CUT: "the body is cut by the edge of the image",
-        Verdict.BLOB: "what stands out is not a long body; give --background",
+        FrameStatus.NOTHING: "no contrast or no motion: nothing stands out from the background; "
+        "give --background, or better light",
+        FrameStatus.SEVERAL: "several animals: cut the film so that one is in view",
+        FrameStatus.CUT: "the body is cut by the edge of the image",
+        FrameStatus.BLOB: "what stands out is not a long body; give --background",
     }.get(worst, f"the body is never seen whole: {worst}")
-    return f"{advice} ({said.count(worst)} of {len(judged)} frames)"
+    return f"{advice} ({reasons.count(worst)} of {len(checked)} frames)"
 
 
 def _change(points: Floats) -> float:
@@ -181,18 +239,18 @@ def _head_first(
     *,
     fixed: bool,
 ) -> tuple[float, str]:
-    """Above 0 where the first end is the head, and what said so."""
+    """Score from -1 to 1, above 0 where the first end is the head, and what it rests on."""
     good = np.isfinite(points[:, 0, 0])
     if head_px is not None:
         first = points[np.argmax(good)]
         one, other = (float(np.hypot(*(first[k] - head_px))) for k in (0, -1))
         return (1.0 if one <= other else -1.0), "given"
     if fixed:
-        travel = travel_of(points, max(1, round(_TRAVEL_S * rate_hz)))
+        travel = travel_score(points, max(1, round(_TRAVEL_S * rate_hz)))
         if abs(travel) > _TRAVEL:
             return travel, "travel"
     if int(good.sum()) >= 8:
         wave = measure_wave(track_from_points("", points, rate_hz))
         if abs(wave.headward - 0.5) > 0.05:
             return 1.0 - 2.0 * wave.headward, "wave"
-    return taper_of(radius[good]), "taper"
+    return taper_score(radius[good]), "taper"

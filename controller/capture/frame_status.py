@@ -3,7 +3,7 @@
 from enum import StrEnum
 
 
-class Verdict(StrEnum):
+class FrameStatus(StrEnum):
     """``GOOD`` and ``ROUGH`` frames hold points. Of every other one only the reason is kept."""
 
     GOOD = "good"
@@ -20,4 +20,4 @@ class Verdict(StrEnum):
     @property
     def usable(self) -> bool:
         """Whether the frame holds points."""
-        return self in {Verdict.GOOD, Verdict.ROUGH}
+        return self in {FrameStatus.GOOD, FrameStatus.ROUGH}

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.medial_axis import Skeleton
 
 _SURE = 0.2  # margin from which one frame is enough to tell the ends apart
@@ -19,7 +19,7 @@ _GAP = 3  # frames without a skeleton after which the place alone is no longer t
 
 
 @dataclass(frozen=True, slots=True)
-class Followed:
+class AlignedSkeletons:
     """Skeletons of one animal, the same end first in all."""
 
     skeletons: tuple[Skeleton, ...]
@@ -40,15 +40,15 @@ def margin_of(body: Skeleton, before: Skeleton) -> float:
     return (other - same) / max(other + same, 1e-9)
 
 
-def same_way(body: Skeleton, before: Skeleton) -> Skeleton:
+def aligned_to(body: Skeleton, before: Skeleton) -> Skeleton:
     """The body with the end first that was first ``before``; both must be good."""
     return body.reversed() if margin_of(body, before) < 0.0 else body
 
 
-def follow(skeletons: Sequence[Skeleton]) -> Followed:
+def align_ends(skeletons: Sequence[Skeleton]) -> AlignedSkeletons:
     """Put the same end first in every frame; the end of the first skeleton is kept."""
     out = list(skeletons)
-    good = [k for k, one in enumerate(out) if one.verdict is Verdict.GOOD]
+    good = [k for k, one in enumerate(out) if one.status is FrameStatus.GOOD]
     profile = np.zeros(0)
     for number, k in enumerate(good):
         if number == 0:
@@ -62,11 +62,11 @@ def follow(skeletons: Sequence[Skeleton]) -> Followed:
         if here < 0.0:
             out[k] = out[k].reversed()
         profile = profile + (_lopsided(out[k]) - profile) / min(number + 1, 200)
-    return Followed(tuple(out), margins(out))
+    return AlignedSkeletons(tuple(out), margins(out))
 
 
 def margins(skeletons: Sequence[Skeleton]) -> Floats:
-    """(T,) how much better each fits the one before as it is than reversed: ``Followed``."""
+    """(T,) how much better each fits the one before as it is than reversed: ``align_ends``."""
     margin = np.full(len(skeletons), np.nan)
     before: Skeleton | None = None
     for k, one in enumerate(skeletons):
@@ -93,7 +93,7 @@ def _norms(one: Floats, other: Floats) -> tuple[float, float]:
     return float(np.linalg.norm(one)), float(np.linalg.norm(other))
 
 
-def travel_of(points_px: Floats, step: int) -> float:
+def travel_score(points_px: Floats, step: int) -> float:
     """Whether the first end leads, -1 to 1: travel along the body's direction over all travel.
 
     Args:
@@ -115,7 +115,7 @@ def travel_of(points_px: Floats, step: int) -> float:
     return float(along[use].sum() / whole[use].sum()) if use.any() else 0.0
 
 
-def taper_of(radius_px: Floats) -> float:
+def taper_score(radius_px: Floats) -> float:
     """How much thicker the first fifth (without the tip) is than the last one, of the mean."""
     mean = np.nanmean(radius_px, axis=0)
     count = len(mean)

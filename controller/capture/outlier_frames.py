@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.medial_axis import Skeleton, no_skeleton
 
 _SPREADS = 6.0  # usual deviations, taken from the middle half of the frames
@@ -23,7 +23,7 @@ _TIPS = 6  # points at each end whose thickness is not compared
 _FEWEST = 5  # frames that make a usual body
 
 
-def beside_the_others(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skeleton]:
+def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skeleton]:
     """Drop bodies that are unlike the film's: nothing is guessed of them.
 
     Args:
@@ -32,7 +32,7 @@ def beside_the_others(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Sk
 
     """
     out = list(skeletons)
-    good = [k for k, one in enumerate(out) if one.verdict is Verdict.GOOD]
+    good = [k for k, one in enumerate(out) if one.status is FrameStatus.GOOD]
     if len(good) < _FEWEST:
         return out
     length = _beside(np.array([out[k].length_px for k in good]), _LENGTH)
@@ -45,9 +45,9 @@ def beside_the_others(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Sk
     thick = (ratio / np.maximum(_THICK, _SPREADS * spread)).max(axis=1)
     for n, k in enumerate(good):
         if thick[n] > 1.0 or length[n] < -1.0 or area[n] < -1.0:
-            out[k] = no_skeleton(Verdict.SHORT)
+            out[k] = no_skeleton(FrameStatus.SHORT)
         elif length[n] > 1.0 or area[n] > 1.0:
-            out[k] = no_skeleton(Verdict.LARGER)
+            out[k] = no_skeleton(FrameStatus.LARGER)
     return out
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.localization.dead_reckoning import DeadReckoning
 from snakewalk.controller.localization.overhead_camera import Sighting
 from snakewalk.controller.localization.pose_fit import PoseFit, both_ways
@@ -89,8 +89,8 @@ class CameraPose:
 
     def _take(self, sighting: Sighting) -> None:
         self.frames += 1
-        if sighting.verdict is not Verdict.GOOD:
-            self._why = str(sighting.verdict)
+        if sighting.status is not FrameStatus.GOOD:
+            self._why = str(sighting.status)
             return
         then = self._at(sighting.time_s)
         fit = self._chosen(both_ways(self._robot, sighting.line_m, then.joint_rad), then)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.body_detector import Eye, Seen
-from snakewalk.controller.capture.frame_status import Verdict
-from snakewalk.controller.capture.image.silhouette import Look
+from snakewalk.controller.capture.body_detector import BodyDetector, Detection
+from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.capture.image.silhouette import Polarity
 
 _LEAST_AREA = 0.01  # of the image: four corners that span less fix no plane
 
@@ -87,12 +87,12 @@ class Sighting:
     line_m: Floats
     """(101, 2) axis of the body in the world from tip to tip, which end first is not known; NaN
     where the frame shows no whole body."""
-    verdict: Verdict
+    status: FrameStatus
 
 
 @dataclass(frozen=True, slots=True)
-class OverheadEye:
-    """Camera, empty floor and height of the body's axis; ``see`` takes any frame."""
+class OverheadDetector:
+    """Camera, empty floor and height of the body's axis; ``detect`` takes any frame."""
 
     model: CameraModel
     background: Image
@@ -100,18 +100,18 @@ class OverheadEye:
     shade: float = 0.0
     """Part of the floor's light that the body's shadow may take: so much darker is still floor."""
 
-    def see(self, image: Image, time_s: float) -> Sighting:
+    def detect(self, image: Image, time_s: float) -> Sighting:
         """Find the body in one frame (H, W[, 3]).
 
         Raises:
             InputError: the frame is not as large as the background.
 
         """
-        seen = self.look(image).skeleton
-        line = self.model.on_plane(seen.points_px, self.axis_height_m)
-        return Sighting(time_s, line, seen.verdict)
+        skeleton = self.detect_px(image).skeleton
+        line = self.model.on_plane(skeleton.points_px, self.axis_height_m)
+        return Sighting(time_s, line, skeleton.status)
 
-    def look(self, image: Image) -> Seen:
+    def detect_px(self, image: Image) -> Detection:
         """Silhouette and skeleton of a frame, in pixels.
 
         Raises:
@@ -125,7 +125,7 @@ class OverheadEye:
         dark = cv2.convertScaleAbs(floor, alpha=1.0 - self.shade)
         brighter, darker = cv2.subtract(image, floor), cv2.subtract(dark, image)
         apart: Image = np.asarray(cv2.max(brighter, darker), dtype=np.uint8)
-        return Eye(np.zeros_like(apart), Look.BOTH, "given").see(apart)
+        return BodyDetector(np.zeros_like(apart), Polarity.BOTH, "given").detect(apart)
 
 
 def _projected(matrix: Floats, points: Floats) -> Floats:

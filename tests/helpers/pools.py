@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.controller.capture.fish.matching import Seen
+from snakewalk.controller.capture.fish.matching import SilhouetteFrame
 from snakewalk.controller.capture.fish.model import FishModel, fish_model
 from snakewalk.controller.capture.fish.postures import Postures
-from snakewalk.controller.capture.fish.rendered_fish import Look, Scene
+from snakewalk.controller.capture.fish.rendered_fish import FilmConditions, FishScene
 from snakewalk.controller.capture.fish.silhouettes import seen
-from snakewalk.controller.capture.image.silhouette import Look as Standing
+from snakewalk.controller.capture.image.silhouette import Polarity
 
 Floats = NDArray[np.float64]
 
@@ -18,28 +18,28 @@ def film(
     frames: range,
     length_px: float = 90.0,
     build: str = "carp",
-    look: Look | None = None,
+    conditions: FilmConditions | None = None,
     seed: int = 0,
-) -> tuple[list[Seen], FishModel, Floats]:
+) -> tuple[list[SilhouetteFrame], FishModel, Floats]:
     """Frames from above, the model that was drawn, and the base (n, 2) in pixels."""
     model = fish_model(build, length_px)
     spine = truth.points()[list(frames)] * length_px
     low, high = spine.min(axis=(0, 1)), spine.max(axis=(0, 1))
     columns, rows = (int(np.ceil(side)) for side in high - low + 0.6 * length_px)
     shift = np.array([columns, -rows]) / 2 - 0.5 * (low + high)
-    scene = Scene(rows, columns, seed, look)
+    scene = FishScene(rows, columns, seed, conditions)
     empty = scene.background()
     half = model.half_width * length_px
-    top = [seen(scene.top(body + shift, half), empty, Standing.DARK) for body in spine]
+    top = [seen(scene.top(body + shift, half), empty, Polarity.DARK) for body in spine]
     return top, model, truth.base[list(frames)] * length_px + shift
 
 
 def side_film(
     truth: Postures, frames: range, model: FishModel, base_px: Floats, columns: int
-) -> list[Seen]:
+) -> list[SilhouetteFrame]:
     """The same moments from the side, at the same scale, column by column."""
     rows = round(2.2 * model.length_px)
-    scene = Scene(rows, columns, 7)
+    scene = FishScene(rows, columns, 7)
     empty = scene.background()
     assert truth.height is not None
     assert truth.pitch_rad is not None
@@ -53,5 +53,5 @@ def side_film(
         wide = np.abs(step[:, 1]) / np.hypot(step[:, 0], step[:, 1])
         wide *= model.half_width * model.length_px
         image = scene.side(line[:, [0, 2]], wide, model.half_height * model.length_px)
-        found.append(seen(image, empty, Standing.DARK))
+        found.append(seen(image, empty, Polarity.DARK))
     return found

@@ -18,7 +18,7 @@ _FINE = 8  # parts of a pixel's side in which bodies up to 100 px are drawn
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class SnakeScene:
     """What is filmed, and how; grey values 0 to 255."""
 
     length_px: float = 150.0
@@ -48,7 +48,7 @@ class Scene:
     seed: int = 0
 
 
-def true_midlines(scene: Scene) -> Floats:
+def true_midlines(scene: SnakeScene) -> Floats:
     """(T, 101, 2) x, y in pixels, head first, equal arcs; a pixel's centre is whole."""
     s = (np.arange(400) + 0.5) / 400
     time_s = np.arange(scene.frames) / scene.rate_hz
@@ -67,7 +67,7 @@ def true_midlines(scene: Scene) -> Floats:
     return np.stack([equal_arc_length(one, 100) for one in body])
 
 
-def film(scene: Scene) -> Iterator[Image]:
+def film(scene: SnakeScene) -> Iterator[Image]:
     """The frames (H, W)."""
     rng = np.random.default_rng(scene.seed)
     ground = _ground(scene, rng)
@@ -75,14 +75,14 @@ def film(scene: Scene) -> Iterator[Image]:
         yield _shot(scene, ground, _coverage(scene, midline), rng)
 
 
-def empty(scene: Scene) -> Image:
+def empty(scene: SnakeScene) -> Image:
     """(H, W) the same place without the animal."""
     rng = np.random.default_rng(scene.seed)
     ground = _ground(scene, rng)
     return _shot(scene, ground, np.zeros_like(ground), np.random.default_rng(scene.seed + 1))
 
 
-def half_width(scene: Scene) -> Floats:
+def half_width(scene: SnakeScene) -> Floats:
     """(101,) px along the body: a rounded head, thickest at two fifths, a tail that tapers."""
     s = np.linspace(0.0, 1.0, 101)
     shape = np.sqrt(np.clip(s / 0.08, 0.0, 1.0)) * (
@@ -92,7 +92,7 @@ def half_width(scene: Scene) -> Floats:
     return np.asarray(0.5 * scene.length_px / scene.slender * np.minimum(shape, 0.15 + 0.85 * tail))
 
 
-def _coverage(scene: Scene, midline: Floats) -> NDArray[np.float32]:
+def _coverage(scene: SnakeScene, midline: Floats) -> NDArray[np.float32]:
     """(H, W) part of each pixel that the body covers."""
     fine = _FINE if scene.length_px <= 100.0 else 3
     side = np.gradient(midline, axis=0)
@@ -125,7 +125,7 @@ def _coverage(scene: Scene, midline: Floats) -> NDArray[np.float32]:
     return whole
 
 
-def _ground(scene: Scene, rng: np.random.Generator) -> NDArray[np.float32]:
+def _ground(scene: SnakeScene, rng: np.random.Generator) -> NDArray[np.float32]:
     ground = np.full((scene.rows, scene.columns), scene.ground, dtype=np.float32)
     if scene.texture > 0.0:
         pattern = np.asarray(
@@ -136,7 +136,7 @@ def _ground(scene: Scene, rng: np.random.Generator) -> NDArray[np.float32]:
 
 
 def _shot(
-    scene: Scene,
+    scene: SnakeScene,
     ground: NDArray[np.float32],
     body: NDArray[np.float32],
     rng: np.random.Generator,

@@ -12,9 +12,8 @@ from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite, whole_file
 from snakewalk.controller.app.report.plots.capture import contact_sheet, overlay_film, step_picture
-from snakewalk.controller.capture.body_detector import Eye, open_eye
-from snakewalk.controller.capture.capture import Capture, capture
-from snakewalk.controller.capture.capture_file import save_capture
+from snakewalk.controller.capture.body_detector import BodyDetector, make_detector
+from snakewalk.controller.capture.capture import Capture, capture, save_capture
 from snakewalk.controller.capture.image.video import Footage, open_footage, read_image
 from snakewalk.controller.capture.scale import scale_of_length, scale_of_marker
 
@@ -55,22 +54,22 @@ def capture_file(wanted: Wanted) -> dict[str, object]:
     with console.status("learning the background ..."):
         some = footage.some(_SAMPLE)
         given = None if wanted.background is None else _like(read_image(wanted.background), some[0])
-        eye = open_eye(some, given)
+        detector = make_detector(some, given)
         m_per_px = None
         if wanted.marker is not None:
-            ground = some[0] if eye.background is None else eye.background
+            ground = some[0] if detector.background is None else detector.background
             m_per_px = scale_of_marker(wanted.marker, ground)
     fixed = not wanted.cropped and len({frame.shape for frame in some}) == 1
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("frames", total=footage.count)
         captured = capture(
             footage.read(),
-            eye,
+            detector,
             footage.rate_hz,
             name=str(wanted.recording),
             head_px=head_px,
             fixed=fixed,
-            seen=lambda: progress.advance(task),
+            on_progress=lambda: progress.advance(task),
         )
         if wanted.length_m is not None:
             m_per_px = scale_of_length(wanted.length_m, captured.length_px)
@@ -87,11 +86,11 @@ def capture_file(wanted: Wanted) -> dict[str, object]:
         if wanted.steps is not None:
             number = int(np.argmax(captured.used))
             image = next(islice(footage.read(), number, None))
-            step_picture(wanted.steps, image, eye, captured.points_px[number])
+            step_picture(wanted.steps, image, detector, captured.points_px[number])
         if wanted.overlay is not None:
             task = progress.add_task("overlay film", total=footage.count)
             overlay_film(wanted.overlay, footage.read(), captured, lambda: progress.advance(task))
-    return _facts(wanted, footage, eye, captured, m_per_px)
+    return _facts(wanted, footage, detector, captured, m_per_px)
 
 
 def _check(wanted: Wanted) -> None:
@@ -129,7 +128,11 @@ def _like(background: Image, frame: Image) -> Image:
 
 
 def _facts(
-    wanted: Wanted, footage: Footage, eye: Eye, captured: Capture, m_per_px: float | None
+    wanted: Wanted,
+    footage: Footage,
+    detector: BodyDetector,
+    captured: Capture,
+    m_per_px: float | None,
 ) -> dict[str, object]:
     length_px = float(np.nanmedian(captured.length_px))
     known = captured.expected_px[np.isfinite(captured.expected_px)]
@@ -138,15 +141,15 @@ def _facts(
     return {
         "recording": str(wanted.recording),
         "track": str(wanted.output),
-        "frames": len(captured.verdict),
+        "frames": len(captured.status),
         "frames_used": int(captured.used.sum()),
         "frames_rough": int((captured.used & ~captured.good).sum()),
-        "frames_with_company": int(captured.accompanied.sum()),
+        "frames_with_company": int(captured.with_distractors.sum()),
         "verdicts": captured.counts,
         "rate_hz": footage.rate_hz,
         "rate_assumed": footage.rate_assumed,
-        "background": eye.how,
-        "animal": str(eye.look),
+        "background": detector.background_source,
+        "animal": str(detector.polarity),
         "length_px": round(length_px, 2),
         "expected_error_px": None if np.isnan(error_px) else round(error_px, 3),
         "length_m": None if m_per_px is None else round(length_px * m_per_px, 5),

@@ -10,7 +10,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.fish.model import fish_model
 from snakewalk.controller.capture.fish.postures import Postures, postures_of_track, save_postures
 from snakewalk.controller.capture.fish.raster import Grey
-from snakewalk.controller.capture.fish.rendered_fish import Look, Scene
+from snakewalk.controller.capture.fish.rendered_fish import FishScene
 from snakewalk.controller.capture.fish.swimmer import swim
 from snakewalk.controller.capture.readers.load import load_track
 
@@ -24,7 +24,6 @@ def render(
     frames: int | None = None,
     side: bool = False,
     seed: int = 0,
-    look: Look | None = None,
     tick: Callable[[int, int], None] = lambda done, total: None,
 ) -> Postures:
     """Write ``top/``, ``top-background.png``, with ``side`` the same from the side, ``truth.npz``.
@@ -37,7 +36,6 @@ def render(
         frames: at most so many.
         side: also film from the side; a recording of midlines has no height and swims level.
         seed: of patterns and noise.
-        look: light and camera.
         tick: told of frames done and in all.
 
     Returns:
@@ -50,11 +48,11 @@ def render(
     shift = np.array([columns, -rows]) / 2.0 - 0.5 * (low + high) * length_px
     model = fish_model(build, length_px)
     half = model.half_width * length_px
-    top = Scene(rows, columns, seed, look)
+    top = FishScene(rows, columns, seed)
     (folder / "top").mkdir(parents=True, exist_ok=True)
     _write(folder / "top-background.png", top.background())
     height = round(2.2 * length_px)
-    beside = Scene(height, columns, seed + 1, look)
+    beside = FishScene(height, columns, seed + 1)
     if side:
         (folder / "side").mkdir(exist_ok=True)
         _write(folder / "side-background.png", beside.background())

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from snakewalk.controller.capture.fish.match_film import Matched, match_film
+from snakewalk.controller.capture.fish.match_film import FilmMatch, match_film
 from snakewalk.controller.capture.fish.model import fish_model
 from snakewalk.controller.capture.fish.postures import Postures, postures_of_track
 from snakewalk.controller.capture.fish.silhouettes import open_film
@@ -26,7 +26,7 @@ def match_footage(
     rate_hz: float | None,
     length_m: float | None,
     tick: Callable[[int, int], None],
-) -> tuple[Matched, dict[str, Any]]:
+) -> tuple[FilmMatch, dict[str, Any]]:
     """Match a film and say what was found.
 
     Raises:

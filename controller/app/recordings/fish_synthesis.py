@@ -10,11 +10,16 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.capture.fish.joining import Repertoire, repertoire
+from snakewalk.controller.capture.fish.joining import PieceGraph, piece_graph
 from snakewalk.controller.capture.fish.postures import Postures
-from snakewalk.controller.capture.fish.segments import Cutting, Segment, commonest_posture, cut
+from snakewalk.controller.capture.fish.segments import (
+    MotionSegment,
+    Segmentation,
+    commonest_posture,
+    cut,
+)
 from snakewalk.controller.capture.fish.synthesis import (
-    Sequence,
+    PieceSequence,
     at_random,
     compose,
     junctions,
@@ -47,9 +52,9 @@ class Made:
     """A motion and where it is from."""
 
     source: Postures
-    segments: list[Segment]
-    pieces: Repertoire
-    sequence: Sequence
+    segments: list[MotionSegment]
+    pieces: PieceGraph
+    sequence: PieceSequence
     motion: Postures
     joints_rad: Floats
     """(T, joints) of the robot."""
@@ -80,9 +85,9 @@ def synthesise_motion(source: Postures, wanted: Wanted) -> Made:
             raise InputError("--mirror needs the straight reference: a bent one has no mirror end")
     elif wanted.reference != "straight":
         raise InputError(f"--reference {wanted.reference}: straight or commonest")
-    cutting = Cutting(within_rad=within, merge_rad=float(np.radians(wanted.merge_deg)))
+    cutting = Segmentation(within_rad=within, merge_rad=float(np.radians(wanted.merge_deg)))
     segments = cut(source, cutting, reference)
-    pieces = repertoire(source, segments, mirror=wanted.mirror)
+    pieces = piece_graph(source, segments, mirror=wanted.mirror)
     if wanted.through:
         points = np.array(wanted.through)
         radius = wanted.radius * source.length

@@ -18,7 +18,11 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.app.runs.rendered_camera import centre_of, seen_whole
 from snakewalk.controller.capture.image.video import read_image
-from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadEye, Sighting
+from snakewalk.controller.localization.overhead_camera import (
+    CameraModel,
+    OverheadDetector,
+    Sighting,
+)
 from snakewalk.drivers.clock import Clock
 
 PATIENCE_S = 5.0
@@ -38,7 +42,7 @@ class DeviceCamera:
     def __init__(self, run: RunConfig, robot: RobotConfig, clock: Clock) -> None:
         camera = run.camera
         self._clock = clock
-        self.eye = eye_of(run, robot)
+        self.detector = overhead_detector(run, robot)
         self._name = f"camera {camera.device}"
         self._device = open_device(camera)
         self._found: queue.SimpleQueue[Sighting | InputError] = queue.SimpleQueue()
@@ -97,14 +101,14 @@ class DeviceCamera:
                 self._found.put(InputError(f"{self._name}: hands over no more frames"))
                 return
             try:
-                self._found.put(self.eye.see(in_colour(frame), self._clock.now_s()))
+                self._found.put(self.detector.detect(in_colour(frame), self._clock.now_s()))
             except InputError as fault:
                 self._found.put(InputError(f"{self._name}: {fault}"))
                 return
 
 
-def eye_of(run: RunConfig, robot: RobotConfig) -> OverheadEye:
-    """Build the eye of a real camera from its table in the run.
+def overhead_detector(run: RunConfig, robot: RobotConfig) -> OverheadDetector:
+    """Build the detector of a real camera from its table in the run.
 
     Raises:
         InputError: no background image, of another size, or corners that fix no plane.
@@ -120,7 +124,7 @@ def eye_of(run: RunConfig, robot: RobotConfig) -> OverheadEye:
     centre_m = centre_of(run)
     corners = camera.corners_px is not None
     make = CameraModel.from_corners if corners else CameraModel.straight_down
-    return OverheadEye(make(camera, centre_m), ground, robot.body_radius_m, camera.shade)
+    return OverheadDetector(make(camera, centre_m), ground, robot.body_radius_m, camera.shade)
 
 
 def open_device(camera: CameraConfig) -> cv2.VideoCapture:

@@ -11,8 +11,12 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import FlatGround, WorldConfig
-from snakewalk.controller.capture.frame_status import Verdict
-from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadEye, Sighting
+from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.localization.overhead_camera import (
+    CameraModel,
+    OverheadDetector,
+    Sighting,
+)
 from snakewalk.drivers.clock import Clock
 
 
@@ -72,8 +76,8 @@ def seen_whole(sighting: Sighting, camera: str) -> Sighting:
         InputError: it does not show the whole body.
 
     """
-    if sighting.verdict is not Verdict.GOOD:
-        raise InputError(f"{camera}: the robot is not seen whole at its start: {sighting.verdict}")
+    if sighting.status is not FrameStatus.GOOD:
+        raise InputError(f"{camera}: the robot is not seen whole at its start: {sighting.status}")
     return sighting
 
 
@@ -100,7 +104,7 @@ class RenderedCamera:
         centre_m = centre_of(run)
         self._view = TopView(robot, world, run.camera, centre_m, run.seed)
         model = CameraModel.straight_down(run.camera, centre_m)
-        self.eye = OverheadEye(
+        self.detector = OverheadDetector(
             model, self._view.empty_floor(), robot.body_radius_m, run.camera.shade
         )
         self._qpos, self._clock = qpos, clock
@@ -129,4 +133,4 @@ class RenderedCamera:
         self._view.close()
 
     def _look(self, now_s: float) -> Sighting:
-        return self.eye.see(self._view.picture(self._qpos()), now_s)
+        return self.detector.detect(self._view.picture(self._qpos()), now_s)

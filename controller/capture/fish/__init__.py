@@ -1,9 +1,10 @@
-"""A fish from video, [TH]: a deformable model laid over every frame, its motion cut and rejoined.
+"""A fish from video, [TH]: a deformable model matched to every frame, its motion cut and rejoined.
 
 ``model`` bends and projects the fish, ``raster`` draws it as the camera would see it, ``matching``
-scores a posture by area and edges, ``climb`` searches, ``first_frame`` and ``calibrate`` start,
-``follow`` goes from frame to frame, ``side_view`` adds height and pitch. ``postures`` keeps the
-result. ``segments`` cuts it at basic postures, ``joining`` says what may follow what, ``synthesis``
-strings segments together and ``track_file`` writes what a run can follow. ``scene`` and ``swimmer``
-render films of a fish whose every angle is known; ``accuracy`` compares with what was found.
+scores a posture by area and edges, ``pattern_search`` searches, ``first_frame`` and ``calibrate``
+start, ``tracking`` goes from frame to frame, ``side_view`` adds height and pitch. ``postures``
+keeps the result. ``segments`` cuts it at basic postures, ``joining`` says what may follow what,
+``synthesis`` strings segments together and ``track_file`` writes what a run can follow.
+``rendered_fish`` and ``swimmer`` render films of a fish whose every angle is known; ``accuracy``
+compares postures with known ones.
 """

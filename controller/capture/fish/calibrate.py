@@ -13,16 +13,16 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.fish.first_frame import rough_midline, starts
-from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, Seen, Target
+from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, SilhouetteFrame, Target
 from snakewalk.controller.capture.fish.model import STATIONS, FishModel
-from snakewalk.controller.capture.fish.pattern_search import climb
+from snakewalk.controller.capture.fish.pattern_search import pattern_search
 from snakewalk.controller.capture.fish.top_view import Match, TopView, search, window_of
 
 SHORTEST_PX = 20.0
 
 
 def calibrate(
-    model: FishModel, sample: list[Seen], weight: float = EDGE_WEIGHT, name: str = "film"
+    model: FishModel, sample: list[SilhouetteFrame], weight: float = EDGE_WEIGHT, name: str = "film"
 ) -> FishModel:
     """Fit the build to a few frames of one fish.
 
@@ -53,7 +53,7 @@ def calibrate(
         raise InputError(f"{name}: the body is {length:.0f} px long; at least {SHORTEST_PX:.0f}")
     model = model.sized(length)
     for measured in (True, True):
-        found: list[tuple[Seen, Match]] = []
+        found: list[tuple[SilhouetteFrame, Match]] = []
         for seen, line in seen_by:
             match = search(seen, model, starts(model, line), weight=weight)
             if match is not None and np.isfinite(match.value):
@@ -70,7 +70,7 @@ def calibrate(
     return model
 
 
-def _widths(model: FishModel, good: list[tuple[Seen, Match]]) -> Floats:
+def _widths(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> Floats:
     """(STATIONS,) half widths in body lengths: median over frames of the silhouette's depth."""
     rows = []
     for seen, match in good:
@@ -86,7 +86,9 @@ def _widths(model: FishModel, good: list[tuple[Seen, Match]]) -> Floats:
     return np.asarray(soft[:STATIONS] / model.length_px)
 
 
-def _size(model: FishModel, seen: Seen, match: Match, weight: float) -> tuple[float, float]:
+def _size(
+    model: FishModel, seen: SilhouetteFrame, match: Match, weight: float
+) -> tuple[float, float]:
     """Factors of length and width of the largest V, the fish free to slide along its head."""
     scale = min(1.0, 200.0 / model.length_px)
     window = window_of(seen, model, match.parameters[:2], scale)
@@ -104,5 +106,5 @@ def _size(model: FishModel, seen: Seen, match: Match, weight: float) -> tuple[fl
         return TopView(target, grown, 0.0, weight).value(at)
 
     first = np.array([0.05, 0.1, 0.03 * model.length_px])
-    found, _ = climb(value, np.array([1.0, 1.0, 0.0]), first, halvings=4, evaluations=200)
+    found, _ = pattern_search(value, np.array([1.0, 1.0, 0.0]), first, halvings=4, evaluations=200)
     return float(found[0]), float(found[1])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.fish.postures import Postures
-from snakewalk.controller.capture.fish.segments import Kind, Segment
+from snakewalk.controller.capture.fish.segments import Kind, MotionSegment
 
 CLASSES = 3
 
@@ -38,7 +38,7 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Repertoire:
+class PieceGraph:
     """Pieces and the rule by which they follow each other."""
 
     pieces: tuple[Piece, ...]
@@ -93,7 +93,9 @@ def speed_classes(
     )
 
 
-def repertoire(postures: Postures, segments: list[Segment], *, mirror: bool = False) -> Repertoire:
+def piece_graph(
+    postures: Postures, segments: list[MotionSegment], *, mirror: bool = False
+) -> PieceGraph:
     """Take segments out of their film.
 
     Args:
@@ -111,7 +113,7 @@ def repertoire(postures: Postures, segments: list[Segment], *, mirror: bool = Fa
     pieces = [_piece(postures, segment) for segment in segments]
     if mirror:
         pieces += [_mirrored(piece) for piece in pieces]
-    return Repertoire(tuple(pieces), postures.joints_at, postures.rate_hz, postures.length_m)
+    return PieceGraph(tuple(pieces), postures.joints_at, postures.rate_hz, postures.length_m)
 
 
 def placed(base: Floats, origin: Floats, head_rad: float) -> Floats:
@@ -120,7 +122,7 @@ def placed(base: Floats, origin: Floats, head_rad: float) -> Floats:
     return np.asarray(base @ np.array([[c, s], [-s, c]]) + origin)
 
 
-def _piece(postures: Postures, segment: Segment) -> Piece:
+def _piece(postures: Postures, segment: MotionSegment) -> Piece:
     part = slice(segment.start, segment.stop + 1)
     head = np.unwrap(postures.head_rad[part])
     base = postures.base[part] - postures.base[segment.start]

@@ -8,20 +8,20 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.fish.calibrate import calibrate
-from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, Seen
+from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, SilhouetteFrame
 from snakewalk.controller.capture.fish.model import FishModel
 from snakewalk.controller.capture.fish.postures import Postures
 from snakewalk.controller.capture.fish.side_view import SideCamera, SideView, align
-from snakewalk.controller.capture.fish.tracking import follow
+from snakewalk.controller.capture.fish.tracking import track_film
 
-Film = Callable[[], Iterator[Seen]]
+Film = Callable[[], Iterator[SilhouetteFrame]]
 """Opens a film from its start."""
 SAMPLE = 9
 """Frames from which the model is calibrated."""
 
 
 @dataclass(frozen=True, slots=True)
-class Matched:
+class FilmMatch:
     """What matching a film gave."""
 
     postures: Postures
@@ -47,7 +47,7 @@ def match_film(
     weight: float = EDGE_WEIGHT,
     name: str = "fish",
     tick: Callable[[], None] = lambda: None,
-) -> Matched:
+) -> FilmMatch:
     """Calibrate the model on a few frames and match all of them.
 
     Args:
@@ -81,7 +81,7 @@ def match_film(
     lost: dict[str, int] = {}
     flank = side() if side is not None else None
     nothing, no_side = np.full(3 + model.joints, np.nan), np.full(2, np.nan)
-    for step in follow(top(), model, way=way, weight=weight):
+    for step in track_film(top(), model, way=way, weight=weight):
         rows.append(nothing if step.match is None else step.match.parameters)
         values.append(np.nan if step.match is None else step.match.value)
         if step.match is None:
@@ -112,10 +112,10 @@ def match_film(
         value=np.array(values),
         name=name,
     )
-    return Matched(postures, model, parameters, aside, camera, lost)
+    return FilmMatch(postures, model, parameters, aside, camera, lost)
 
 
-def _way(sample: list[Seen]) -> Floats | None:
+def _way(sample: list[SilhouetteFrame]) -> Floats | None:
     """Where the silhouette's centre goes over the sample, x right and y up."""
     centres = [
         np.array([columns.mean(), -rows.mean()])
@@ -126,13 +126,17 @@ def _way(sample: list[Seen]) -> Floats | None:
 
 
 def _tall(
-    model: FishModel, camera: SideCamera, top: list[Seen], side: list[Seen], weight: float
+    model: FishModel,
+    camera: SideCamera,
+    top: list[SilhouetteFrame],
+    side: list[SilhouetteFrame],
+    weight: float,
 ) -> FishModel:
     """Scale the model's height to the side view ([TH] 3.2.3)."""
     steps = [
         (step.match.parameters, beside)
         for seen, beside in zip(top, side, strict=True)
-        for step in follow([seen], model, weight=weight)
+        for step in track_film([seen], model, weight=weight)
         if step.match is not None
     ]
     factors = np.array([0.55, 0.75, 1.0, 1.33, 1.8])

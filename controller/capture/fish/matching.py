@@ -27,7 +27,7 @@ def agreement(drawn: Grey, seen: Grey) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class SilhouetteFrame:
     """One frame of one camera."""
 
     grey: Grey
@@ -41,7 +41,7 @@ class Seen:
 class Target:
     """One frame at one size, against which postures are scored."""
 
-    def __init__(self, seen: Seen, window: Window, blur_px: int) -> None:
+    def __init__(self, seen: SilhouetteFrame, window: Window, blur_px: int) -> None:
         """Reduce the frame.
 
         Args:

@@ -11,7 +11,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 
 
-def climb(
+def pattern_search(
     value: Callable[[Floats], float],
     start: Floats,
     steps: Floats,

@@ -17,7 +17,7 @@ _FINE = 240  # places along the body at which it is drawn
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class FilmConditions:
     """How a scene is lit and filmed; grey values 0 to 255."""
 
     ground: float = 175.0
@@ -31,27 +31,31 @@ class Look:
     noise: float = 4.0
 
 
-class Scene:
+class FishScene:
     """One fixed camera: a ground and what moves over it."""
 
-    def __init__(self, rows: int, columns: int, seed: int = 0, look: Look | None = None) -> None:
+    def __init__(
+        self, rows: int, columns: int, seed: int = 0, conditions: FilmConditions | None = None
+    ) -> None:
         """Lay the ground.
 
         Args:
             rows: height of the frame, px.
             columns: its width, px.
             seed: of pattern and noise.
-            look: light and camera.
+            conditions: light and camera.
 
         """
-        self.look = look or Look()
+        self.conditions = conditions or FilmConditions()
         self._rng = np.random.default_rng(seed)
         y, x = np.mgrid[0:rows, 0:columns]
-        light = self.look.light * (x / columns + y / rows - 1.0)
+        light = self.conditions.light * (x / columns + y / rows - 1.0)
         pattern = gaussian_filter(self._rng.normal(size=(rows, columns)), 2.0)
-        self._ground = self.look.ground + light + self.look.marks * pattern / pattern.std()
+        self._ground = (
+            self.conditions.ground + light + self.conditions.marks * pattern / pattern.std()
+        )
         self._back = gaussian_filter(self._rng.normal(size=(64, _FINE)), 3.0)
-        self._back *= self.look.marks / self._back.std()
+        self._back *= self.conditions.marks / self._back.std()
 
     def background(self) -> Grey:
         """(H, W) the empty scene, filmed once."""
@@ -67,7 +71,7 @@ class Scene:
         far, near = cKDTree(points).query(here)
         covered = np.clip(width[near] - far + 0.5, 0.0, 1.0).reshape(x.shape)
         across = np.clip(far / np.maximum(width[near], 1e-9) * 31.0, 0, 63).astype(int)
-        grey = self.look.fish + self._back[across, near].reshape(x.shape)
+        grey = self.conditions.fish + self._back[across, near].reshape(x.shape)
         return self._put(image, rows, columns, covered, grey)
 
     def side(self, midline_px: Floats, half_wide_px: Floats, half_high_px: Floats) -> Grey:
@@ -88,22 +92,22 @@ class Scene:
             slope = np.sqrt((x - cx) ** 2 / a**4 + (-y - cz) ** 2 / b**4)
             inside = np.maximum(inside, reach * (1.0 - reach) / np.maximum(slope, 1e-9))
         covered = np.clip(inside + 0.5, 0.0, 1.0)
-        return self._put(image, rows, columns, covered, np.full(x.shape, self.look.fish))
+        return self._put(image, rows, columns, covered, np.full(x.shape, self.conditions.fish))
 
     def _put(
         self, image: Floats, rows: slice, columns: slice, covered: Floats, grey: Floats
     ) -> Grey:
         whole = np.zeros_like(image)
         whole[rows, columns] = covered
-        if self.look.shadow:
+        if self.conditions.shadow:
             soft = shift(gaussian_filter(whole, 6.0), (7.0, 5.0), order=1)
-            image = image - self.look.shadow * soft
+            image = image - self.conditions.shadow * soft
         image[rows, columns] += covered * (grey - image[rows, columns])
         return self._film(image)
 
     def _film(self, image: Floats) -> Grey:
-        seen = gaussian_filter(image, self.look.blur_px) if self.look.blur_px else image
-        seen = seen + self._rng.normal(size=image.shape) * self.look.noise
+        seen = gaussian_filter(image, self.conditions.blur_px) if self.conditions.blur_px else image
+        seen = seen + self._rng.normal(size=image.shape) * self.conditions.noise
         return np.clip(np.rint(seen), 0, 255).astype(np.uint8)
 
 

@@ -21,7 +21,7 @@ WITHIN_RAD = float(np.radians(4.0))
 
 
 @dataclass(frozen=True, slots=True)
-class Cutting:
+class Segmentation:
     """How a motion is cut."""
 
     within_rad: float = WITHIN_RAD
@@ -32,7 +32,7 @@ class Cutting:
 
 
 @dataclass(frozen=True, slots=True)
-class Segment:
+class MotionSegment:
     """Frames ``start`` to ``stop``, both in the basic posture and both part of it."""
 
     kind: Kind
@@ -66,8 +66,8 @@ def commonest_posture(angles_rad: Floats, within_rad: float) -> Floats:
 
 
 def cut(
-    postures: Postures, cutting: Cutting | None = None, reference_rad: Floats | None = None
-) -> list[Segment]:
+    postures: Postures, cutting: Segmentation | None = None, reference_rad: Floats | None = None
+) -> list[MotionSegment]:
     """Cut a motion into glides and merged beats; what comes before and after is left out.
 
     Args:
@@ -79,14 +79,14 @@ def cut(
         InputError: the basic posture is not passed twice.
 
     """
-    how = cutting or Cutting()
+    how = cutting or Segmentation()
     straight = np.zeros(postures.angles_rad.shape[1])
     reference = straight if reference_rad is None else reference_rad
     basic = basic_frames(postures.angles_rad, reference, how.within_rad)
     edge = np.flatnonzero(np.diff(np.concatenate([[False], basic, [False]]).astype(int)))
     runs = list(zip(edge[::2].tolist(), (edge[1::2] - 1).tolist(), strict=True))
     speed = speeds(postures)
-    found: list[Segment] = []
+    found: list[MotionSegment] = []
     left_at: int | None = None
     for first, last in runs:
         long = (last - first) >= max(1, round(how.glide_s * postures.rate_hz))
@@ -107,9 +107,9 @@ def cut(
     return merge(found, how.merge_rad)
 
 
-def merge(segments: list[Segment], merge_rad: float) -> list[Segment]:
+def merge(segments: list[MotionSegment], merge_rad: float) -> list[MotionSegment]:
     """Join beats that follow each other and turn little, one by one *and* together ([TH] 4.1.3)."""
-    out: list[Segment] = []
+    out: list[MotionSegment] = []
     for segment in segments:
         last = out[-1] if out else None
         if (
@@ -150,10 +150,10 @@ def turned(head_rad: Floats) -> float:
 
 
 def _segment(
-    postures: Postures, speed: Floats, start: int, stop: int, how: Cutting, *, beat: bool
-) -> Segment:
+    postures: Postures, speed: Floats, start: int, stop: int, how: Segmentation, *, beat: bool
+) -> MotionSegment:
     turn = turned(postures.head_rad[start : stop + 1])
     kind: Kind = "glide"
     if beat:
         kind = "forward" if abs(turn) < how.merge_rad else ("left" if turn > 0.0 else "right")
-    return Segment(kind, start, stop, turn, float(speed[start]), float(speed[stop]))
+    return MotionSegment(kind, start, stop, turn, float(speed[start]), float(speed[stop]))

@@ -6,9 +6,9 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, Seen, Target
+from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, SilhouetteFrame, Target
 from snakewalk.controller.capture.fish.model import FishModel
-from snakewalk.controller.capture.fish.pattern_search import climb
+from snakewalk.controller.capture.fish.pattern_search import pattern_search
 from snakewalk.controller.capture.fish.raster import Window, side_outline
 from snakewalk.controller.capture.fish.tracking import LOST
 
@@ -25,7 +25,9 @@ class SideCamera:
     """Column of the side view where the top view has column 0."""
 
 
-def align(top: list[Seen], side: list[Seen], name: str = "side film") -> SideCamera:
+def align(
+    top: list[SilhouetteFrame], side: list[SilhouetteFrame], name: str = "side film"
+) -> SideCamera:
     """Fit scale and offset to where the silhouettes begin and end along x in both views.
 
     Raises:
@@ -60,7 +62,7 @@ class SideView:
         self.last: Floats | None = None
         """Height and pitch (2,) from which the next search starts; None looks everywhere."""
 
-    def find(self, seen: Seen, parameters: Floats) -> tuple[Floats, float] | None:
+    def find(self, seen: SilhouetteFrame, parameters: Floats) -> tuple[Floats, float] | None:
         """Height of the base (px of the side view, up) and pitch (rad), and their V.
 
         Args:
@@ -94,7 +96,9 @@ class SideView:
         steps = np.array([0.04 * model.length_px, 0.1])
 
         def best(starts: list[Floats]) -> tuple[Floats, float]:
-            ends = [climb(value, start, steps, halvings=5, evaluations=60) for start in starts]
+            ends = [
+                pattern_search(value, start, steps, halvings=5, evaluations=60) for start in starts
+            ]
             return max(ends, key=lambda end: end[1])
 
         found = best(fresh if self.last is None else [self.last])

@@ -9,10 +9,10 @@ import numpy as np
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.fish.matching import Seen
-from snakewalk.controller.capture.frame_status import Verdict
-from snakewalk.controller.capture.image.background import look_of, median_background
-from snakewalk.controller.capture.image.silhouette import Look, contrast, silhouette_of
+from snakewalk.controller.capture.fish.matching import SilhouetteFrame
+from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.capture.image.background import contrast_polarity, median_background
+from snakewalk.controller.capture.image.silhouette import Polarity, contrast, silhouette_of
 from snakewalk.controller.capture.image.video import Footage, open_footage, read_image
 
 _FOR_BACKGROUND = 31
@@ -26,9 +26,9 @@ class FishFilm:
 
     footage: Footage
     background: Image
-    look: Look
+    polarity: Polarity
 
-    def frames(self) -> Iterator[Seen]:
+    def frames(self) -> Iterator[SilhouetteFrame]:
         """Every frame, from the start each time.
 
         Raises:
@@ -41,7 +41,7 @@ class FishFilm:
                     f"{self.footage.path}: a frame of {image.shape[1]} x {image.shape[0]} pixels "
                     f"over a background of {self.background.shape[1]} x {self.background.shape[0]}"
                 )
-            yield seen(image, self.background, self.look)
+            yield seen(image, self.background, self.polarity)
 
 
 def open_film(path: Path, background: Path | None = None, rate_hz: float | None = None) -> FishFilm:
@@ -66,10 +66,10 @@ def open_film(path: Path, background: Path | None = None, rate_hz: float | None 
             f"{background}: {empty.shape[1]} x {empty.shape[0]} pixels; the film has "
             f"{some[0].shape[1]} x {some[0].shape[0]}"
         )
-    return FishFilm(footage, empty, look_of(some[len(some) // 2], empty))
+    return FishFilm(footage, empty, contrast_polarity(some[len(some) // 2], empty))
 
 
-def seen(image: Image, background: Image, look: Look = Look.BOTH) -> Seen:
+def seen(image: Image, background: Image, polarity: Polarity = Polarity.BOTH) -> SilhouetteFrame:
     """Cut the fish out of one frame; the mask is empty where nothing stands out.
 
     A tail fin seen on edge is thinner than the blur of the picture and has not half the body's
@@ -78,11 +78,11 @@ def seen(image: Image, background: Image, look: Look = Look.BOTH) -> Seen:
     Args:
         image: (H, W) or (H, W, 3), 8 bit.
         background: (H, W) the same without the fish.
-        look: whether the fish is darker or lighter than its ground.
+        polarity: whether the fish is darker or lighter than its ground.
 
     """
     plain = grey(image)
-    found = silhouette_of(plain, background, look)
+    found = silhouette_of(plain, background, polarity)
     mask = np.zeros(plain.shape, dtype=bool)
     if found.area_px > 0.0:
         left, top = (int(at) for at in found.origin_px)
@@ -92,14 +92,16 @@ def seen(image: Image, background: Image, look: Look = Look.BOTH) -> Seen:
             slice(max(0, top - edge), top + rows + edge),
             slice(max(0, left - edge), left + columns + edge),
         )
-        apart = cv2.GaussianBlur(contrast(plain[part], background[part], look), (3, 3), 0.0)
+        apart = cv2.GaussianBlur(contrast(plain[part], background[part], polarity), (3, 3), 0.0)
         low = max(_THIN * found.threshold, float(np.median(apart)) + _SURE)
         _, label = cv2.connectedComponents((apart > low).astype(np.uint8), connectivity=8)
         core = np.zeros(label.shape, dtype=bool)
         core[top - part[0].start :, left - part[1].start :][:rows, :columns] = found.mask
         kept = np.unique(label[core])
         mask[part] = np.isin(label, kept[kept > 0])
-    return Seen(plain, mask, "" if found.verdict is Verdict.GOOD else str(found.verdict))
+    return SilhouetteFrame(
+        plain, mask, "" if found.status is FrameStatus.GOOD else str(found.status)
+    )
 
 
 def grey(image: Image) -> Image:

@@ -6,7 +6,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.fish.joining import Repertoire, placed
+from snakewalk.controller.capture.fish.joining import PieceGraph, placed
 from snakewalk.controller.capture.fish.junction import join
 from snakewalk.controller.capture.fish.postures import Postures
 
@@ -16,7 +16,7 @@ _DEPTH = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Sequence:
+class PieceSequence:
     """Pieces in order."""
 
     order: tuple[int, ...]
@@ -42,7 +42,7 @@ class _Node:
         return self.order[-1]
 
 
-def at_random(pieces: Repertoire, seconds: float, rng: np.random.Generator) -> Sequence:
+def at_random(pieces: PieceGraph, seconds: float, rng: np.random.Generator) -> PieceSequence:
     """Follow permitted pieces, each as likely as the other, for at least ``seconds``."""
     every = range(len(pieces.pieces))
     order = [int(rng.choice(sorted(pieces.lasting) or list(every)))]
@@ -52,17 +52,17 @@ def at_random(pieces: Repertoire, seconds: float, rng: np.random.Generator) -> S
         forced += not by_rule
         order.append(int(rng.choice(choice)))
         lasts += _seconds(pieces, order[-1])
-    return Sequence(tuple(order), forced)
+    return PieceSequence(tuple(order), forced)
 
 
 def through(
-    pieces: Repertoire,
+    pieces: PieceGraph,
     points: Floats,
     *,
     radius: float,
     limit_s: float = 120.0,
     depth: int = _DEPTH,
-) -> Sequence:
+) -> PieceSequence:
     """Swim through control points in order, from the origin along x.
 
     The text takes the piece that ends nearest to the point; with turns of one size that can circle
@@ -94,10 +94,10 @@ def through(
             )
         here = _ahead(pieces, here, points, radius, depth)
     reached = tuple(k / pieces.rate_hz for k in here.reached_at)
-    return Sequence(here.order, here.forced, reached)
+    return PieceSequence(here.order, here.forced, reached)
 
 
-def compose(pieces: Repertoire, sequence: Sequence, blend_s: float = BLEND_S) -> Postures:
+def compose(pieces: PieceGraph, sequence: PieceSequence, blend_s: float = BLEND_S) -> Postures:
     """Lay the pieces end to end; angles, direction and way blended at every junction."""
     parts = [pieces.pieces[k] for k in sequence.order]
     base, head = [], []
@@ -117,17 +117,17 @@ def compose(pieces: Repertoire, sequence: Sequence, blend_s: float = BLEND_S) ->
     )
 
 
-def junctions(pieces: Repertoire, sequence: Sequence) -> list[int]:
+def junctions(pieces: PieceGraph, sequence: PieceSequence) -> list[int]:
     """Frames of the composed motion at which a new piece begins."""
     lengths = [len(pieces.pieces[k].head_rad) - 1 for k in sequence.order]
     return [int(at) for at in np.cumsum(lengths[:-1])]
 
 
-def _seconds(pieces: Repertoire, piece: int) -> float:
+def _seconds(pieces: PieceGraph, piece: int) -> float:
     return (len(pieces.pieces[piece].head_rad) - 1) / pieces.rate_hz
 
 
-def _ahead(pieces: Repertoire, here: _Node, points: Floats, radius: float, depth: int) -> _Node:
+def _ahead(pieces: PieceGraph, here: _Node, points: Floats, radius: float, depth: int) -> _Node:
     """Take the first piece of the best way found."""
     wanted = len(here.reached_at)
     beam, best, first = [here], None, len(here.order)
@@ -152,18 +152,18 @@ def _ahead(pieces: Repertoire, here: _Node, points: Floats, radius: float, depth
     return node
 
 
-def _choice(pieces: Repertoire, node: _Node) -> tuple[list[int], bool]:
+def _choice(pieces: PieceGraph, node: _Node) -> tuple[list[int], bool]:
     if node.order:
         return pieces.next(node.last)
     return sorted(pieces.lasting) or list(range(len(pieces.pieces))), True
 
 
-def _is_by_rule(pieces: Repertoire, node: _Node, piece: int) -> bool:
+def _is_by_rule(pieces: PieceGraph, node: _Node, piece: int) -> bool:
     return not node.order or piece in pieces.permitted(node.last)
 
 
 def _take(
-    pieces: Repertoire, node: _Node, piece: int, by_rule: bool, points: Floats, radius: float
+    pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, points: Floats, radius: float
 ) -> _Node:
     part = pieces.pieces[piece]
     way = placed(part.base, node.base, node.head_rad)

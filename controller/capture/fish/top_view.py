@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, Seen, Target
+from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, SilhouetteFrame, Target
 from snakewalk.controller.capture.fish.model import FishModel
 from snakewalk.controller.capture.fish.raster import Window
 from snakewalk.controller.capture.fish.refine import refine
@@ -29,7 +29,9 @@ class Match:
     """V of Eq. 3."""
 
 
-def window_of(seen: Seen, model: FishModel, near: Floats | None, scale: float) -> Window | None:
+def window_of(
+    seen: SilhouetteFrame, model: FishModel, near: Floats | None, scale: float
+) -> Window | None:
     """The part of a frame where the fish may be: around the mask, or around ``near`` (x, y)."""
     rows, columns = seen.mask.shape
     low_x, high_x, low_y, high_y = 0, columns, 0, rows
@@ -75,7 +77,7 @@ class TopView:
 
 
 def search(
-    seen: Seen,
+    seen: SilhouetteFrame,
     model: FishModel,
     starts: list[Floats],
     *,

@@ -6,14 +6,14 @@ from typing import BinaryIO
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.fish.joining import Repertoire
+from snakewalk.controller.capture.fish.joining import PieceGraph
 from snakewalk.controller.capture.fish.junction import join
 from snakewalk.controller.capture.fish.postures import Postures, tangents
-from snakewalk.controller.capture.fish.synthesis import BLEND_S, Sequence
+from snakewalk.controller.capture.fish.synthesis import BLEND_S, PieceSequence
 from snakewalk.controller.kinematics.retarget import Retarget
 
 
-def joint_pieces(pieces: Repertoire, sequence: Sequence, retarget: Retarget) -> list[Floats]:
+def joint_pieces(pieces: PieceGraph, sequence: PieceSequence, retarget: Retarget) -> list[Floats]:
     """Each piece as joint angles (n, joints of the robot), not yet joined."""
     return [
         retarget.joints_rad(tangents(part.head_rad, part.angles_rad, pieces.joints_at))
@@ -22,7 +22,7 @@ def joint_pieces(pieces: Repertoire, sequence: Sequence, retarget: Retarget) -> 
 
 
 def joint_motion(
-    pieces: Repertoire, sequence: Sequence, retarget: Retarget, blend_s: float = BLEND_S
+    pieces: PieceGraph, sequence: PieceSequence, retarget: Retarget, blend_s: float = BLEND_S
 ) -> Floats:
     """(T, joints) the whole motion, joined with a blend at the joint layer."""
     samples = max(1, round(blend_s * pieces.rate_hz))
@@ -30,7 +30,11 @@ def joint_motion(
 
 
 def save_motion(
-    path: Path | BinaryIO, postures: Postures, joints_rad: Floats, robot: str, sequence: Sequence
+    path: Path | BinaryIO,
+    postures: Postures,
+    joints_rad: Floats,
+    robot: str,
+    sequence: PieceSequence,
 ) -> None:
     """Write a motion; ``controller.capture.readers.load.load_track`` reads it as any recording."""
     np.savez_compressed(

@@ -7,7 +7,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.fish.first_frame import rough_midline, starts
-from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, Seen
+from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, SilhouetteFrame
 from snakewalk.controller.capture.fish.model import FishModel
 from snakewalk.controller.capture.fish.top_view import Match, search
 
@@ -26,8 +26,8 @@ class Step:
     """Why, for a frame without a match."""
 
 
-def follow(
-    frames: Iterable[Seen],
+def track_film(
+    frames: Iterable[SilhouetteFrame],
     model: FishModel,
     *,
     way: Floats | None = None,
@@ -87,7 +87,7 @@ def follow(
 
 
 def _anew(
-    seen: Seen,
+    seen: SilhouetteFrame,
     model: FishModel,
     ways: list[Floats],
     way: Floats | None,

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Image
-from snakewalk.controller.capture.image.silhouette import Look
+from snakewalk.controller.capture.image.silhouette import Polarity
 
 _GRID_PX = 64  # longest side of the picture to which the surface is fitted
 _ROUNDS = 4
@@ -19,17 +19,17 @@ def median_background(frames: Sequence[Image]) -> Image:
     return _part_of(np.stack(frames), 0.5)
 
 
-def spread_backgrounds(frames: Sequence[Image]) -> Iterator[tuple[Image, Look | None, str]]:
+def background_candidates(frames: Sequence[Image]) -> Iterator[tuple[Image, Polarity | None, str]]:
     """The median over frames, and for slow animals the light and the dark end of what was seen.
 
     Yields:
-        background (H, W[, 3]), the look that it supposes (None: any), and its name.
+        background (H, W[, 3]), the polarity that it supposes (None: any), and its name.
 
     """
     stack = np.stack(frames)
     yield _part_of(stack, 0.5), None, "the median of frames"
-    yield _part_of(stack, _LATE), Look.DARK, "the lighter frames at each place"
-    yield _part_of(stack, 1.0 - _LATE), Look.LIGHT, "the darker frames at each place"
+    yield _part_of(stack, _LATE), Polarity.DARK, "the lighter frames at each place"
+    yield _part_of(stack, 1.0 - _LATE), Polarity.LIGHT, "the darker frames at each place"
 
 
 def _part_of(stack: Image, part: float) -> Image:
@@ -64,8 +64,8 @@ def smooth_background(image: Image) -> Image:
     return np.asarray(np.rint(whole), dtype=np.uint8)
 
 
-def look_of(image: Image, background: Image) -> Look:
-    """Whether what stands out most is darker or lighter than the ground, or both."""
+def contrast_polarity(image: Image, background: Image) -> Polarity:
+    """Whether the pixels that stand out most are darker or lighter than the ground, or both."""
     apart = image.astype(np.int16) - background
     if apart.ndim == 3:
         strongest = np.argmax(np.abs(apart), axis=2)[..., None]
@@ -75,5 +75,5 @@ def look_of(image: Image, background: Image) -> Look:
     edge = 0.5 * float(np.percentile(np.abs(smooth), 100.0 - 100.0 * part))
     dark, light = np.count_nonzero(smooth < -edge), np.count_nonzero(smooth > edge)
     if max(dark, light) < 4 * min(dark, light):
-        return Look.BOTH
-    return Look.DARK if dark > light else Look.LIGHT
+        return Polarity.BOTH
+    return Polarity.DARK if dark > light else Polarity.LIGHT

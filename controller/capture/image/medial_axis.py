@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skimage.morphology import skeletonize
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
 from snakewalk.controller.capture.image.ridge import WORKING_WIDTH, sample, to_the_tips
 from snakewalk.controller.capture.image.thinning import filled, largest, longest_way
@@ -40,31 +40,31 @@ class Skeleton:
     """(101,) distance to the boundary."""
     length_px: float
     """Sum of the chords; NaN where there is no skeleton."""
-    verdict: Verdict
+    status: FrameStatus
 
     def reversed(self) -> "Skeleton":
         """The same body from its other end."""
         return Skeleton(
-            self.points_px[::-1].copy(), self.radius_px[::-1].copy(), self.length_px, self.verdict
+            self.points_px[::-1].copy(), self.radius_px[::-1].copy(), self.length_px, self.status
         )
 
 
-def no_skeleton(verdict: Verdict) -> Skeleton:
-    """What is returned of a frame that cannot be used."""
+def no_skeleton(status: FrameStatus) -> Skeleton:
+    """Stand-in for the skeleton of a frame that cannot be used: all NaN."""
     nan = np.full((SEGMENTS + 1, 3), np.nan)
-    return Skeleton(nan[:, :2].copy(), nan[:, 2].copy(), float("nan"), verdict)
+    return Skeleton(nan[:, :2].copy(), nan[:, 2].copy(), float("nan"), status)
 
 
 def skeleton_of(mask: NDArray[np.bool_]) -> Skeleton:
     """Skeleton of a body given as a mask (H, W) of one component, holes of the image filled or not.
 
-    Never raises on a mask: an empty, round, looped or branching one has a verdict other than
+    Never raises on a mask: an empty, round, looped or branching one has a status other than
     ``GOOD``, and NaN for points. The order of the ends is arbitrary.
     """
     shape = np.ascontiguousarray(mask, dtype=np.uint8)
     rows, columns = np.flatnonzero(shape.any(axis=1)), np.flatnonzero(shape.any(axis=0))
     if not rows.size:
-        return no_skeleton(Verdict.NOTHING)
+        return no_skeleton(FrameStatus.NOTHING)
     top, left = int(rows[0]), int(columns[0])
     body = shape[top : rows[-1] + 1, left : columns[-1] + 1]
     level = cv2.copyMakeBorder(body, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=0)
@@ -96,41 +96,41 @@ def skeleton_of_level(
     """
     width = _width(level > threshold)
     if width is None:
-        return no_skeleton(Verdict.BLOB)
+        return no_skeleton(FrameStatus.BLOB)
     step = min(WORKING_WIDTH / width, _LARGEST_PX / max(level.shape))
     fine = _rescaled(level, step)
     solid = largest(fine > threshold)
     if solid is None:
-        return no_skeleton(Verdict.NOTHING)
+        return no_skeleton(FrameStatus.NOTHING)
     solid, looped = filled(solid, _HOLE * WORKING_WIDTH**2)
     if looped:
-        return no_skeleton(Verdict.LOOP)
+        return no_skeleton(FrameStatus.LOOP)
     depth = np.asarray(cv2.distanceTransform(solid, cv2.DIST_L2, 5), dtype=np.float32)
     thin = skeletonize(solid > 0)  # type: ignore[no-untyped-call]
     way = longest_way(np.asarray(thin, dtype=bool))
     if way is None:
-        return no_skeleton(Verdict.BLOB)
+        return no_skeleton(FrameStatus.BLOB)
     curve, branch = way
     if branch > _BRANCH * len(curve) + float(depth.max()):
-        return no_skeleton(Verdict.BRANCH)
+        return no_skeleton(FrameStatus.BRANCH)
     inside = float(np.percentile(fine[solid > 0], 75))
     tip = inside * float(np.clip(_THIN_TIP + 0.075 * (width - 2.0), _THIN_TIP, 0.5))
     line = to_the_tips(curve, fine, threshold, depth, min(threshold, max(tip, least)))
     if line is None:
-        return no_skeleton(Verdict.BLOB)
+        return no_skeleton(FrameStatus.BLOB)
     if width < THIN_PX and grey:
         found = fitted((line - _MARGIN + 0.5) / step - 0.5, level, width)
         if found is None and width < _UNSURE_PX:
-            return no_skeleton(Verdict.BLOB)
+            return no_skeleton(FrameStatus.BLOB)
         if found is not None:
             line = (found[0] + 0.5) * step - 0.5 + _MARGIN
     try:
         even = equipartition(line, SEGMENTS)
     except (NoEquipartitionError, ValueError):
-        return no_skeleton(Verdict.BLOB)
+        return no_skeleton(FrameStatus.BLOB)
     radius = sample(depth, even.points) / step
     points = (even.points - _MARGIN + 0.5) / step - 0.5 + np.asarray(origin_px)
-    return Skeleton(points, radius, even.chord * SEGMENTS / step, Verdict.GOOD)
+    return Skeleton(points, radius, even.chord * SEGMENTS / step, FrameStatus.GOOD)
 
 
 def _width(mask: NDArray[np.bool_]) -> float | None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Image
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 
 _MARGIN = 4
 _CLEAR = 6.0  # standard deviations of the noise that an animal's pixel must stand out
@@ -17,8 +17,8 @@ _RIVAL = 0.4  # of the largest body's size: a second animal, not dirt
 _SHRUNK_PX = 400  # longest side of the picture on which the noise is measured
 
 
-class Look(StrEnum):
-    """How the animal stands out from its ground."""
+class Polarity(StrEnum):
+    """Whether the animal is darker or lighter than its ground."""
 
     DARK = "dark"
     LIGHT = "light"
@@ -33,14 +33,14 @@ class Silhouette:
     """(h, w) contrast against the background, grey values; other things in the cut-out are 0."""
     threshold: float
     """Contrast at the boundary: half of the body's own."""
-    least: float
+    noise_level: float
     """Contrast that noise alone may reach."""
     origin_px: tuple[float, float]
     """x, y of the cut-out's first pixel in the image."""
     area_px: float
-    company: float
-    """Size of the next largest thing that stands out, of this body's; noise and dirt count."""
-    verdict: Verdict
+    distractors: float
+    """Area of the next largest object that stands out, over this body's; noise and dirt count."""
+    status: FrameStatus
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -48,11 +48,11 @@ class Silhouette:
         return np.asarray(self.level > self.threshold)
 
 
-def contrast(image: Image, background: Image, look: Look) -> Image:
+def contrast(image: Image, background: Image, polarity: Polarity) -> Image:
     """(H, W) how much each pixel stands out; of a colour image its strongest channel."""
-    if look is Look.BOTH:
+    if polarity is Polarity.BOTH:
         apart = cv2.absdiff(image, background)
-    elif look is Look.DARK:
+    elif polarity is Polarity.DARK:
         apart = cv2.subtract(background, image)
     else:
         apart = cv2.subtract(image, background)
@@ -71,17 +71,19 @@ def noise_of(apart: Image) -> tuple[float, float]:
     return middle, float(1.4826 * np.median(above)) + 0.5
 
 
-def silhouette_of(image: Image, background: Image, look: Look = Look.BOTH) -> Silhouette:
+def silhouette_of(
+    image: Image, background: Image, polarity: Polarity = Polarity.BOTH
+) -> Silhouette:
     """Find the animal of one frame.
 
     Args:
         image: (H, W) or (H, W, 3), 8 bit.
         background: the same without the animal.
-        look: whether the animal is darker or lighter than its ground.
+        polarity: whether the animal is darker or lighter than its ground.
 
     """
     apart: Image = np.asarray(
-        cv2.GaussianBlur(contrast(image, background, look), (3, 3), 0.0), dtype=np.uint8
+        cv2.GaussianBlur(contrast(image, background, polarity), (3, 3), 0.0), dtype=np.uint8
     )
     middle, spread = noise_of(apart)
     sure = middle + _CLEAR * spread
@@ -100,7 +102,7 @@ def silhouette_of(image: Image, background: Image, look: Look = Look.BOTH) -> Si
 def nothing() -> Silhouette:
     """No animal."""
     empty = np.zeros((1, 1), dtype=np.float32)
-    return Silhouette(empty, 0.5, 0.0, (0.0, 0.0), 0.0, 0.0, Verdict.NOTHING)
+    return Silhouette(empty, 0.5, 0.0, (0.0, 0.0), 0.0, 0.0, FrameStatus.NOTHING)
 
 
 def _parts(mask: Image) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
@@ -129,12 +131,12 @@ def _cut_out(apart: Image, threshold: float, sure: float) -> Silhouette:
     best = 1 + int(np.argmax(areas))
     left, top, wide, high, area = (int(v) for v in stats[best])
     rows, columns = apart.shape
-    verdict = Verdict.GOOD
-    company = float(np.sort(areas)[-2:-1].sum()) / area
-    if company > _RIVAL:
-        verdict = Verdict.SEVERAL
+    status = FrameStatus.GOOD
+    distractors = float(np.sort(areas)[-2:-1].sum()) / area
+    if distractors > _RIVAL:
+        status = FrameStatus.SEVERAL
     elif left == 0 or top == 0 or left + wide == columns or top + high == rows:
-        verdict = Verdict.CUT
+        status = FrameStatus.CUT
     window = (
         slice(max(0, top - _MARGIN), min(rows, top + high + _MARGIN)),
         slice(max(0, left - _MARGIN), min(columns, left + wide + _MARGIN)),
@@ -144,4 +146,4 @@ def _cut_out(apart: Image, threshold: float, sure: float) -> Silhouette:
     if other.any():
         level[cv2.dilate(other.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = 0.0
     origin = (float(window[1].start), float(window[0].start))
-    return Silhouette(level, threshold, sure, origin, float(area), company, verdict)
+    return Silhouette(level, threshold, sure, origin, float(area), distractors, status)

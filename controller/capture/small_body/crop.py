@@ -18,7 +18,7 @@ _WORKING_PX = 48.0  # length of the body while it is fitted, at most
 
 
 @dataclass(frozen=True, slots=True)
-class Glimpse:
+class Crop:
     """A cut-out of a frame and of its ground."""
 
     image: Image
@@ -27,14 +27,14 @@ class Glimpse:
     """x, y of its first pixel."""
 
 
-def glimpse(image: Image, ground: Image, points_px: Floats) -> Glimpse:
+def crop_body(image: Image, ground: Image, points_px: Floats) -> Crop:
     """Cut the body of (P, 2) points out."""
     length = float(np.hypot(*np.diff(points_px, axis=0).T).sum())
     reach = max(_AROUND * length, _LEAST_AROUND_PX)
     left, top = np.maximum(np.floor(points_px.min(axis=0) - reach), 0.0).astype(int)
     right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int) + 1
     window = (slice(int(top), int(bottom)), slice(int(left), int(right)))
-    return Glimpse(image[window].copy(), ground[window].copy(), (int(left), int(top)))
+    return Crop(image[window].copy(), ground[window].copy(), (int(left), int(top)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,14 +47,14 @@ class Workspace:
     """(C,) how channels are weighted: as the body stands out; 1 for grey images."""
 
     @classmethod
-    def of(cls, glimpses: Sequence[Glimpse], length_px: float) -> "Workspace":
+    def of(cls, crops: Sequence[Crop], length_px: float) -> "Workspace":
         """Choose it from some frames."""
         scale = min(1.0, _WORKING_PX / length_px)
-        if glimpses[0].image.ndim == 2:
+        if crops[0].image.ndim == 2:
             # above 0 where the body is: which sign that is, the strongest pixels say
-            strong = np.concatenate([_strongest(one) for one in glimpses])
+            strong = np.concatenate([_strongest(one) for one in crops])
             return cls(scale, np.array([np.sign(np.median(strong)) or 1.0]))
-        apart = np.median(np.concatenate([_strongest(one) for one in glimpses]), axis=0)
+        apart = np.median(np.concatenate([_strongest(one) for one in crops]), axis=0)
         return cls(scale, apart / max(float(np.linalg.norm(apart)), 1e-9))
 
     def to_px(self, points: Floats) -> Floats:
@@ -70,7 +70,7 @@ class Workspace:
         own = 0.0 if self.scale == 1.0 else _OWN_BLUR
         return float(np.sqrt(max(spot**2 - own**2, 0.09))) / self.scale
 
-    def contrast(self, seen: Glimpse) -> tuple[Floats, tuple[int, int]]:
+    def contrast(self, seen: Crop) -> tuple[Floats, tuple[int, int]]:
         """Picture (h, w) on the working grid, above 0 where the body is, and its first pixel."""
         apart = seen.ground.astype(np.float32) - seen.image.astype(np.float32)
         apart = apart.reshape(*apart.shape[:2], -1) @ self.channels.astype(np.float32)
@@ -88,7 +88,7 @@ class Workspace:
         return np.asarray(small, dtype=float), (int(first[0]), int(first[1]))
 
 
-def _strongest(seen: Glimpse) -> Floats:
+def _strongest(seen: Crop) -> Floats:
     """(K[, C]) contrast of the twelfth part of the pixels that stands out most."""
     apart = seen.ground.astype(float) - seen.image.astype(float)
     much = np.abs(apart) if apart.ndim == 2 else np.linalg.norm(apart, axis=2)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.small_body.crop import Glimpse, Workspace
+from snakewalk.controller.capture.small_body.crop import Crop, Workspace
 from snakewalk.controller.capture.small_body.ribbon import BENDS, bend_basis
 
 _REACH = 6.0  # working pixels beside the body that are fitted
@@ -26,7 +26,7 @@ class View:
     """(FRAME,) a first guess; places relative to the first pixel."""
 
     @classmethod
-    def of(cls, seen: Glimpse, points_px: Floats, radius_px: float, space: Workspace) -> "View":
+    def of(cls, seen: Crop, points_px: Floats, radius_px: float, space: Workspace) -> "View":
         """View a frame whose body lies about along ``points_px`` (P, 2)."""
         picture, first = space.contrast(seen)
         line = space.from_px(points_px) - first

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
 from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px
-from snakewalk.controller.capture.small_body.crop import Glimpse, Workspace
+from snakewalk.controller.capture.small_body.crop import Crop, Workspace
 from snakewalk.controller.capture.small_body.film_body import (
     FilmBody,
     Fit,
@@ -41,7 +41,7 @@ _PASSES = 2
 _FORM = 0.004  # of the length: what the model of the tips may be wrong by
 _SHARP = 62.0  # times the blur: a longer body's medial axis is as good
 _LONG, _WIDE = 50.0, 2.4  # times the blur: so is that of a wide body, by length and half width
-_BY_BLUR = 0.6  # of the blur of all of the body, what its softness says: ``softness``
+_BY_BLUR = 0.6  # of the blur of all of the body, what its edges show: ``edge_blur_px``
 _LOST = 2.0  # times the usual rest: the picture shows something else
 _FOUND = 1.5  # the same for a frame that had no skeleton
 _ALIKE = 0.3  # of the usual contrast
@@ -50,7 +50,7 @@ _TRIED = 5  # frames of a stretch between doubts
 
 
 @dataclass(frozen=True, slots=True)
-class Refined:
+class FittedFilm:
     """A film's skeletons after the fit."""
 
     skeletons: tuple[Skeleton, ...]
@@ -60,31 +60,31 @@ class Refined:
     """None where nothing was fitted: the bodies are long against their blur, or too few."""
 
 
-def refine(
+def fit_film(
     skeletons: Sequence[Skeleton],
-    glimpses: Mapping[int, Glimpse],
+    crops: Mapping[int, Crop],
     margin: Floats,
     expected_px: Floats,
     *,
     fixed: bool,
-) -> Refined:
-    """Fit all frames that have a glimpse.
+) -> FittedFilm:
+    """Fit all frames that have a crop.
 
     Args:
         skeletons: (T) the same end first in all.
-        glimpses: by frame.
-        margin: (T,) how surely the ends were told apart: ``identity.Followed``.
+        crops: by frame.
+        margin: (T,) how surely the ends were told apart: ``identity.AlignedSkeletons``.
         expected_px: (T,) error of frames that are not fitted, NaN where it is not known.
         fixed: whether the ground stands still, so that frames tell it to one another.
 
     """
-    good = [k for k in glimpses if skeletons[k].verdict is Verdict.GOOD]
+    good = [k for k in crops if skeletons[k].status is FrameStatus.GOOD]
     if len(good) < 2:
         return _unfitted(skeletons, expected_px)
     length = float(np.median([skeletons[k].length_px for k in good]))
     radius = float(np.median([np.median(skeletons[k].radius_px) for k in good]))
-    space = Workspace.of([glimpses[k] for k in good[:: max(1, len(good) // 20)]], length)
-    views = {k: View.of(glimpses[k], skeletons[k].points_px, radius, space) for k in good}
+    space = Workspace.of([crops[k] for k in good[:: max(1, len(good) // 20)]], length)
+    views = {k: View.of(crops[k], skeletons[k].points_px, radius, space) for k in good}
     sample = _spread(good, views)
     start = _first_body([views[k] for k in sample], length * space.scale)
     starts = {k: views[k].start for k in good}
@@ -105,7 +105,7 @@ def refine(
         fits = {k: fit_frame(patches[k], starts[k], body) for k in starts}
         if turn == 0:
             _tell_the_ends(fits, patches, body, margin)
-            _find_the_lost(fits, views, glimpses, body, radius, space)
+            _find_the_lost(fits, views, crops, body, radius, space)
             ground = FilmGround.of(views, fits, body) if fixed else None
             for k, fit in fits.items():
                 beside = 0.0 if ground is None else ground.beside(views[k], fit, body)
@@ -116,28 +116,28 @@ def refine(
     usual = float(np.median([fit.noise for fit in fits.values()]))
     for k, fit in fits.items():
         if fit.noise > _LOST * usual:
-            out[k] = replace(out[k], verdict=Verdict.ROUGH) if k in good else out[k]
+            out[k] = replace(out[k], status=FrameStatus.ROUGH) if k in good else out[k]
             continue
         expected[k] = expected_error(fit, body) / space.scale
         line = space.to_px(curve_of(fit.frame, float(body.values[0])) + views[k].first)
         out[k] = _skeleton(line, body, space, expected[k])
     rest = [one if k in fits else _told(one, expected[k], length) for k, one in enumerate(out)]
-    return Refined(tuple(rest), expected, body)
+    return FittedFilm(tuple(rest), expected, body)
 
 
-def _unfitted(skeletons: Sequence[Skeleton], expected_px: Floats) -> Refined:
+def _unfitted(skeletons: Sequence[Skeleton], expected_px: Floats) -> FittedFilm:
     """Skeletons as they are, rough where their error says so."""
-    good = [one.verdict is Verdict.GOOD for one in skeletons]
+    good = [one.status is FrameStatus.GOOD for one in skeletons]
     length = np.array([one.length_px for one in skeletons])
     usual = float(np.median(length[good])) if any(good) else 1.0
     out = [_told(one, error, usual) for one, error in zip(skeletons, expected_px, strict=True)]
-    return Refined(tuple(out), expected_px, None)
+    return FittedFilm(tuple(out), expected_px, None)
 
 
 def _told(body: Skeleton, error_px: float, length_px: float) -> Skeleton:
     """The body, rough where its error says so."""
-    if body.verdict is Verdict.GOOD and error_px > ROUGH * length_px:
-        return replace(body, verdict=Verdict.ROUGH)
+    if body.status is FrameStatus.GOOD and error_px > ROUGH * length_px:
+        return replace(body, status=FrameStatus.ROUGH)
     return body
 
 
@@ -179,21 +179,21 @@ def _tell_the_ends(
 def _find_the_lost(
     fits: dict[int, Fit],
     views: dict[int, View],
-    glimpses: Mapping[int, Glimpse],
+    crops: Mapping[int, Crop],
     body: FilmBody,
     radius: float,
     space: Workspace,
 ) -> None:
     """Fit frames without a skeleton from their neighbour's place; kept where they look alike."""
     usual = float(np.median([fit.noise for fit in fits.values()]))
-    lost = sorted(set(glimpses) - set(fits))
+    lost = sorted(set(crops) - set(fits))
     for step, order in ((-1, lost), (1, lost[::-1])):
         for k in order:
             if k in fits or k + step not in fits:
                 continue
             near = fits[k + step].frame
             line = curve_of(near, float(body.values[0]), SEGMENTS) + views[k + step].first
-            view = View.of(glimpses[k], space.to_px(line), radius, space)
+            view = View.of(crops[k], space.to_px(line), radius, space)
             first = near.copy()
             first[:2] += np.subtract(views[k + step].first, view.first)
             fit = fit_frame(Patch(view.picture, view.use), first, body, rounds=16)
@@ -225,4 +225,4 @@ def _skeleton(line: Floats, body: FilmBody, space: Workspace, expected_px: float
     at = np.linspace(0.0, 1.0, SEGMENTS + 1)
     radius = np.interp(at, STATIONS, np.exp(body.values[2:BODY])) / space.scale
     rough = even is None or expected_px > ROUGH * length
-    return Skeleton(points, radius, length, Verdict.ROUGH if rough else Verdict.GOOD)
+    return Skeleton(points, radius, length, FrameStatus.ROUGH if rough else FrameStatus.GOOD)

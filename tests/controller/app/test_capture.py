@@ -16,9 +16,9 @@ from snakewalk.controller.app.recordings.capturing import Wanted, capture_file
 from snakewalk.controller.capture.image.video import open_footage
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.capture.scale import scale_of_marker
-from tests.oracles.rendered_snake import Scene, empty, film, true_midlines
+from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 
-SCENE = Scene(rows=160, columns=200, length_px=70.0, frames=24, wave_hz=1.0)
+SCENE = SnakeScene(rows=160, columns=200, length_px=70.0, frames=24, wave_hz=1.0)
 
 
 def snakewalk(*words: str) -> subprocess.CompletedProcess[str]:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.medial_axis import skeleton_of
 
 Floats = NDArray[np.float64]
@@ -28,7 +28,7 @@ def test_the_axis_of_a_bar_is_its_middle(width_px: int) -> None:
     mask = np.zeros((100, 400), dtype=bool)
     mask[40 : 40 + width_px, 30:370] = True
     found = skeleton_of(mask)
-    assert found.verdict is Verdict.GOOD
+    assert found.status is FrameStatus.GOOD
     assert np.abs(found.points_px[:, 1] - (39.5 + width_px / 2)).max() < 0.6
     ends = np.sort(found.points_px[[0, -1], 0])
     assert np.allclose(ends, [29.5, 369.5], atol=1.0 + 0.05 * width_px)
@@ -38,7 +38,7 @@ def test_the_axis_of_a_bar_is_its_middle(width_px: int) -> None:
 
 def test_the_axis_of_an_arc_is_an_arc_of_equal_chords() -> None:
     found = skeleton_of(tube(arc(100.0, 0.3, 3.2), 13))
-    assert found.verdict is Verdict.GOOD
+    assert found.status is FrameStatus.GOOD
     away = np.hypot(*(found.points_px - [200.0, 150.0]).T)
     assert np.median(np.abs(away - 100.0)) < 0.3
     assert np.abs(away - 100.0).max() < 2.0  # at the round ends
@@ -49,7 +49,7 @@ def test_a_spur_on_the_side_is_pruned() -> None:
     body = tube(np.array([[40.0, 150.0], [360.0, 150.0]]), 15)
     body |= tube(np.array([[200.0, 150.0], [200.0, 164.0]]), 5)
     found = skeleton_of(body)
-    assert found.verdict is Verdict.GOOD
+    assert found.status is FrameStatus.GOOD
     assert np.abs(found.points_px[:, 1] - 150.0).max() < 3.0
 
 
@@ -59,33 +59,33 @@ def test_turning_the_image_turns_the_skeleton(turn: int) -> None:
     body = np.column_stack([110.0 * s, 30.0 * np.sin(4.0 * s)])
     c, si = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     found = skeleton_of(tube(body @ [[c, si], [-si, c]] + [200.0, 150.0], 11))
-    assert found.verdict is Verdict.GOOD
+    assert found.status is FrameStatus.GOOD
     back = (found.points_px - [200.0, 150.0]) @ [[c, -si], [si, c]]
     error = np.abs(back[:, 1] - 30.0 * np.sin(4.0 * np.clip(back[:, 0] / 110.0, -1.1, 1.1)))
     assert np.median(error) < 0.5
 
 
 def test_a_ring_is_a_loop() -> None:
-    assert skeleton_of(tube(arc(70.0, 0.0, 6.4), 14)).verdict is Verdict.LOOP
+    assert skeleton_of(tube(arc(70.0, 0.0, 6.4), 14)).status is FrameStatus.LOOP
 
 
 def test_a_body_that_crosses_itself_is_a_loop() -> None:
     t = np.linspace(-2.2, 2.2, 300)
     curve = np.column_stack([200.0 + 30.0 * (t**3 - 3.0 * t), 60.0 + 40.0 * t * t])
-    assert skeleton_of(tube(curve, 9)).verdict is Verdict.LOOP
+    assert skeleton_of(tube(curve, 9)).status is FrameStatus.LOOP
 
 
 def test_a_head_laid_against_the_side_branches() -> None:
     body = tube(np.array([[40.0, 150.0], [360.0, 150.0]]), 13)
     body |= tube(np.array([[200.0, 150.0], [230.0, 240.0]]), 13)
-    assert skeleton_of(body).verdict is Verdict.BRANCH
+    assert skeleton_of(body).status is FrameStatus.BRANCH
 
 
 def test_what_is_no_body_has_a_verdict_and_no_points() -> None:
     nothing = skeleton_of(np.zeros((50, 50), dtype=bool))
-    assert nothing.verdict is Verdict.NOTHING
+    assert nothing.status is FrameStatus.NOTHING
     disc = np.hypot(*np.mgrid[-50:50, -50:50]) < 30
     blob = skeleton_of(disc)
-    assert blob.verdict is Verdict.BLOB
+    assert blob.status is FrameStatus.BLOB
     assert np.isnan(blob.points_px).all()
     assert blob.points_px.shape == (101, 2)

@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snakewalk.controller.capture.body_detector import Eye
+from snakewalk.controller.capture.body_detector import BodyDetector
 from snakewalk.controller.capture.capture import Capture, capture
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.identity import margins
 from snakewalk.controller.capture.image.medial_axis import no_skeleton
-from snakewalk.controller.capture.image.silhouette import Look
-from snakewalk.controller.capture.small_body.crop import glimpse
+from snakewalk.controller.capture.image.silhouette import Polarity
+from snakewalk.controller.capture.small_body.crop import crop_body
 from snakewalk.controller.capture.small_body.film_view import bends_of, turned_round
-from snakewalk.controller.capture.small_body.fit import refine
+from snakewalk.controller.capture.small_body.fit import fit_film
 from snakewalk.controller.capture.small_body.ribbon import (
     BENDS,
     FRAME,
@@ -26,16 +26,16 @@ from snakewalk.controller.capture.small_body.ribbon import (
     gram,
 )
 from snakewalk.controller.capture.small_body.thin_body_fit import fitted
-from tests.oracles.rendered_snake import Scene, film, true_midlines
+from tests.oracles.rendered_snake import SnakeScene, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
 
-SMALL = Scene(rows=120, columns=140, length_px=36.0, frames=10, wave_hz=0.6, rate_hz=12.0)
-EYE = Eye(None, Look.DARK, "a smooth surface through each frame")
+SMALL = SnakeScene(rows=120, columns=140, length_px=36.0, frames=10, wave_hz=0.6, rate_hz=12.0)
+DETECTOR = BodyDetector(None, Polarity.DARK, "a smooth surface through each frame")
 
 
-def watch(scene: Scene) -> tuple[Capture, np.ndarray]:
+def watch(scene: SnakeScene) -> tuple[Capture, np.ndarray]:
     """A film seen, and the error of every point's mean, of the length, of the used frames."""
-    seen = capture(film(scene), EYE, scene.rate_hz)
+    seen = capture(film(scene), DETECTOR, scene.rate_hz)
     truth = true_midlines(scene)
     used = np.flatnonzero(seen.used)
     assert not any(swapped(seen.points_px[k], truth[k]) for k in used)
@@ -67,7 +67,7 @@ def test_corresponding_points_are_within_a_hundredth(change: dict[str, Any]) -> 
 def test_a_body_too_blurred_and_noisy_for_its_size_is_told_rough_and_keeps_its_points() -> None:
     scene = replace(SMALL, length_px=20.0, noise=8.0, blur_px=1.5)
     seen, errors = watch(scene)
-    rough = np.array([one is Verdict.ROUGH for one in seen.verdict])
+    rough = np.array([one is FrameStatus.ROUGH for one in seen.status])
     assert rough.mean() > 0.5
     assert not seen.good.any()
     assert np.isfinite(seen.points_px[rough]).all()
@@ -170,29 +170,29 @@ def test_a_stretch_from_the_wrong_end_is_turned_and_a_lost_frame_found() -> None
     truth = true_midlines(SMALL)
     bodies, cut_outs = [], {}
     for k, image in enumerate(film(SMALL)):
-        look = EYE.see(image)
-        body = look.skeleton
+        detection = DETECTOR.detect(image)
+        body = detection.skeleton
         wrong = k >= 8  # after a doubt
         bodies.append(body.reversed() if swapped(body.points_px, truth[k]) != wrong else body)
-        cut_outs[k] = glimpse(image, look.ground, body.points_px)
-    bodies[4] = no_skeleton(Verdict.BLOB)
+        cut_outs[k] = crop_body(image, detection.background, body.points_px)
+    bodies[4] = no_skeleton(FrameStatus.BLOB)
     expected = np.full(len(bodies), np.nan)
-    refined = refine(bodies, cut_outs, margins(bodies), expected, fixed=True)
+    refined = fit_film(bodies, cut_outs, margins(bodies), expected, fixed=True)
     assert refined.body is not None
-    assert [one.verdict for one in refined.skeletons] == [Verdict.GOOD] * len(bodies)
+    assert [one.status for one in refined.skeletons] == [FrameStatus.GOOD] * len(bodies)
     for body, true in zip(refined.skeletons, truth, strict=True):
         assert point_error(body.points_px, true) < 0.015 * SMALL.length_px
 
 
 def test_sharp_long_bodies_are_left_as_they_are() -> None:
     scene = replace(SMALL, rows=160, columns=180, length_px=110.0, blur_px=0.5, frames=8)
-    looks = [(image, EYE.see(image)) for image in film(scene)]
-    bodies = [look.skeleton for _, look in looks]
+    detections = [(image, DETECTOR.detect(image)) for image in film(scene)]
+    bodies = [detection.skeleton for _, detection in detections]
     cut_outs = {
-        k: glimpse(image, look.ground, look.skeleton.points_px)
-        for k, (image, look) in enumerate(looks)
+        k: crop_body(image, detection.background, detection.skeleton.points_px)
+        for k, (image, detection) in enumerate(detections)
     }
-    refined = refine(bodies, cut_outs, margins(bodies), np.full(8, np.nan), fixed=True)
+    refined = fit_film(bodies, cut_outs, margins(bodies), np.full(8, np.nan), fixed=True)
     assert refined.body is None
     assert all(a.points_px is b.points_px for a, b in zip(refined.skeletons, bodies, strict=True))
     assert (refined.expected_px < 1.1).all()

@@ -14,7 +14,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.app.runs.device_camera import DeviceCamera
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.prepare import Prepared, prepare
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.kinematics.links import pose_at
 from snakewalk.controller.localization.overhead_camera import CameraModel
 from snakewalk.controller.runlog.reader import read_log
@@ -185,7 +185,7 @@ def test_a_device_hands_over_what_it_sees_and_says_when_it_is_gone(bench: Prepar
     camera = DeviceCamera(bench.run, bench.robot, WallClock())
     try:
         found = camera.start
-        assert found.verdict is Verdict.GOOD
+        assert found.status is FrameStatus.GOOD
         assert np.hypot(*(found.line_m[[0, -1]] - (0.53, 0.11)).T).min() < 0.03
         said = [_gone(camera) for _ in range(6)]
         assert any("hands over no more frames" in text for text in said)

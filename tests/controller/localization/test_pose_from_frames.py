@@ -8,11 +8,15 @@ import pytest
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.localization.camera_pose import CameraPose
 from snakewalk.controller.localization.dead_reckoning import DeadReckoning
-from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadEye, Sighting
+from snakewalk.controller.localization.overhead_camera import (
+    CameraModel,
+    OverheadDetector,
+    Sighting,
+)
 from snakewalk.controller.localization.pose_fit import both_ways
 from snakewalk.drivers.types import BodyPose, JointState
 from tests.oracles.overhead_scene import DrawnView
@@ -21,7 +25,7 @@ ROBOT = load_robot("yaw16")
 CAMERA = CameraConfig()
 MODEL = CameraModel.straight_down(CAMERA, (0.0, 0.0))
 VIEW = DrawnView(ROBOT, MODEL, (CAMERA.width_px, CAMERA.height_px))
-EYE = OverheadEye(MODEL, VIEW.empty_floor(), ROBOT.body_radius_m, CAMERA.shade)
+DETECTOR = OverheadDetector(MODEL, VIEW.empty_floor(), ROBOT.body_radius_m, CAMERA.shade)
 NUMBER = np.arange(ROBOT.joint_count)
 
 
@@ -46,8 +50,8 @@ def state_at(time_s: float, joints: np.ndarray) -> JointState:
 def test_head_and_heading_are_found_to_a_third_of_a_pixel(heading: float, bend: np.ndarray) -> None:
     head = 0.5 * np.array([np.cos(heading), np.sin(heading)])
     pose = pose_at(head, heading)
-    seen = EYE.see(VIEW.picture(pose, bend), 0.0)
-    assert seen.verdict is Verdict.GOOD
+    seen = DETECTOR.detect(VIEW.picture(pose, bend), 0.0)
+    assert seen.status is FrameStatus.GOOD
     fits = both_ways(ROBOT, seen.line_m, bend)
     near = min(fits, key=lambda fit: np.hypot(*(fit.head_m - head)))
     assert np.hypot(*(near.head_m - head)) < 0.0031  # 9.4 mm a pixel
@@ -59,7 +63,7 @@ def test_head_and_heading_are_found_to_a_third_of_a_pixel(heading: float, bend: 
 def test_the_joints_tell_the_head_from_the_tail_where_the_shape_has_two_ends() -> None:
     coiled_in_front = np.where(NUMBER < 8, 0.25, 0.0)
     pose = pose_at(np.array([0.4, 0.2]), 0.5)
-    line = EYE.see(VIEW.picture(pose, coiled_in_front), 0.0).line_m
+    line = DETECTOR.detect(VIEW.picture(pose, coiled_in_front), 0.0).line_m
     for seen in (line, line[::-1]):
         better = min(both_ways(ROBOT, seen, coiled_in_front), key=lambda fit: fit.error_m)
         np.testing.assert_allclose(better.head_m, (0.4, 0.2), atol=0.005)
@@ -109,7 +113,7 @@ def sighting(time_s: float, pose: BodyPose, bend: np.ndarray) -> Sighting:
     corners = np.vstack([links[0] + half[0], links, links[-1] - half[-1]])
     at = np.concatenate([[0.0], np.arange(17) + 0.5, [17.0]])
     line = np.column_stack([np.interp(np.linspace(0, 17, 171), at, axis) for axis in corners.T])
-    return Sighting(time_s, line[::-1].copy(), Verdict.GOOD)
+    return Sighting(time_s, line[::-1].copy(), FrameStatus.GOOD)
 
 
 def believer(scene: Scene, said: list[str], start=(0.0, 0.0), heading=0.0) -> CameraPose:
@@ -154,7 +158,7 @@ def test_frames_that_cannot_be_used_are_bridged_and_told() -> None:
     truth = pose_at(np.array([0.3, 0.3]), 0.4)
     nothing = np.full((101, 2), np.nan)
     frames = [sighting(0.0, truth, bend)]
-    frames += [Sighting(k / 30.0, nothing, Verdict.CUT) for k in range(1, 20)]
+    frames += [Sighting(k / 30.0, nothing, FrameStatus.CUT) for k in range(1, 20)]
     frames += [sighting(k / 30.0, truth, bend) for k in range(20, 30)]
     said: list[str] = []
     pose = believer(Scene(frames, start=frames[0]), said, heading=0.4)
@@ -183,6 +187,6 @@ def test_something_else_than_the_robot_is_not_believed() -> None:
 
 def test_a_body_over_the_edge_is_said_to_be_cut() -> None:
     pose = pose_at(np.array([3.4, 0.0]), 0.0)
-    seen = EYE.see(VIEW.picture(pose, wave(0.2, 0.0)), 0.0)
-    assert seen.verdict is Verdict.CUT
+    seen = DETECTOR.detect(VIEW.picture(pose, wave(0.2, 0.0)), 0.0)
+    assert seen.status is FrameStatus.CUT
     assert np.isnan(seen.line_m).all()

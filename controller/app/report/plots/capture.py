@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.atomic_write import whole_file
-from snakewalk.controller.capture.body_detector import Eye
+from snakewalk.controller.capture.body_detector import BodyDetector
 from snakewalk.controller.capture.capture import Capture
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 
 _BODY, _HEAD, _TEXT, _BAD = (60, 200, 255), (80, 255, 80), (255, 255, 255), (80, 80, 255)
 _BACK = 32
@@ -22,15 +22,17 @@ _FILM_PX = 480
 """Smaller frames are enlarged to this, so that the line does not hide the animal."""
 
 
-def drawn(image: Image, points_px: Floats, verdict: Verdict, wide_px: int, high_px: int) -> Image:
-    """(high, wide, 3) the frame enlarged or shrunk to fit, the skeleton, its head, its verdict."""
+def drawn(
+    image: Image, points_px: Floats, status: FrameStatus, wide_px: int, high_px: int
+) -> Image:
+    """(high, wide, 3) the frame enlarged or shrunk to fit, the skeleton, its head, its status."""
     canvas = np.full((high_px, wide_px, 3), _BACK, dtype=np.uint8)
     factor = min(wide_px / image.shape[1], (high_px - 18) / image.shape[0])
     size = (max(1, round(image.shape[1] * factor)), max(1, round(image.shape[0] * factor)))
     how = cv2.INTER_AREA if factor < 1.0 else cv2.INTER_NEAREST
     colour = image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     canvas[: size[1], : size[0]] = cv2.resize(colour, size, interpolation=how)
-    if verdict.usable:
+    if status.usable:
         line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
         thick = 2 if max(size) > 2 * _TILE_PX else 1
         cv2.polylines(canvas, [line], False, _BODY, thick, cv2.LINE_AA, 4)
@@ -52,10 +54,10 @@ def contact_sheet(
     tiles = []
     for number, image in enumerate(frames):
         if number in chosen:
-            verdict = captured.verdict[number]
-            tile = _tile(image, captured.points_px[number], verdict)
-            said = "" if verdict is Verdict.GOOD else f": {verdict.split(':')[-1].strip()}"
-            _words(tile, f"{number}{said}"[:34], verdict is Verdict.GOOD)
+            status = captured.status[number]
+            tile = _tile(image, captured.points_px[number], status)
+            reason = "" if status is FrameStatus.GOOD else f": {status.split(':')[-1].strip()}"
+            _words(tile, f"{number}{reason}"[:34], status is FrameStatus.GOOD)
             tiles.append(tile)
     empty = np.full((_TILE_PX, _TILE_PX, 3), _BACK, dtype=np.uint8)
     wide = min(columns, len(tiles))
@@ -66,14 +68,14 @@ def contact_sheet(
             raise InputError(f"{path}: a contact sheet is a .png or .jpg")
 
 
-def _tile(image: Image, points_px: Floats, verdict: Verdict) -> Image:
+def _tile(image: Image, points_px: Floats, status: FrameStatus) -> Image:
     """The animal and a little around it; all of a frame in which it was not found."""
-    if verdict.usable:
+    if status.usable:
         reach = 0.12 * float(np.hypot(*np.diff(points_px, axis=0).T).sum()) + 6.0
         left, top = np.maximum(points_px.min(axis=0) - reach, 0.0).astype(int)
         right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int)
         image, points_px = image[top:bottom, left:right], points_px - [left, top]
-    return drawn(image, points_px, verdict, _TILE_PX, _TILE_PX)
+    return drawn(image, points_px, status, _TILE_PX, _TILE_PX)
 
 
 def _written(path: Path, image: Image) -> bool:
@@ -83,21 +85,21 @@ def _written(path: Path, image: Image) -> bool:
         return False
 
 
-def step_picture(path: Path, image: Image, eye: Eye, points_px: Floats) -> None:
+def step_picture(path: Path, image: Image, detector: BodyDetector, points_px: Floats) -> None:
     """One frame through all steps: image, silhouette, medial axis, equal chords, head.
 
     Raises:
         InputError: not a picture's ending.
 
     """
-    body = eye.see(image).silhouette
+    body = detector.detect(image).silhouette
     mask = np.zeros(image.shape[:2], dtype=np.uint8)
     x, y = (int(v) for v in body.origin_px)
     high, wide = body.mask.shape
     mask[y : y + high, x : x + wide] = body.mask * np.uint8(200)
     nothing = np.empty((0, 2))
-    bare = drawn(image, nothing, Verdict.NOTHING, _STEP_PX, _STEP_PX)
-    shape = drawn(mask, nothing, Verdict.NOTHING, _STEP_PX, _STEP_PX)
+    bare = drawn(image, nothing, FrameStatus.NOTHING, _STEP_PX, _STEP_PX)
+    shape = drawn(mask, nothing, FrameStatus.NOTHING, _STEP_PX, _STEP_PX)
     factor = min(_STEP_PX / image.shape[1], (_STEP_PX - 18) / image.shape[0])
     line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
     axis, chords = shape.copy(), shape.copy()
@@ -105,7 +107,7 @@ def step_picture(path: Path, image: Image, eye: Eye, points_px: Floats) -> None:
     for number, (u, v) in enumerate(line.tolist()):
         size = 4 if number % 10 == 0 else 2
         cv2.circle(chords, (u, v), size * 16, _BAD, -1, cv2.LINE_AA, 4)
-    whole = drawn(image, points_px, Verdict.GOOD, _STEP_PX, _STEP_PX)
+    whole = drawn(image, points_px, FrameStatus.GOOD, _STEP_PX, _STEP_PX)
     named = {
         "image": bare,
         "silhouette": shape,
@@ -137,9 +139,9 @@ def overlay_film(
     path: Path,
     frames: Iterable[Image],
     captured: Capture,
-    seen: Callable[[], None] | None = None,
+    on_progress: Callable[[], None] | None = None,
 ) -> None:
-    """The recording with the skeleton on it, every frame with its number and verdict.
+    """The recording with the skeleton on it, every frame with its number and status.
 
     Raises:
         InputError: no film of this ending can be written here.
@@ -160,11 +162,11 @@ def overlay_film(
                 film = cv2.VideoWriter(str(part), code, captured.rate_hz, (wide, high))
                 if not film.isOpened():
                     raise InputError(f"{path}: this OpenCV cannot write such a film; try .avi")
-            verdict = captured.verdict[number]
-            canvas = drawn(image, captured.points_px[number], verdict, wide, high)
-            _words(canvas, f"{number}: {verdict}", verdict is Verdict.GOOD)
+            status = captured.status[number]
+            canvas = drawn(image, captured.points_px[number], status, wide, high)
+            _words(canvas, f"{number}: {status}", status is FrameStatus.GOOD)
             film.write(canvas)
-            if seen is not None:
-                seen()
+            if on_progress is not None:
+                on_progress()
         if film is not None:
             film.release()

@@ -17,7 +17,7 @@ from snakewalk.controller.app.report.figures.style import (
     SKY,
     style,
 )
-from snakewalk.controller.capture.fish.match_film import Matched
+from snakewalk.controller.capture.fish.match_film import FilmMatch
 from snakewalk.controller.capture.fish.postures import Postures
 from snakewalk.controller.capture.fish.silhouettes import grey
 from snakewalk.controller.capture.image.video import open_footage
@@ -30,7 +30,7 @@ def draw_match(
     file: Path,
     found: Postures,
     known: Postures | None,
-    matched: Matched | None,
+    matched: FilmMatch | None,
     footage: Path,
 ) -> None:
     """Draw frames with the model's outline (of a film), and spine angles, dotted where known.
@@ -59,7 +59,7 @@ def draw_match(
         figure.savefig(file)
 
 
-def _frames(panels: list[Axes], matched: Matched, footage: Path) -> None:
+def _frames(panels: list[Axes], matched: FilmMatch, footage: Path) -> None:
     """Crop frames to the fish; outline, spine, base of the head."""
     known = np.flatnonzero(np.isfinite(matched.parameters[:, 2]))
     shown = known[np.linspace(0, len(known) - 1, min(len(panels), len(known))).astype(int)]

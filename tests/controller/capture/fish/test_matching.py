@@ -7,15 +7,15 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.fish.accuracy import compare
 from snakewalk.controller.capture.fish.first_frame import rough_midline, starts
 from snakewalk.controller.capture.fish.match_film import match_film
-from snakewalk.controller.capture.fish.matching import Seen, Target, agreement
+from snakewalk.controller.capture.fish.matching import SilhouetteFrame, Target, agreement
 from snakewalk.controller.capture.fish.model import fish_model
-from snakewalk.controller.capture.fish.pattern_search import climb
+from snakewalk.controller.capture.fish.pattern_search import pattern_search
 from snakewalk.controller.capture.fish.postures import Postures
 from snakewalk.controller.capture.fish.raster import Window
-from snakewalk.controller.capture.fish.rendered_fish import Look
+from snakewalk.controller.capture.fish.rendered_fish import FilmConditions
 from snakewalk.controller.capture.fish.swimmer import Stroke, swim
 from snakewalk.controller.capture.fish.top_view import TopView, search
-from snakewalk.controller.capture.fish.tracking import follow
+from snakewalk.controller.capture.fish.tracking import track_film
 from tests.helpers.pools import film, side_film
 
 TRUTH = swim()
@@ -45,10 +45,10 @@ def test_climb_finds_the_top_of_a_ridge_and_never_falls() -> None:
     def ridge(at: np.ndarray) -> float:
         return float(-((at[0] - 1.0) ** 2) - 20.0 * (at[0] + at[1] - 2.0) ** 2)
 
-    found, value = climb(ridge, np.array([3.0, -4.0]), np.array([0.5, 0.5]), halvings=12)
+    found, value = pattern_search(ridge, np.array([3.0, -4.0]), np.array([0.5, 0.5]), halvings=12)
     np.testing.assert_allclose(found, [1.0, 1.0], atol=0.02)
     assert value >= ridge(np.array([3.0, -4.0]))
-    held, _ = climb(ridge, np.array([3.0, -4.0]), np.array([0.0, 0.5]), halvings=8)
+    held, _ = pattern_search(ridge, np.array([3.0, -4.0]), np.array([0.0, 0.5]), halvings=8)
     assert held[0] == 3.0
 
 
@@ -83,7 +83,9 @@ def test_a_side_view_gives_height_and_pitch() -> None:
 
 def test_an_edge_one_pixel_wide_says_nothing_two_pixels_away_and_a_wide_one_does() -> None:
     """Eq. 2 as printed: Canny lines are a pixel wide, so K is the same at any larger error."""
-    top, model, base = film(TRUTH, range(0, 1), 120.0, look=Look(marks=0.0, noise=0.0))
+    top, model, base = film(
+        TRUTH, range(0, 1), 120.0, conditions=FilmConditions(marks=0.0, noise=0.0)
+    )
     at = np.array([*base[0], TRUTH.head_rad[0], *TRUTH.angles_rad[0]])
     window = Window(0, 0, top[0].grey.shape[1], top[0].grey.shape[0], 1.0)
 
@@ -111,7 +113,7 @@ def test_coordinates_in_turn_stop_on_a_ridge_where_least_squares_goes_on() -> No
         window = Window(0, 0, seen.grey.shape[1], seen.grey.shape[0], 1.0)
         view = TopView(Target(seen, window, 3), model, 0.0, 0.3)
         steps = np.array([1.0, 1.0, 0.02, 0.05, 0.05, 0.05, 0.05])
-        found, _ = climb(view.value, truth + off, steps, halvings=3)
+        found, _ = pattern_search(view.value, truth + off, steps, halvings=3)
         printed.append(np.abs(found - truth)[3:].mean())
         match = search(seen, model, [truth + off], from_level=1)
         assert match is not None
@@ -124,7 +126,7 @@ def test_head_and_tail_of_a_fish_at_rest_are_told_apart_by_its_build() -> None:
     still = swim((Stroke("glide", 0.2),))
     top, model, _ = film(still, range(0, 4), 100.0)
     same = [top[0]] * 3  # the centre's way from frame to frame is 0
-    for step in follow(same, model, way=np.zeros(2)):
+    for step in track_film(same, model, way=np.zeros(2)):
         assert step.match is not None
         assert np.cos(step.match.parameters[2] - still.head_rad[0]) > 0.99
 
@@ -134,7 +136,7 @@ def test_a_backing_fish_keeps_its_head() -> None:
     ahead = swim((Stroke("glide", 0.5),))
     top, model, _ = film(ahead, range(0, 12, 3), 100.0)
     way = np.array([-1.0, 0.0])
-    for step in follow(top[::-1], model, way=way):
+    for step in track_film(top[::-1], model, way=way):
         assert step.match is not None
         assert np.cos(step.match.parameters[2] - ahead.head_rad[0]) > 0.99
 
@@ -142,8 +144,8 @@ def test_a_backing_fish_keeps_its_head() -> None:
 def test_frames_without_a_fish_are_left_out_and_it_is_found_again() -> None:
     frames = range(40, 80, 8)
     top, model, _ = film(TRUTH, frames, 90.0)
-    empty = Seen(top[0].grey, np.zeros_like(top[0].mask))
-    steps = list(follow([top[0], empty, *top[3:]], model))
+    empty = SilhouetteFrame(top[0].grey, np.zeros_like(top[0].mask))
+    steps = list(track_film([top[0], empty, *top[3:]], model))
     assert [step.match is None for step in steps] == [False, True, False, False]
     assert steps[1].reason == "no silhouette"
 
@@ -161,7 +163,9 @@ def test_the_skeleton_of_a_mask_runs_from_end_to_end_and_gives_starts_both_ways(
 
 
 def test_films_that_hold_no_fish_are_refused_in_one_line() -> None:
-    blank = Seen(np.full((60, 80), 128, np.uint8), np.zeros((60, 80), bool), "nothing seen")
+    blank = SilhouetteFrame(
+        np.full((60, 80), 128, np.uint8), np.zeros((60, 80), bool), "nothing seen"
+    )
     with pytest.raises(InputError, match=r"no silhouette of one body in 9 frames \(nothing seen\)"):
         match_film(lambda: iter([blank] * 20), 20, fish_model("carp"), rate_hz=30.0)
     with pytest.raises(InputError, match="at least 2"):

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.capture.fish.joining import Piece, Repertoire, placed, repertoire
+from snakewalk.controller.capture.fish.joining import Piece, PieceGraph, piece_graph, placed
 from snakewalk.controller.capture.fish.junction import fading, join
 from snakewalk.controller.capture.fish.postures import Postures, postures_of_track
 from snakewalk.controller.capture.fish.segments import (
-    Cutting,
-    Segment,
+    MotionSegment,
+    Segmentation,
     basic_frames,
     commonest_posture,
     cut,
@@ -32,13 +32,13 @@ TRUTH = swim()
 LIMIT = np.radians(20.0)
 
 
-def beat(turn_deg: float, start: int, stop: int) -> Segment:
+def beat(turn_deg: float, start: int, stop: int) -> MotionSegment:
     turn = float(np.radians(turn_deg))
     kind = "forward" if abs(turn) < LIMIT else ("left" if turn > 0 else "right")
-    return Segment(kind, start, stop, turn, 1.0, 1.0)
+    return MotionSegment(kind, start, stop, turn, 1.0, 1.0)
 
 
-def printed_merge(a: Segment, b: Segment) -> bool:
+def printed_merge(a: MotionSegment, b: MotionSegment) -> bool:
     """[TH] 4.1.3: only the first and the last direction are compared."""
     return abs(a.turn_rad + b.turn_rad) < LIMIT
 
@@ -104,8 +104,8 @@ def piece(begin: float, end: float, way: float = 1.0, turn: float = 0.0) -> Piec
     return Piece("forward", base, head, np.zeros((11, 4)), begin, end, "made")
 
 
-def pieces(*made: Piece) -> Repertoire:
-    return Repertoire(made, TRUTH.joints_at, 10.0, None)
+def pieces(*made: Piece) -> PieceGraph:
+    return PieceGraph(made, TRUTH.joints_at, 10.0, None)
 
 
 def test_where_nothing_is_permitted_drawing_never_ends_and_ours_does() -> None:
@@ -131,7 +131,7 @@ def test_dead_ends_are_avoided_while_there_is_another_way() -> None:
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000))
 def test_every_join_is_within_one_class_and_seeds_repeat(seed: int) -> None:
-    stock = repertoire(TRUTH, cut(TRUTH))
+    stock = piece_graph(TRUTH, cut(TRUTH))
     made = at_random(stock, 10.0, np.random.default_rng(seed))
     assert made == at_random(stock, 10.0, np.random.default_rng(seed))
     top = max(max(p.begin_speed, p.end_speed) for p in stock.pieces)
@@ -145,7 +145,7 @@ POINTS = np.array([[3.0, 0.0], [5.0, 3.0], [2.0, 5.0], [-2.0, 2.0]])
 
 
 def test_control_points_are_passed_in_order() -> None:
-    stock = repertoire(TRUTH, cut(TRUTH), mirror=True)
+    stock = piece_graph(TRUTH, cut(TRUTH), mirror=True)
     made = through(stock, POINTS, radius=0.5)
     way = compose(stock, made).base
     at = [round(t * TRUTH.rate_hz) for t in made.reached_s]
@@ -204,7 +204,7 @@ def test_joining_what_fits_changes_nothing_and_blending_commutes_with_the_joints
     line = np.arange(31.0)[:, None] * [0.1, 0.2]
     np.testing.assert_array_equal(join([line[:11], line[10:]], 5), line)
     assert join([wave[:11], wave[10:]], 5) == pytest.approx(wave, abs=0.02)
-    stock = repertoire(TRUTH, cut(TRUTH))
+    stock = piece_graph(TRUTH, cut(TRUTH))
     order = at_random(stock, 6.0, np.random.default_rng(2))
     robot = Retarget(load_robot("yaw16"))
     motion = compose(stock, order)
@@ -224,7 +224,7 @@ def test_a_placed_piece_is_turned_to_the_left_by_its_angle() -> None:
 
 def test_a_filmed_turn_to_one_side_serves_both_when_mirrored() -> None:
     left = swim((Stroke("glide", 0.3), Stroke("turn", 0.6, 1.0), Stroke("glide", 0.3)))
-    stock = repertoire(left, cut(left), mirror=True)
+    stock = piece_graph(left, cut(left), mirror=True)
     turns = [float(p.head_rad[-1]) for p in stock.pieces]
     assert min(turns) == pytest.approx(-max(turns))
     assert max(turns) > 0.8
@@ -243,7 +243,7 @@ def test_real_eels_are_never_straight_and_are_cut_at_their_commonest_posture(
     within = np.radians(12.0)
     assert not basic_frames(found.angles_rad, np.zeros(8), within).any()
     posture = commonest_posture(found.angles_rad, within)
-    stock = repertoire(found, cut(found, Cutting(within_rad=within), posture))
+    stock = piece_graph(found, cut(found, Segmentation(within_rad=within), posture))
     made = at_random(stock, 20.0, np.random.default_rng(0))
     motion = compose(stock, made)
     assert motion.frames / motion.rate_hz >= 20.0

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.body_detector import open_eye
+from snakewalk.controller.capture.body_detector import make_detector
 from snakewalk.controller.capture.capture import Capture, capture
-from snakewalk.controller.capture.image.silhouette import Look
-from tests.oracles.rendered_snake import Scene, empty, film, true_midlines
+from snakewalk.controller.capture.image.silhouette import Polarity
+from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
 
-CLEAN = Scene(rows=240, columns=320, frames=20, wave_hz=0.6)
+CLEAN = SnakeScene(rows=240, columns=320, frames=20, wave_hz=0.6)
 HARSH = replace(CLEAN, noise=6.0, blur_px=1.2, light=0.3, shadow=0.25, texture=5.0)
 
 
-def watch(scene: Scene) -> Capture:
+def watch(scene: SnakeScene) -> Capture:
     frames = list(film(scene))
-    return capture(frames, open_eye(frames[:: max(1, len(frames) // 5)]), scene.rate_hz)
+    return capture(frames, make_detector(frames[:: max(1, len(frames) // 5)]), scene.rate_hz)
 
 
-def median_error(scene: Scene, seen: Capture) -> float:
+def median_error(scene: SnakeScene, seen: Capture) -> float:
     truth = true_midlines(scene)
     good = np.flatnonzero(seen.good)
     return float(np.median([point_error(seen.points_px[k], truth[k]) for k in good]))
@@ -52,17 +52,17 @@ def test_noise_blur_uneven_light_and_shadow_are_stood(length_px: float) -> None:
 def test_a_light_animal_on_dark_ground_with_a_given_background() -> None:
     scene = replace(CLEAN, length_px=90.0, ground=50.0, body=190.0)
     frames = list(film(scene))
-    eye = open_eye(frames[::4], empty(scene))
-    seen = capture(frames, eye, scene.rate_hz)
-    assert eye.look is Look.LIGHT
-    assert eye.how == "given"
+    detector = make_detector(frames[::4], empty(scene))
+    seen = capture(frames, detector, scene.rate_hz)
+    assert detector.polarity is Polarity.LIGHT
+    assert detector.background_source == "given"
     assert median_error(scene, seen) < 0.01 * scene.length_px
 
 
 def test_colours_of_equal_brightness_are_told_apart() -> None:
     scene = replace(CLEAN, length_px=90.0, frames=12)
     frames = [np.dstack([f, np.full_like(f, 90), 230 - f]) for f in film(scene)]
-    seen = capture(frames, open_eye(frames[::2]), scene.rate_hz)
+    seen = capture(frames, make_detector(frames[::2]), scene.rate_hz)
     assert median_error(scene, seen) < 0.01 * scene.length_px
 
 
@@ -71,7 +71,7 @@ def test_the_head_stays_the_head_after_a_gap() -> None:
     frames = list(film(scene))
     for k in range(16, 28):
         frames[k] = empty(scene)
-    seen = capture(frames, open_eye(frames[::3], empty(scene)), scene.rate_hz)
+    seen = capture(frames, make_detector(frames[::3], empty(scene)), scene.rate_hz)
     truth = true_midlines(scene)
     assert np.flatnonzero(~seen.good).tolist() == list(range(16, 28))
     assert seen.counts["nothing seen"] == 12
@@ -84,7 +84,7 @@ def test_the_user_may_say_where_the_head_is() -> None:
     frames = list(film(scene))
     truth = true_midlines(scene)
     tail = (float(truth[0, -1, 0]), float(truth[0, -1, 1]))
-    seen = capture(frames, open_eye(frames), scene.rate_hz, head_px=tail)
+    seen = capture(frames, make_detector(frames), scene.rate_hz, head_px=tail)
     assert seen.head_by == "given"
     assert all(swapped(found, true) for found, true in zip(seen.points_px, truth, strict=True))
 
@@ -95,7 +95,7 @@ def test_a_body_cut_by_the_edge_is_told_not_guessed() -> None:
     long = replace(scene, frames=40, rate_hz=10.0)
     frames = [np.ascontiguousarray(frame[:, 100:]) for frame in film(long)]
     ground = np.ascontiguousarray(empty(scene)[:, 100:])
-    seen = capture(frames, open_eye(frames[::4], ground), long.rate_hz)
+    seen = capture(frames, make_detector(frames[::4], ground), long.rate_hz)
     truth = true_midlines(long) - [100.0, 0.0]
     outside = truth[:, :, 0].min(axis=1) < 0.0
     assert outside.any()
@@ -108,17 +108,17 @@ def test_what_cannot_be_used_is_refused_in_one_line() -> None:
     frames = list(film(scene))
     still = [frames[0]] * 8
     with pytest.raises(InputError, match="no motion"):
-        capture(still, open_eye(still), 30.0)
+        capture(still, make_detector(still), 30.0)
     blank = [empty(replace(scene, seed=k)) for k in range(8)]
     with pytest.raises(InputError, match="no contrast"):
-        capture(blank, open_eye(blank), 30.0)
+        capture(blank, make_detector(blank), 30.0)
     two = [np.minimum(a, a[::-1, ::-1]) for a in frames]
     with pytest.raises(InputError, match="several animals"):
-        capture(two, open_eye(two, empty(scene)), 30.0)
+        capture(two, make_detector(two, empty(scene)), 30.0)
     with pytest.raises(InputError, match="no frames"):
-        open_eye([])
+        make_detector([])
     with pytest.raises(InputError, match=r"320 x 240 grey, the background 319 x 240 grey"):
-        open_eye(frames, np.ascontiguousarray(empty(scene)[:, 1:]))
+        make_detector(frames, np.ascontiguousarray(empty(scene)[:, 1:]))
 
 
 def test_the_skeleton_s_thickness_is_the_body_s() -> None:

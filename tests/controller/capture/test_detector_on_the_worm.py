@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from snakewalk.controller.capture.body_detector import open_eye
+from snakewalk.controller.capture.body_detector import make_detector
 from snakewalk.controller.capture.capture import Capture, capture
 from snakewalk.controller.capture.image.video import open_footage
 from tests.oracles.skeleton_accuracy import distance, swapped
@@ -17,8 +17,8 @@ def worm(shared_data: Path) -> tuple[Capture, np.ndarray]:
     if not (folder / "frames").is_dir():
         pytest.skip("the frames of the worm are not there")
     footage = open_footage(folder / "frames")
-    eye = open_eye(footage.some(25))
-    seen = capture(footage.read(), eye, footage.rate_hz, fixed=False)
+    detector = make_detector(footage.some(25))
+    seen = capture(footage.read(), detector, footage.rate_hz, fixed=False)
     with np.load(folder / "skeletons.npz") as data:
         published = data["skeletons"].astype(float)
     at = np.linspace(0.0, 51.0, 101)

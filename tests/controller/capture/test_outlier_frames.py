@@ -5,26 +5,25 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from snakewalk.controller.capture.body_detector import open_eye
+from snakewalk.controller.capture.body_detector import make_detector
 from snakewalk.controller.capture.capture import capture
-from snakewalk.controller.capture.frame_status import Verdict
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.medial_axis import Skeleton, no_skeleton
-from snakewalk.controller.capture.outlier_frames import beside_the_others
+from snakewalk.controller.capture.outlier_frames import mark_outliers
 from snakewalk.controller.capture.small_body.blur_estimate import (
     axis_error_px,
-    blur_of,
-    softness_px,
+    edge_blur_px,
 )
-from tests.oracles.rendered_snake import Scene, empty, film
+from tests.oracles.rendered_snake import SnakeScene, empty, film
 
-SCENE = Scene(rows=240, columns=320, length_px=140.0, frames=20, wave_hz=0.6)
+SCENE = SnakeScene(rows=240, columns=320, length_px=140.0, frames=20, wave_hz=0.6)
 ODD = [8, 9, 10]
 
 
 def straight(length: float, radius: float, jitter: float = 0.0) -> Skeleton:
     at = np.linspace(0.0, 1.0, 101)
     points = np.column_stack([length * at, np.zeros(101)])
-    return Skeleton(points, np.full(101, radius + jitter), length, Verdict.GOOD)
+    return Skeleton(points, np.full(101, radius + jitter), length, FrameStatus.GOOD)
 
 
 def usual(count: int = 12) -> list[Skeleton]:
@@ -34,37 +33,37 @@ def usual(count: int = 12) -> list[Skeleton]:
 def test_usual_frames_are_kept_and_the_unusual_ones_named() -> None:
     bodies = usual()
     area = np.full(len(bodies), 800.0)
-    assert [one.verdict for one in beside_the_others(bodies, area)] == [Verdict.GOOD] * 12
+    assert [one.status for one in mark_outliers(bodies, area)] == [FrameStatus.GOOD] * 12
     bodies[3] = straight(88.0, 4.0)
     bodies[4] = straight(112.0, 4.0)
     thick = bodies[5].radius_px.copy()
     thick[40:60] = 7.0  # a part of the body beside itself
     bodies[5] = replace(bodies[5], radius_px=thick)
     area[6], area[7] = 600.0, 1000.0
-    bodies[9] = no_skeleton(Verdict.CUT)
-    found = [one.verdict for one in beside_the_others(bodies, area)]
+    bodies[9] = no_skeleton(FrameStatus.CUT)
+    found = [one.status for one in mark_outliers(bodies, area)]
     assert found[3:8] == [
-        Verdict.SHORT,
-        Verdict.LARGER,
-        Verdict.SHORT,
-        Verdict.SHORT,
-        Verdict.LARGER,
+        FrameStatus.SHORT,
+        FrameStatus.LARGER,
+        FrameStatus.SHORT,
+        FrameStatus.SHORT,
+        FrameStatus.LARGER,
     ]
-    assert found[9] is Verdict.CUT
-    assert found[:3] + found[8:9] + found[10:] == [Verdict.GOOD] * 6
+    assert found[9] is FrameStatus.CUT
+    assert found[:3] + found[8:9] + found[10:] == [FrameStatus.GOOD] * 6
 
 
 def test_a_body_whose_length_changes_all_the_time_is_not_dropped() -> None:
     bodies = [straight(100.0 + 8.0 * np.sin(k), 4.0) for k in range(30)]
-    found = beside_the_others(bodies, np.full(30, 800.0))
-    assert all(one.verdict is Verdict.GOOD for one in found)
+    found = mark_outliers(bodies, np.full(30, 800.0))
+    assert all(one.status is FrameStatus.GOOD for one in found)
 
 
 def with_something(draw: object) -> tuple[list[np.ndarray], np.ndarray]:
     frames = list(film(SCENE))
-    first = open_eye(frames[::4], empty(SCENE))
+    first = make_detector(frames[::4], empty(SCENE))
     for k in ODD:
-        line = first.see(frames[k]).skeleton.points_px
+        line = first.detect(frames[k]).skeleton.points_px
         draw(frames[k], line)  # type: ignore[operator]
     return frames, empty(SCENE)
 
@@ -77,7 +76,7 @@ def test_a_small_animal_that_touches_the_body_is_noticed() -> None:
         cv2.polylines(frame, [np.rint(pair).astype(np.int32)], False, 60, 7)
 
     frames, ground = with_something(beside)
-    seen = capture(frames, open_eye(frames[::4], ground), SCENE.rate_hz)
+    seen = capture(frames, make_detector(frames[::4], ground), SCENE.rate_hz)
     assert np.flatnonzero(~seen.used).tolist() == ODD
 
 
@@ -90,17 +89,17 @@ def test_a_small_animal_elsewhere_is_counted_and_the_body_still_used() -> None:
         cv2.polylines(frame, [pair], False, 60, 7)
 
     frames, ground = with_something(apart)
-    seen = capture(frames, open_eye(frames[::4], ground), SCENE.rate_hz)
+    seen = capture(frames, make_detector(frames[::4], ground), SCENE.rate_hz)
     assert seen.used.all()
-    assert np.flatnonzero(seen.accompanied).tolist() == ODD
-    assert (seen.company[ODD] < 0.4).all()
+    assert np.flatnonzero(seen.with_distractors).tolist() == ODD
+    assert (seen.distractors[ODD] < 0.4).all()
 
 
 def test_a_tail_folded_on_the_body_without_a_hole_is_noticed() -> None:
     frames, ground = with_something(lambda frame, line: None)
-    bare = open_eye(frames[::4], ground)
+    bare = make_detector(frames[::4], ground)
     for k in ODD:
-        line = bare.see(frames[k]).skeleton.points_px
+        line = bare.detect(frames[k]).skeleton.points_px
         # the last fifth is taken away and laid beside the body, without a gap
         image = ground.copy()
         kept = np.rint(line[:80] * 16.0).astype(np.int32)
@@ -114,11 +113,11 @@ def test_a_tail_folded_on_the_body_without_a_hole_is_noticed() -> None:
     assert np.flatnonzero(~seen.used).tolist() == ODD
 
 
-def test_softness_is_that_of_a_blurred_edge() -> None:
+def test_edge_blur_is_that_of_a_blurred_step() -> None:
     step = np.zeros((80, 80), dtype=np.float32)
     step[20:60, 20:60] = 100.0
     for blur in (2.0, 4.0):
         level = np.asarray(cv2.GaussianBlur(step, (0, 0), blur), dtype=np.float32)
-        assert abs(blur_of(softness_px(level, 50.0)) - blur) < 0.3 * blur
-    assert blur_of(softness_px(step, 50.0)) < 0.8
+        assert abs(edge_blur_px(level, 50.0) - blur) < 0.3 * blur
+    assert edge_blur_px(step, 50.0) < 0.8
     assert axis_error_px(3.0, 100.0) > axis_error_px(1.0, 100.0) > 0.3
