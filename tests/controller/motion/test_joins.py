@@ -13,7 +13,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.app.runs.prepare import Prepared, prepare
-from snakewalk.controller.capture.fish.joining import repertoire
+from snakewalk.controller.capture.fish.joining import piece_graph
 from snakewalk.controller.capture.fish.segments import cut
 from snakewalk.controller.capture.fish.swimmer import swim
 from snakewalk.controller.capture.fish.synthesis import at_random
@@ -60,7 +60,7 @@ def wave(robot: RobotConfig) -> tuple[np.ndarray, np.ndarray]:
 def fish_motion(name: str) -> tuple[np.ndarray, np.ndarray]:
     """Segments of a fish in a random order, joined at the joint layer, as wide as joints bend."""
     swum = swim()
-    pieces = repertoire(swum, cut(swum), mirror=True)
+    pieces = piece_graph(swum, cut(swum), mirror=True)
     order = at_random(pieces, 6.0, np.random.default_rng(2))
     joints = joint_motion(pieces, order, Retarget(ROBOTS[name]), 6)
     share = 0.9 / (np.abs(joints) / ROBOTS[name].limit_rad).max()
