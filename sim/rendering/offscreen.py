@@ -1,12 +1,13 @@
 """Pictures without a screen: OSMesa where it is installed, else EGL."""
 
 import ctypes
+import weakref
 from typing import Any, Self
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 
 REMEDY = "apt-get install libosmesa6 (draws on the CPU), or libegl1 with a driver"
@@ -17,7 +18,10 @@ class OffscreenError(InputError):
 
 
 class Offscreen:
-    """A frame buffer of one model; use it as a context manager.
+    """A frame buffer of one model; use it as a context manager, or ``close`` it.
+
+    Several may be open at once. OpenGL draws into, and deletes from, whichever context is current,
+    so each makes its own current before it does either, also when it is collected unclosed.
 
     Raises:
         OffscreenError: neither OSMesa nor EGL works.
@@ -32,9 +36,13 @@ class Offscreen:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
         self._view = mujoco.MjrRect(0, 0, width, height)
         self._pixels = np.zeros((height, width, 3), np.uint8)
+        self.close = weakref.finalize(self, _free, self._gl, self._mjr)
+        """Free the frame buffer; safe to call twice."""
+        self.close.atexit = False  # EGL may be gone by then
 
-    def draw(self, scene: mujoco.MjvScene, caption: str = "") -> NDArray[np.uint8]:
+    def draw(self, scene: mujoco.MjvScene, caption: str = "") -> Image:
         """Draw one frame, (height, width, 3), top row first; valid until the next one."""
+        self._gl.make_current()
         mujoco.mjr_render(self._view, scene, self._mjr)
         if caption:
             mujoco.mjr_overlay(
@@ -52,8 +60,13 @@ class Offscreen:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._mjr.free()
-        self._gl.free()
+        self.close()
+
+
+def _free(gl: Any, mjr: mujoco.MjrContext) -> None:
+    gl.make_current()
+    mjr.free()
+    gl.free()
 
 
 def _context(width: int, height: int) -> Any:

@@ -74,7 +74,7 @@ class TopView:
 
     def close(self) -> None:
         """Free the frame buffer."""
-        self._screen.__exit__()
+        self._screen.close()
 
     def _update(self, option: mujoco.MjvOption) -> None:
         data, model = self._data, self._model

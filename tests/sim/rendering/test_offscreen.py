@@ -1,0 +1,44 @@
+"""Several frame buffers at once: none draws into, or deletes from, another's."""
+
+import gc
+
+import cv2
+import numpy as np
+import pytest
+
+from snakewalk.config.camera import CameraConfig
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.sim.rendering.offscreen import OffscreenError
+from snakewalk.sim.rendering.top_view import TopView
+
+ROBOT, WORLD = load_robot("yaw16"), load_world("flat")
+AT_REST = np.concatenate([[0.0, 0.0, ROBOT.body_radius_m, 1.0, 0.0, 0.0, 0.0], np.zeros(16)])
+
+
+def view() -> TopView:
+    try:
+        return TopView(ROBOT, WORLD, CameraConfig(), (0.0, 0.0))
+    except OffscreenError as error:
+        pytest.skip(str(error))
+
+
+def shows_the_body(top: TopView) -> bool:
+    return bool(cv2.absdiff(top.picture(AT_REST), top.empty_floor()).max() > 100)
+
+
+def test_a_view_still_draws_after_another_was_collected_unclosed() -> None:
+    unclosed, kept = view(), view()
+    assert shows_the_body(kept)
+    del unclosed
+    gc.collect()
+    assert shows_the_body(kept)
+    kept.close()
+
+
+@pytest.mark.parametrize("closed_first", [0, 1])
+def test_two_views_draw_by_turns_and_one_outlives_the_other(closed_first: int) -> None:
+    views = [view(), view()]
+    assert all(shows_the_body(each) for each in views)
+    views.pop(closed_first).close()
+    assert shows_the_body(views[0])
+    views[0].close()
