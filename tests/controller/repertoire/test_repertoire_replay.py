@@ -90,7 +90,7 @@ def test_a_body_that_heads_another_way_on_a_slope_leaves_the_ground_with_the_pri
 ):
     # a turn on the spot on a plane that leans: recorded uphill, replayed across
     lean = turned(np.array([0.0, 1.0, 0.0]), -0.4)
-    frames = [Frame(lean @ Frame.flat(0, 0, a).rotation, np.zeros(3)) for a in (0.0, 0.5, 1.0)]
+    frames = [posed(lean @ Frame.flat(0, 0, a).rotation, np.zeros(3)) for a in (0.0, 0.5, 1.0)]
     links = np.array([frame.to_world_m(np.eye(3)) for frame in frames])
     axes, joints = np.tile(np.eye(3), (3, 3, 1, 1)), np.zeros((3, 2))
     segment = cut("turn", "left", 0.1, frames, links, axes, joints[:-1], joints)
