@@ -7,6 +7,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import TURN, bends_rad, group_places
+from snakewalk.controller.kinematics.smoothstep import cubic
 
 EDGE = 0.7
 """Share of the folded part over which the folds grow and vanish."""
@@ -41,7 +42,6 @@ class Concertina(Gait):
         turn = np.mod(phase_rad, TURN) / TURN
         centre = (1.0 + half - turn * (1.0 + p.share))[:, None]
         edge = np.clip((1.0 - np.abs(at - centre) / half) / EDGE, 0.0, 1.0)
-        window = edge * edge * (3.0 - 2.0 * edge)
-        headings = p.winding_rad * window * np.sin(TURN * p.folds * at)
+        headings = p.winding_rad * cubic(edge) * np.sin(TURN * p.folds * at)
         joints[:, yaw] = bends_rad(robot, yaw, headings)
         return joints

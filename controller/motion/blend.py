@@ -19,8 +19,8 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.kinematics.smoothstep import cubic, cubic_sum, quintic, quintic_slope
 from snakewalk.controller.motion.join_time import DELAY, shortest_join_s
-from snakewalk.controller.motion.smoothstep import cubic, cubic_sum, quintic, quintic_slope
 from snakewalk.controller.motion.source import MotionSource, Pace
 
 RATES = (1.0, 0.7, 0.4, 0.0)

@@ -1,9 +1,15 @@
 """How long a join has to take: the shortest time in which it stays within the limits."""
 
 import numpy as np
+from numba.extending import register_jitable
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.motion.smoothstep import cubic, cubic_slope, quintic_bend, quintic_slope
+from snakewalk.controller.kinematics.smoothstep import (
+    cubic,
+    cubic_slope,
+    quintic_bend,
+    quintic_slope,
+)
 from snakewalk.controller.motion.source import Pace
 from snakewalk.drivers.compiling import compiled
 
@@ -15,6 +21,8 @@ TOLERANCE = 0.02
 """A target at its limits and the last of an error add up to a little more than a limit."""
 DELAY = 0.3
 """Share of a join before a slowed target speeds up: most of the error should be gone by then."""
+register_jitable(cubic)  # the loops below call them
+register_jitable(cubic_slope)
 _X = np.linspace(0.0, 1.0, 25)
 _Z = np.maximum(0.0, (_X - DELAY) / (1.0 - DELAY))
 _SHAPES = np.array(
@@ -64,7 +72,7 @@ def _within(
         dr = (1.0 - rate) * shapes[2, i] / duration
         dp, ddp = shapes[3, i] / duration, shapes[4, i] / duration**2
         y = min(shapes[0, i] * duration / brake, 1.0)
-        left, dleft = 1.0 - y * y * (3.0 - 2.0 * y), -6.0 * y * (1.0 - y) / brake
+        left, dleft = 1.0 - cubic(y), -cubic_slope(y) / brake
         for j in range(len(error)):
             total = error[j] + 0.5 * brake * error_speed[j]
             if r * speed[j] + abs(error_speed[j] * left - total * dp) > limits[0, j]:

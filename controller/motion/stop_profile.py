@@ -1,6 +1,6 @@
 """How a motion comes to rest where it is: its time slows down to a stop."""
 
-from snakewalk.controller.motion.smoothstep import cubic
+from snakewalk.controller.kinematics.smoothstep import cubic
 
 STOP_S = 1.0
 

@@ -3,10 +3,7 @@
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-
-# Peak speed and acceleration of the quintic 10 t^3 - 15 t^4 + 6 t^5 on [0, 1].
-_PEAK_SPEED = 1.875
-_PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)
+from snakewalk.controller.kinematics.smoothstep import QUINTIC_BEND_MAX, QUINTIC_SLOPE_MAX, quintic
 
 
 class Ramp:
@@ -18,12 +15,11 @@ class Ramp:
         self._start, self._goal = np.array(start_rad), np.array(goal_rad)
         way = float(np.abs(self._goal - self._start).max(initial=0.0))
         self.duration_s = max(
-            way * _PEAK_SPEED / speed_rad_s,
-            float(np.sqrt(way * _PEAK_ACCELERATION / acceleration_rad_s2)),
+            way * QUINTIC_SLOPE_MAX / speed_rad_s,
+            float(np.sqrt(way * QUINTIC_BEND_MAX / acceleration_rad_s2)),
         )
 
     def at(self, time_s: float) -> Floats:
         """Joint angles (J,) after ``time_s``; the goal from ``duration_s`` on."""
         t = 1.0 if self.duration_s == 0.0 else min(max(time_s / self.duration_s, 0.0), 1.0)
-        blend = t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
-        return np.asarray(self._start + blend * (self._goal - self._start))
+        return np.asarray(self._start + quintic(t) * (self._goal - self._start))

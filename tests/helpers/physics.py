@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.kinematics.smoothstep import quintic
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.plant import ServoDrive
 from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
@@ -42,6 +43,6 @@ def a_drive(*, torque_on: bool = True) -> ServoDrive:
 def serpenoid(time_s: float, amplitude_rad: float = 0.35) -> Floats:
     """Joint angles of a wave travelling backwards that grows from a straight body within 1 s."""
     x = min(max(time_s, 0.0), 1.0)
-    grown = amplitude_rad * x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+    grown = amplitude_rad * quintic(x)
     phase = HZ * time_s - np.arange(ROBOT.joint_count) / WAVELENGTH_JOINTS
     return np.asarray(grown * np.sin(2.0 * np.pi * phase))

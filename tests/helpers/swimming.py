@@ -10,6 +10,7 @@ from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.gaits.gait import Gait
+from snakewalk.controller.kinematics.smoothstep import quintic
 from snakewalk.controller.motion.gait_cycle import Cycle
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.plant import ServoDrive
@@ -63,7 +64,7 @@ def follow(
     for k, t in enumerate(time_s):
         x = min(t / grow_s, 1.0) if grow_s else 1.0
         goal = cycle.goal_rad() if t <= hold_s else cycle.step(FRAME_S, None)  # type: ignore[arg-type]
-        drive.goal_rad[:] = goal * x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+        drive.goal_rad[:] = goal * quintic(x)
         plant.advance(float(t), drive)
         centre[k], joints[k] = plant.link_positions_m.mean(axis=0), plant.position_rad
     return Followed(time_s, centre, joints, cycle.frequency_hz, plant)

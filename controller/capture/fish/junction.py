@@ -9,6 +9,7 @@ difference dies away along a quintic: position and speed are continuous, acceler
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.smoothstep import quintic
 
 
 def fading(step: Floats, slope: Floats, duration: float, time: Floats) -> Floats:
@@ -24,7 +25,7 @@ def fading(step: Floats, slope: Floats, duration: float, time: Floats) -> Floats
 
     """
     u = np.clip(np.asarray(time, dtype=float) / duration, 0.0, 1.0)
-    value = 1.0 + u**3 * (-10.0 + u * (15.0 - 6.0 * u))
+    value = 1.0 - quintic(u)
     rate = u * (1.0 + u * u * (-6.0 + u * (8.0 - 3.0 * u)))
     return np.outer(value, step) + np.outer(rate, slope) * duration
 

@@ -8,6 +8,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.fish.model import fish_model
 from snakewalk.controller.capture.fish.postures import Postures
+from snakewalk.controller.kinematics.smoothstep import cubic
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +84,7 @@ def swim(
 
 def _shape(stroke: Stroke, u: float, share: Floats) -> tuple[Floats, float]:
     """Spine angles (J,) and heading turned so far, at share ``u`` of a stroke."""
-    smooth = u * u * (3.0 - 2.0 * u)
+    smooth = cubic(u)
     if stroke.kind == "glide":
         return np.zeros(len(share)), stroke.turn_rad * smooth
     late = np.clip(u * 1.25 - 0.25 * share, 0.0, 1.0)

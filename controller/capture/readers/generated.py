@@ -12,6 +12,7 @@ from snakewalk.config.loader import load, locate, shipped
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.controller.capture.resample import SEGMENTS, body_points
 from snakewalk.controller.capture.track import Track
+from snakewalk.controller.kinematics.smoothstep import cubic
 
 EMBEDDED = shipped("recordings")
 """Names of the shipped recordings."""
@@ -68,7 +69,7 @@ def _script(
     for episode in figures.episodes:
         span_s = episode.cycles / figures.frequency_hz
         u = np.clip((at - begin_s) / span_s, 0.0, 1.0)
-        ease = u * u * (3.0 - 2.0 * u)
+        ease = cubic(u)
         next_waves = episode.waves or figures.waves
         gain += (episode.gain - last_gain) * ease
         waves += (next_waves - last_waves) * ease

@@ -1,15 +1,15 @@
-"""Smooth rises over a share of time: a cubic and a quintic, their slopes and what they add up to.
+"""Smoothsteps: a cubic and a quintic over x from 0 to 1, with their slopes and integrals.
 
 Both rise from 0 at 0 to their height at 1. The cubic ``3 x^2 - 2 x^3`` begins and ends at rest; the
 quintic ``10 x^3 - 15 x^4 + 6 x^5`` does so without a step in acceleration. They do not clip x.
 """
 
+import math
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
+from snakewalk.config.arrays import Floats
 
-Share = TypeVar("Share", float, NDArray[np.float64])
+Share = TypeVar("Share", float, Floats)
 
 
 def cubic(x: Share, height: float = 1.0) -> Share:
@@ -27,13 +27,19 @@ def cubic_sum(x: Share) -> Share:
     return x**3 - 0.5 * x**4
 
 
+QUINTIC_SLOPE_MAX = 1.875
+"""Largest slope of ``quintic``, in the middle."""
+QUINTIC_BEND_MAX = 10.0 / math.sqrt(3.0)
+"""Largest absolute slope of ``quintic_slope``."""
+
+
 def quintic(x: Share) -> Share:
     """``10 x^3 - 15 x^4 + 6 x^5``."""
     return x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
 
 
 def quintic_slope(x: Share) -> Share:
-    """Of ``quintic``; largest in the middle, 1.875."""
+    """Of ``quintic``."""
     return 30.0 * x * x * (1.0 - x) ** 2
 
 
