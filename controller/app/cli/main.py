@@ -8,6 +8,7 @@ import typer
 from typer import rich_utils
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import missing_extra
 from snakewalk.controller.app.cli.commands.analyse import analyse
 from snakewalk.controller.app.cli.commands.body import body
 from snakewalk.controller.app.cli.commands.bus import serve, sniff
@@ -199,6 +200,12 @@ def main() -> None:
     except DriverError as error:
         print(f"snakewalk: {error}", file=sys.stderr)
         raise SystemExit(1) from None
+    except ModuleNotFoundError as error:
+        needed = missing_extra(error)
+        if needed is None:
+            raise
+        print(f"snakewalk: {needed}", file=sys.stderr)
+        raise SystemExit(2) from None
     except OSError as error:
         print(f"snakewalk: {Path(str(error.filename or ''))}: {error.strerror}", file=sys.stderr)
         raise SystemExit(2) from None

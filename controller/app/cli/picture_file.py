@@ -1,9 +1,9 @@
 """The file of a picture, looked at before any work is done."""
 
-from importlib.util import find_spec
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
 
 ENDINGS = (".png", ".svg", ".pdf")
 
@@ -19,5 +19,4 @@ def check_picture(path: Path | None) -> None:
         return
     if path.suffix.lower() not in ENDINGS:
         raise InputError(f"{path}: a picture ends in {', '.join(ENDINGS)}")
-    if find_spec("matplotlib") is None:
-        raise InputError("pictures need matplotlib: pip install 'snakewalk[view]'")
+    require_extra("pictures need", "matplotlib")

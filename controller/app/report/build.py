@@ -1,10 +1,9 @@
 """Log to page: reads the log, writes ``summary.json`` and ``report.html`` beside each other."""
 
 import json
-from importlib.util import find_spec
 from pathlib import Path
 
-from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.report.film_on_page import film_html
 from snakewalk.controller.app.report.page import Section, page
 from snakewalk.controller.metrics.summary import Summary, summary
@@ -45,8 +44,7 @@ def write_summary(record: RunRecord, out_dir: Path) -> Summary:
 
 
 def _sections(record: RunRecord) -> list[Section]:
-    if find_spec("matplotlib") is None:
-        raise InputError("the report draws with matplotlib: pip install 'snakewalk[view]'")
+    require_extra("the report needs", "matplotlib")
     from snakewalk.controller.app.report.figures.all import sections  # noqa: PLC0415  (an extra)
 
     return sections(record)

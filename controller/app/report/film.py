@@ -1,7 +1,6 @@
 """From a log to its film: the measured head pose and joints are all that it takes, on metal too."""
 
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
@@ -10,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.runlog.record import Header, RunRecord
@@ -40,9 +40,7 @@ def film_run(
             the log holds no two poses.
 
     """
-    missing = [name for name in ("mujoco", "av") if find_spec(name) is None]
-    if missing:
-        raise InputError(f"films need {' and '.join(missing)}: pip install 'snakewalk[sim,view]'")
+    require_extra("films need", "mujoco", "av")
     from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
 
     header = record.header

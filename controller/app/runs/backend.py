@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.extras import require_extra
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
@@ -51,7 +52,7 @@ def simulated(
         laid: heading of the head link, and joint angles to begin with.
 
     """
-    # The simulation is an extra: a robot's small computer has none.
+    require_extra("simulated runs need", "mujoco")
     from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
     from snakewalk.sim.physics.plant import MujocoPlant  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415

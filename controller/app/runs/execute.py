@@ -7,8 +7,7 @@ from pathlib import Path
 from snakewalk.controller.app.report.build import write_summary
 from snakewalk.controller.app.runs.backend import metal, simulated
 from snakewalk.controller.app.runs.job import Job
-from snakewalk.controller.app.runs.pose_source import pose_source
-from snakewalk.controller.app.runs.rendered_camera import pose_faults
+from snakewalk.controller.app.runs.pose_source import pose_faults, pose_source
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, Outcome, Watcher

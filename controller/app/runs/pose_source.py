@@ -3,19 +3,68 @@
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.camera import CameraConfig
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import FlatGround, WorldConfig
 from snakewalk.controller.app.runs.backend import Backend
-from snakewalk.controller.app.runs.device_camera import DeviceCamera
 from snakewalk.controller.app.runs.job import Job
-from snakewalk.controller.app.runs.rendered_camera import RenderedCamera
 from snakewalk.controller.kinematics.links import body_in_world
-from snakewalk.controller.localization.camera_pose import CameraPose
 from snakewalk.controller.localization.dead_reckoning import DeadReckoning
 from snakewalk.controller.runtime.drive import PoseSource
 from snakewalk.drivers.types import BodyPose, JointState
+
+if TYPE_CHECKING:
+    from snakewalk.controller.app.runs.device_camera import DeviceCamera
+    from snakewalk.controller.app.runs.rendered_camera import RenderedCamera
+
+
+def pose_faults(run: RunConfig, robot: RobotConfig, world: WorldConfig, *, metal: bool) -> None:
+    """Refuse a pose source that cannot work here.
+
+    Raises:
+        InputError: one line per fault, or the extra that an overhead camera needs is not there.
+
+    """
+    faults = []
+    if run.pose == "simulator" and metal:
+        faults.append("pose: servos on a port have no simulator; take camera or joints")
+    if run.pose == "camera":
+        require_extra("pose: the overhead camera needs", "cv2", "skimage")
+        if not isinstance(world.ground, FlatGround) or world.obstacle is not None:
+            faults.append(
+                f"pose: the overhead camera needs a bare level floor; world {world.name} has none"
+            )
+        if run.motion == "gait" and robot.pitch_joints:
+            faults.append(
+                f"pose: the overhead camera takes the body to lie flat; a gait of {robot.name} "
+                "lifts or rolls it"
+            )
+        if run.camera.height_m <= 4.0 * robot.body_radius_m:
+            faults.append("camera: height_m: the lens must be well above the robot")
+        if metal:
+            faults += _missing(run.camera)
+    if faults:
+        raise InputError(faults)
+
+
+def _missing(camera: CameraConfig) -> list[str]:
+    return [
+        f"camera: {key}: needed with servos on a port: {why}"
+        for key, why in (
+            ("device", "number, device or address of the camera"),
+            ("background", "an image of the empty floor"),
+            ("centre_m", "the floor's place under the lens"),
+        )
+        if getattr(camera, key) is None
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +154,8 @@ def pose_source(
     with ExitStack() as stack:
         believed: PoseSource = reckoning
         if run.pose == "camera":
+            from snakewalk.controller.localization.camera_pose import CameraPose  # noqa: PLC0415  OpenCV is an extra
+
             camera = stack.enter_context(closing(_camera(prepared, backend)))
             believed = seen = CameraPose(
                 robot, camera, reckoning, lambda text: note("camera", text)
@@ -118,10 +169,14 @@ def pose_source(
         note("pose", ", ".join(f"{key} {value}" for key, value in found.items()))
 
 
-def _camera(prepared: Job, backend: Backend) -> RenderedCamera | DeviceCamera:
+def _camera(prepared: Job, backend: Backend) -> "RenderedCamera | DeviceCamera":
     run, robot, clock = prepared.run, prepared.robot, backend.clock
     if backend.qpos is None:
+        from snakewalk.controller.app.runs.device_camera import DeviceCamera  # noqa: PLC0415  OpenCV is an extra
+
         return DeviceCamera(run, robot, clock)
+    from snakewalk.controller.app.runs.rendered_camera import RenderedCamera  # noqa: PLC0415  OpenCV is an extra
+
     return RenderedCamera(run, robot, prepared.world, backend.qpos, clock)
 
 

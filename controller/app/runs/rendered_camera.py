@@ -6,11 +6,10 @@ from collections.abc import Callable
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.config.world import FlatGround, WorldConfig
+from snakewalk.config.world import WorldConfig
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
@@ -18,46 +17,6 @@ from snakewalk.controller.localization.overhead_camera import (
     Sighting,
 )
 from snakewalk.drivers.clock import Clock
-
-
-def pose_faults(run: RunConfig, robot: RobotConfig, world: WorldConfig, *, metal: bool) -> None:
-    """Refuse a pose source that cannot work here.
-
-    Raises:
-        InputError: one line per fault.
-
-    """
-    faults = []
-    if run.pose == "simulator" and metal:
-        faults.append("pose: servos on a port have no simulator; take camera or joints")
-    if run.pose == "camera":
-        if not isinstance(world.ground, FlatGround) or world.obstacle is not None:
-            faults.append(
-                f"pose: the overhead camera needs a bare level floor; world {world.name} has none"
-            )
-        if run.motion == "gait" and robot.pitch_joints:
-            faults.append(
-                f"pose: the overhead camera takes the body to lie flat; a gait of {robot.name} "
-                "lifts or rolls it"
-            )
-        if run.camera.height_m <= 4.0 * robot.body_radius_m:
-            faults.append("camera: height_m: the lens must be well above the robot")
-        if metal:
-            faults += _missing(run.camera)
-    if faults:
-        raise InputError(faults)
-
-
-def _missing(camera: CameraConfig) -> list[str]:
-    return [
-        f"camera: {key}: needed with servos on a port: {why}"
-        for key, why in (
-            ("device", "number, device or address of the camera"),
-            ("background", "an image of the empty floor"),
-            ("centre_m", "the floor's place under the lens"),
-        )
-        if getattr(camera, key) is None
-    ]
 
 
 def centre_of(run: RunConfig) -> tuple[float, float]:

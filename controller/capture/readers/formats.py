@@ -1,9 +1,9 @@
 """Recordings of every kind in a file: the content, not the name, says which it is."""
 
-from importlib.util import find_spec
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
 from snakewalk.controller.capture.readers.arrays import load_npy, load_npz
 from snakewalk.controller.capture.readers.kinds import KNOWN
 from snakewalk.controller.capture.readers.tables import load_csv
@@ -62,8 +62,7 @@ def load_file(
 
 
 def _load_hdf5(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
-    if find_spec("h5py") is None:
-        raise InputError(f"{file}: HDF5 needs h5py: pip install 'snakewalk[vision]'")
+    require_extra(f"{file}: HDF5 needs", "h5py")
     from snakewalk.controller.capture.readers.hdf5 import load_hdf5  # noqa: PLC0415  an extra
 
     return load_hdf5(file, rate_hz, least_score)

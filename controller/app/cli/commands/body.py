@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
 from snakewalk.controller.app.cli.options import Force, Json, show
 from snakewalk.controller.app.cli.picture_file import check_picture
@@ -46,8 +46,7 @@ def body(
     as_json: Json = False,
 ) -> None:
     """Make the body's mesh: an ellipse at each skeleton point, with mirrored texture."""
-    if find_spec("trimesh") is None:
-        raise InputError("body: meshes need trimesh: pip install 'snakewalk[vision]'")
+    require_extra("body: meshes need", "trimesh")
     from snakewalk.controller.capture.mesh import body_model as model  # noqa: PLC0415  heavy
     from snakewalk.controller.capture.mesh.mesh import body_mesh  # noqa: PLC0415
     from snakewalk.controller.capture.mesh.mesh_files import mesh_files, write_mesh  # noqa: PLC0415

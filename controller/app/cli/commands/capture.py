@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.options import Json, show
 
 
@@ -51,6 +52,7 @@ def capture(
     as_json: Json = False,
 ) -> None:
     """Find the animal in every frame: silhouette, medial axis, 100 equal chords, head and tail."""
+    require_extra("capture needs", "cv2", "skimage")
     from snakewalk.controller.app.recordings.capturing import Wanted, capture_file  # noqa: PLC0415  heavy
 
     wanted = Wanted(

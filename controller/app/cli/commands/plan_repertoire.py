@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
 from snakewalk.controller.app.cli.commands.repertoire import bar, carry_out
 from snakewalk.controller.app.cli.options import show
@@ -29,6 +30,8 @@ def plan_with_repertoire(
     from snakewalk.controller.app.studies.repertoire_timing import search_cost  # noqa: PLC0415
 
     refuse_to_overwrite([out], force)
+    if physics or carry:
+        require_extra("candidates and runs on the physics need", "mujoco")
     job = plan_route(run, repertoire, robot=robot, world=world, beam=beam)
     found = plan_facts(job)
     if not as_json:

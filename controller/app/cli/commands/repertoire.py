@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
 from snakewalk.controller.app.cli.options import (
     Film,
@@ -50,6 +51,7 @@ def record(
     file = out or default_file(robot, world)
     refuse_to_overwrite([file, picture], force)
     check_picture(picture)
+    require_extra("recording needs", "mujoco")
     with bar() as progress:
         task = progress.add_task("record", total=float(len(ACTIONS)))
         begun: list[str] = []

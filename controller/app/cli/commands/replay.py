@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
+from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.options import Json, console
 
 
@@ -29,6 +30,7 @@ def replay(
     from snakewalk.controller.app.studies.replay import replay as run_again  # noqa: PLC0415
     from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
 
+    require_extra("a replay needs", "mujoco")
     record = read_log(log)
     if record.note:
         print(f"snakewalk: {log}: {record.note}", file=sys.stderr)

@@ -9,6 +9,7 @@ from rich import progress
 from rich.console import Console
 from rich.table import Table
 
+from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.options import Json, console
 from snakewalk.controller.app.cli.picture_file import check_picture
 
@@ -49,7 +50,6 @@ def sweep(
     as_json: Json = False,
 ) -> None:
     """Measure gaits over their parameters: speed, cost of transport, torque, heat, slip."""
-    from snakewalk.controller.app.report.plots.sweep import draw_sweep  # noqa: PLC0415
     from snakewalk.controller.app.studies.pool import each  # noqa: PLC0415
     from snakewalk.controller.app.studies.sweep_digest import digest  # noqa: PLC0415
     from snakewalk.controller.app.studies.sweep_measure import measure  # noqa: PLC0415
@@ -58,6 +58,7 @@ def sweep(
     from snakewalk.controller.app.studies.sweep_table import read_table  # noqa: PLC0415
 
     check_picture(picture)
+    require_extra("a sweep needs", "mujoco" if dask is None else "distributed")
     planned = plan_sweep(gaits, robot, points, seed=seed, seconds=seconds)
     for line in () if as_json else planned.left_out:
         console.print(f"left out: {line}", style="dim")
@@ -74,6 +75,8 @@ def sweep(
             table.add(point, row)
     rows = digest(read_table(out))
     if picture is not None:
+        from snakewalk.controller.app.report.plots.sweep import draw_sweep  # noqa: PLC0415
+
         draw_sweep(read_table(out), picture)
     if as_json:
         found = {"table": str(out), "run": len(missing), "held": len(planned.points)}

@@ -10,6 +10,7 @@ from rich.progress import track as progress
 from rich.table import Table
 
 from snakewalk.controller.app.cli.options import Json, console
+from snakewalk.controller.app.cli.picture_file import check_picture
 
 
 def track(
@@ -31,6 +32,7 @@ def track(
     from snakewalk.controller.app.recordings.recording import examine  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.capture.readers.generated import EMBEDDED  # noqa: PLC0415
 
+    check_picture(picture)
     names = recordings or list(EMBEDDED)
     found = [
         examine(name, robot, world, None if name in EMBEDDED else rate)

@@ -9,6 +9,7 @@ from rich import progress
 from rich.console import Console
 from rich.table import Table
 
+from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.options import (
     DEFAULT_RUN,
     Json,
@@ -60,6 +61,7 @@ def trials(
     """Simulate a job over seeds, motions, robots and relief; tabulate what was reached and why."""
     from snakewalk.controller.app.studies import trials as study  # noqa: PLC0415  heavy; --help stays quick
 
+    require_extra("trials need", "mujoco")
     motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
     cases = [
         study.Case(m, r, k)

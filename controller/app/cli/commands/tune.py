@@ -9,6 +9,7 @@ from rich import progress
 from rich.console import Console
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
 from snakewalk.controller.app.cli.options import Json, Robot, show
 
@@ -37,6 +38,7 @@ def tune(
     if out is not None and out.suffix != ".toml":
         raise InputError(f"{out}: a set of parameters ends in .toml")
     refuse_to_overwrite([out], force)
+    require_extra("tuning needs", "mujoco")
     body = robot or ("alternating16" if make_gait(gait).needs.pitch else "yaw16")
     bar = progress.Progress(console=Console(stderr=True))
     with bar:

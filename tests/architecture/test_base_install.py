@@ -1,0 +1,150 @@
+"""The base install (no extras) runs a robot; what needs an extra says which one."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+import typer
+
+from snakewalk.controller.app.cli.main import app
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPT = ROOT / "tests" / "helpers" / "base_install.py"
+
+
+class Result(NamedTuple):
+    """Of one command."""
+
+    code: int
+    out: str
+    err: str
+
+
+def call(folder: Path, *commands: tuple[str, ...]) -> list[Result]:
+    """Run commands one after the other in one interpreter without extras, in ``folder``."""
+    ran = subprocess.run(
+        [sys.executable, str(SCRIPT)],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "100", "TERM": "dumb"},
+        input=json.dumps(commands),
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stderr
+    return [Result(*row) for row in json.loads(ran.stdout)]
+
+
+def commands() -> list[tuple[str, ...]]:
+    found: list[tuple[str, ...]] = []
+
+    def walk(command: object, words: tuple[str, ...]) -> None:
+        found.append(words)
+        for name, inner in getattr(command, "commands", {}).items():
+            walk(inner, (*words, name))
+
+    walk(typer.main.get_command(app), ())  # type: ignore[arg-type]
+    return found
+
+
+BASE = [
+    ("scan", "--port", "/dev/null", "--baud", "1000000"),
+    ("doctor", "--port", "/dev/null", "--robot", "yaw16"),
+    ("bus", "set", "--port", "/dev/null", "--id", "3", "--return-delay", "0", "--yes"),
+    ("list",),
+    ("gait", "list"),
+    ("gait", "show", "rolling"),
+    ("plan", "flat-slalom", "--motion", "serpenoid"),
+    ("track", "worm-like"),
+    ("analyse", "worm-like"),
+    ("walk", "--graph", "er:40:5", "--repeats", "2"),
+    ("play", "worm-like", "--port", "/dev/null", "--robot", "yaw16", "--out", "p"),
+    ("bus", "serve", "--servos", "1-2", "--for", "0.1"),
+]
+"""Commands that need no extra."""
+
+NEEDY = [
+    (("run", "flat-slalom"), "sim"),
+    (("gait", "run", "lateral-undulation"), "sim"),
+    (("play", "worm-like"), "sim"),
+    (("replay", "log.mcap"), "sim"),
+    (("bus", "serve", "--robot", "yaw16"), "sim"),
+    (("sweep", "rolling", "--points", "1"), "sim"),
+    (("sweep", "rolling", "--points", "1", "--dask", "tcp://localhost:1"), "sweep"),
+    (("tune", "rolling"), "sim"),
+    (("trials", "flat-slalom", "--seeds", "1"), "sim"),
+    (("repertoire", "record"), "sim"),
+    (("gait", "show", "rolling", "--picture", "a.png"), "view"),
+    (("gait", "fit", "curve.csv", "--picture", "a.png"), "view"),
+    (("track", "worm-like", "--picture", "a.png"), "view"),
+    (("analyse", "worm-like", "--picture", "a.png"), "view"),
+    (("walk", "--picture", "a.png"), "view"),
+    (("sweep", "rolling", "--picture", "a.png"), "view"),
+    (("repertoire", "record", "--picture", "a.png"), "view"),
+    (("body", "worm-like", "-o", "b.glb"), "vision"),
+    (("capture", "film.mp4"), "vision"),
+    (("fish", "match", "film.mp4"), "vision"),
+    (("fish", "film", "tank"), "vision"),
+    (("run", "flat-slalom", "--pose", "camera", "--port", "/dev/null"), "vision"),
+]
+"""Commands, and the extra that each needs."""
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, ...], Result]:
+    """Every command above, run once."""
+    words = [*BASE, *(words for words, _ in NEEDY)]
+    return dict(zip(words, call(tmp_path_factory.mktemp("base"), *words), strict=True))
+
+
+def test_a_motion_runs_on_servos(tmp_path: Path) -> None:
+    words = ("gait", "run", "lateral-undulation", "--robot", "yaw16", "--seconds", "2")
+    (ran,) = call(tmp_path, (*words, "--port", "/dev/null", "--out", "run", "--json"))
+    assert ran.code == 0, ran.err
+    result = json.loads(ran.out)
+    assert result["tripped"] is None
+    assert result["report"] is None
+    assert result["film"] is None
+    assert (tmp_path / "run" / "log.mcap").is_file()
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["trip"] is None
+    assert "snakewalk: no film: films need MuJoCo and PyAV: pip install" in ran.err
+    assert "snakewalk: no report: the report needs matplotlib: pip install" in ran.err
+
+
+def test_a_job_runs_on_servos_by_its_joints_alone(tmp_path: Path) -> None:
+    words = ("run", "flat-slalom", "--motion", "serpenoid", "--pose", "joints")
+    (ran,) = call(tmp_path, (*words, "--port", "/dev/null", "--out", "run", "--json"))
+    assert ran.code in {0, 1}, ran.err
+    assert json.loads(ran.out)["tripped"] is None
+
+
+@pytest.mark.parametrize("words", BASE, ids=" ".join)
+def test_a_command_needs_no_extra(
+    words: tuple[str, ...], results: dict[tuple[str, ...], Result]
+) -> None:
+    ran = results[words]
+    assert ran.code == 0, ran.err
+
+
+@pytest.mark.parametrize(("words", "extra"), NEEDY, ids=[" ".join(words) for words, _ in NEEDY])
+def test_a_command_that_needs_an_extra_names_it(
+    words: tuple[str, ...], extra: str, results: dict[tuple[str, ...], Result]
+) -> None:
+    ran = results[words]
+    assert ran.code == 2, ran.err
+    lines = [line for line in ran.err.splitlines() if line.startswith("snakewalk: ")]
+    assert len(lines) == 1, ran.err
+    assert f"pip install 'snakewalk[{extra}]'" in lines[0]
+
+
+def test_help_of_every_command(tmp_path: Path) -> None:
+    words = [(*words, "--help") for words in commands()]
+    assert len(words) > 25
+    for ran in call(tmp_path, *words):
+        assert ran.code == 0, ran.err
+        assert "Usage: " in ran.out
