@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from snakewalk.controller.app.runs.prepare_gait import prepare_gait
     from snakewalk.controller.app.studies.sweep_measure import measure
     from snakewalk.controller.app.studies.sweep_plan import plan_sweep
-    from snakewalk.controller.gaits.gait import Gait
+    from snakewalk.controller.gaits.gait import Gait, Needs
     from snakewalk.controller.gaits.registry import GAITS, make_gait
     from snakewalk.controller.kinematics.links import BodyView, body_in_world
     from snakewalk.controller.metrics.summary import summary
     from snakewalk.controller.motion.gait_motion import GaitMotion
-    from snakewalk.controller.motion.source import MotionSource
+    from snakewalk.controller.motion.source import MotionSource, Pace
     from snakewalk.controller.runlog.reader import read_log
     from snakewalk.controller.runlog.record import RunRecord
     from snakewalk.controller.runtime.loop import ticks
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from snakewalk.drivers.clock import Clock
     from snakewalk.drivers.errors import DriverError, SafetyTrippedError
     from snakewalk.drivers.link import JointLink
+    from snakewalk.drivers.port.byte_port import BytePort
     from snakewalk.drivers.port.serial_port import SerialPort
     from snakewalk.drivers.safety.safe_link import SafeLink
     from snakewalk.drivers.safety.vet import SafetyLimits
@@ -44,6 +45,7 @@ __all__ = [
     "GAITS",
     "BodyPose",
     "BodyView",
+    "BytePort",
     "Clock",
     "DriverError",
     "DynamixelBus",
@@ -55,6 +57,8 @@ __all__ = [
     "JointLink",
     "JointState",
     "MotionSource",
+    "Needs",
+    "Pace",
     "RobotConfig",
     "RunConfig",
     "RunRecord",
@@ -94,12 +98,12 @@ _NAMES = {
     "controller.app.runs.prepare_gait": ("prepare_gait",),
     "controller.app.studies.sweep_measure": ("measure",),
     "controller.app.studies.sweep_plan": ("plan_sweep",),
-    "controller.gaits.gait": ("Gait",),
+    "controller.gaits.gait": ("Gait", "Needs"),
     "controller.gaits.registry": ("GAITS", "make_gait"),
     "controller.kinematics.links": ("BodyView", "body_in_world"),
     "controller.metrics.summary": ("summary",),
     "controller.motion.gait_motion": ("GaitMotion",),
-    "controller.motion.source": ("MotionSource",),
+    "controller.motion.source": ("MotionSource", "Pace"),
     "controller.runlog.reader": ("read_log",),
     "controller.runlog.record": ("RunRecord",),
     "controller.runtime.loop": ("ticks",),
@@ -109,6 +113,7 @@ _NAMES = {
     "drivers.clock": ("Clock",),
     "drivers.errors": ("DriverError", "SafetyTrippedError"),
     "drivers.link": ("JointLink",),
+    "drivers.port.byte_port": ("BytePort",),
     "drivers.port.serial_port": ("SerialPort",),
     "drivers.safety.safe_link": ("SafeLink",),
     "drivers.safety.vet": ("SafetyLimits",),

@@ -1,6 +1,6 @@
-"""What the overhead camera sees: ``python -m examples.overhead_picture FILE`` draws it."""
+"""Draw what the overhead camera sees, as docs/overhead-camera.md shows it."""
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -52,4 +52,6 @@ def main(file: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("picture", type=Path, help=".png or .jpg")
+    main(options.parse_args().picture)

@@ -1,6 +1,6 @@
-"""Four stills of a film beside each other: `python examples/film_strip.py FILM.mp4 OUT.jpg`."""
+"""Put four stills of a film beside each other."""
 
-import sys
+import argparse
 from pathlib import Path
 
 import av
@@ -22,4 +22,8 @@ def strip(film: Path, picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    strip(Path(sys.argv[1]), Path(sys.argv[2]))
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("film", type=Path)
+    options.add_argument("picture", type=Path, help=".jpg or .png")
+    given = options.parse_args()
+    strip(given.film, given.picture)

@@ -1,6 +1,6 @@
-"""A short film of each gait: ``python examples/gallery.py docs/pictures/gaits [GAIT ...]``."""
+"""Make a short film of each gait, as docs/gaits.md shows them."""
 
-import sys
+import argparse
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -46,4 +46,8 @@ def _last(film: Path) -> list[Image.Image]:
 
 
 if __name__ == "__main__":
-    gallery(Path(sys.argv[1]), sys.argv[2:] or list(GAITS))
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("folder", type=Path, help="for example docs/pictures/gaits")
+    options.add_argument("gait", nargs="*", help="default: all gaits")
+    given = options.parse_args()
+    gallery(given.folder, given.gait or list(GAITS))
