@@ -15,8 +15,8 @@ the program's hands (the kernel passing it on, waking up, parsing). Both are sho
 pseudo-terminal itself was. It does not model what an adapter adds.
 
 Ours is measured as a chain uses it (goals written when they are known, the state read in the next
-cycle: two writes), and as one call, ``GroupCycle.turn`` (both packets in one write). The rivals
-have no such call.
+cycle: two writes), and as one call, ``ControlCycle.transact`` (both packets in one write). The
+rivals have no such call.
 """
 
 import json
@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from benchmarks.rows import Row
 from benchmarks.wire_times import Answer, WireTimes, build_library
 from snakewalk.drivers.bus.budget import wire_budget
-from snakewalk.drivers.bus.control_cycle import GroupCycle
+from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.port.serial_port import SerialPort
 
 TITLE = "Control cycle of 16 servos on a paced pseudo-terminal"
@@ -99,12 +99,12 @@ def ours(
 ) -> tuple[Cycle, Callable[[], None]]:
     """Our codec on our port, and how to close it."""
     port = SerialPort(device, baud)
-    cycle = GroupCycle(port, IDS, fast=fast, latency_s=0.05)
+    cycle = ControlCycle(port, IDS, fast=fast, latency_s=0.05)
     goals = np.full(len(IDS), 2048, np.int32)
 
     def turn(k: int) -> bool:
         if at_once:
-            return bool(cycle.turn(goals + k).valid.all())
+            return bool(cycle.transact(goals + k).valid.all())
         cycle.write_goals(goals + k)
         return bool(cycle.read().valid.all())
 

@@ -14,8 +14,8 @@ from snakewalk.controller.runtime.guide import Guide
 from snakewalk.controller.runtime.loop import ticks
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
-from snakewalk.drivers.safety.vet import SafetyLimits
 from snakewalk.drivers.types import JointCommand
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.physics.plant import MujocoPlant

@@ -32,7 +32,7 @@ class JointLink(Protocol):
         ...
 
 
-class Judgement(Protocol):
+class CommandOutcome(Protocol):
     """What became of one command."""
 
     @property
@@ -55,7 +55,7 @@ class VettedLink(JointLink, Protocol):
         ...
 
     @property
-    def last_verdict(self) -> Judgement | None:
+    def last_verdict(self) -> CommandOutcome | None:
         """On the newest command; None before the first."""
         ...
 

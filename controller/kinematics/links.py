@@ -7,7 +7,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.compiling import compiled, seen
+from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.types import BodyPose
 
 
@@ -93,8 +93,8 @@ def _yaws(joint_axes: str) -> Bools:
 
 
 @compiled(
-    f"void(boolean[::1], {seen(dimensions=2)}, {seen()}, {seen()}, float64,"
-    " float64[:, :, ::1], float64[:, ::1])"
+    f"void(boolean[::1], {readonly_array(dimensions=2)}, {readonly_array()}, {readonly_array()},"
+    " float64, float64[:, :, ::1], float64[:, ::1])"
 )
 def _forward(
     yaws: Bools,

@@ -11,7 +11,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.run import SafetyConfig
-from snakewalk.drivers.compiling import compiled, seen
+from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.types import JointState
 
 LEAST = 0.25
@@ -84,7 +84,8 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
 
 
 @compiled(
-    f"boolean(float64[::1], {seen()}, float64, {seen()}, {seen()}, float64, float64, float64)"
+    f"boolean(float64[::1], {readonly_array()}, float64, {readonly_array()}, {readonly_array()},"
+    " float64, float64, float64)"
 )
 def _plenty(
     mean_a: Floats,

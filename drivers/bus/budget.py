@@ -1,4 +1,4 @@
-"""Wire time of a control cycle: what the bus can do, counted before a run asks for more.
+"""Wire time of a control cycle, computed before a run, and the rate that it allows.
 
 A cycle is one sync write and one sync read, or *fast* sync read, of N servos. Each byte takes ten
 bit times (start, eight data bits, stop). Packet lengths: e-manual, DYNAMIXEL Protocol 2.0.
@@ -14,9 +14,9 @@ GROUP_BYTES = 14
 STATUS_BYTES = 11
 """Status packet without data: header 4, id, length 2, instruction, error, CRC 2."""
 FAST_HEAD_BYTES = 8
-"""Of the common answer to a fast read: header 4, id, length 2, instruction."""
-FAST_SHARE_BYTES = 4
-"""Of each servo in it, beside its data: error, id, CRC 2."""
+"""Common reply to a fast read, without the servos' parts: header 4, id, length 2, instruction."""
+FAST_PART_BYTES = 4
+"""Each servo's part of it, without its data: error, id, CRC 2."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,15 +30,15 @@ class WireBudget:
     """Sync write of the goals."""
     request_bytes: int
     """Sync read instruction."""
-    answer_bytes: int
-    """All servos' answers."""
+    reply_bytes: int
+    """All servos' replies."""
     return_delay_s: float
-    """Sum over the answers."""
+    """Sum over the replies."""
 
     @property
     def total_bytes(self) -> int:
         """On the wire in a cycle."""
-        return self.write_bytes + self.request_bytes + self.answer_bytes
+        return self.write_bytes + self.request_bytes + self.reply_bytes
 
     @property
     def cycle_s(self) -> float:
@@ -46,9 +46,9 @@ class WireBudget:
         return self.total_bytes * BITS_PER_BYTE / self.baud + self.return_delay_s
 
     @property
-    def answer_s(self) -> float:
-        """From the end of the request to the end of the answers."""
-        return self.answer_bytes * BITS_PER_BYTE / self.baud + self.return_delay_s
+    def reply_s(self) -> float:
+        """From the end of the request to the end of the replies."""
+        return self.reply_bytes * BITS_PER_BYTE / self.baud + self.return_delay_s
 
     @property
     def limit_hz(self) -> float:
@@ -90,7 +90,7 @@ def wire_budget(
     Args:
         servos: N, at least 1.
         baud: bit/s.
-        fast: fast sync read (one common answer) instead of sync read (one packet each).
+        fast: fast sync read (one common reply) instead of sync read (one packet each).
         read_bytes: length of the block read from each servo.
         goal_bytes: length of the goal written to each; 0 for a cycle that only reads.
         slow_read_bytes: length of the second block that some cycles read (the slow round); with it
@@ -101,16 +101,16 @@ def wire_budget(
     if servos < 1 or baud < 1:
         raise ValueError(f"a bus has at least one servo and a speed, got {servos} at {baud} baud")
     write = GROUP_BYTES + servos * (1 + goal_bytes) if goal_bytes else 0
-    request = answer = delays = 0
+    request = reply = delays = 0
     for length in (read_bytes, slow_read_bytes):
         if length:
             request += GROUP_BYTES + servos
-            answer += _answer_bytes(servos, length, fast=fast)
+            reply += _reply_bytes(servos, length, fast=fast)
             delays += 1 if fast else servos
-    return WireBudget(servos, baud, fast, write, request, answer, delays * return_delay_s)
+    return WireBudget(servos, baud, fast, write, request, reply, delays * return_delay_s)
 
 
-def _answer_bytes(servos: int, length: int, *, fast: bool) -> int:
+def _reply_bytes(servos: int, length: int, *, fast: bool) -> int:
     if fast:
-        return FAST_HEAD_BYTES + servos * (FAST_SHARE_BYTES + length)
+        return FAST_HEAD_BYTES + servos * (FAST_PART_BYTES + length)
     return servos * (STATUS_BYTES + length)

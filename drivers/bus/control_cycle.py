@@ -2,12 +2,12 @@
 
 Rules, each against something that happens on real buses:
 
-- Servos answer a group read in turn, each after the one before, so those behind a silent one stay
-  silent as well: it is asked last from then on, and costs its own value only.
-- After anything but a complete clean answer the line is drained until quiet.
-- An answer older than its question is never taken for new. Draining alone cannot promise that (an
-  adapter may stall for longer), so after a failure the block asked for has another length, one of
-  which no answer is open (``pending_replies``): what comes late has the wrong one and is dropped.
+- Servos reply to a group read in turn, each after the one before. Those behind a silent servo stay
+  silent as well, so a silent servo is asked last from then on and costs only its own value.
+- After anything but a complete clean reply the line is drained until quiet.
+- A reply older than its request is never taken for new. Draining alone cannot promise that, because
+  an adapter may stall for longer. So after a failure the request asks for a length of which no
+  reply is pending (``pending_replies``), and a late reply is dropped for its wrong length.
 - Fast reads that keep failing are given up for plain ones, where damage ends with its packet.
 """
 
@@ -17,33 +17,39 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.drivers.bus.group_read import GroupAnswer, GroupQuestion
+from snakewalk.config.arrays import Bools
+from snakewalk.drivers.bus.budget import BITS_PER_BYTE
+from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
-from snakewalk.drivers.bus.pending_replies import Debts
-from snakewalk.drivers.bus.serial_fast_path import Express
-from snakewalk.drivers.port.byte_port import AskingPort, BytePort, FilePort
+from snakewalk.drivers.bus.pending_replies import PendingReplies
+from snakewalk.drivers.bus.serial_fast_path import SerialFastPath
+from snakewalk.drivers.port.byte_port import BytePort, DescriptorPort
 
-_PATIENCE = 3
-"""Reads in a row after which a silent servo no longer has a say in the length."""
-_KEPT_QUESTIONS = 64
+FAST_FAILURES = 3
+"""Fast reads failing in a row until plain ones are used (ours)."""
+_CLEAN_READS = 50
+"""Clean reads in a row until the default order is used again (ours)."""
+_MISSED_LIMIT = 3
+"""Missed reads in a row after which a silent servo is ignored in the choice of the length."""
+_KEPT_REQUESTS = 64
 SPIN_S = 40e-6
-"""About how late a program is woken; awake sooner, it costs more of the processor than it saves."""
+"""About how late Linux wakes a program; polling for longer costs more CPU than it saves time."""
 
 
 @dataclass(slots=True)
 class CycleCounters:
-    """What went wrong so far."""
+    """Irregular reads so far."""
 
     reads: int = 0
     timeouts: int = 0
-    """Reads whose deadline passed before all bytes had come."""
+    """Reads whose deadline passed before all bytes had arrived."""
     unclean: int = 0
-    """Reads with noise, damage, or late answers in them."""
+    """Reads with noise, damage, or late replies in them."""
     drained_bytes: int = 0
     fast_given_up: int = 0
 
 
-class GroupCycle:
+class ControlCycle:
     """Goals at ``goal_address`` (4 bytes) and a block of ``read_bytes`` at ``read_address``."""
 
     def __init__(
@@ -56,72 +62,61 @@ class GroupCycle:
         read_bytes: int = 10,
         fast: bool = True,
         latency_s: float = 0.004,
-        return_delay_s: float = 0.0,
-        fast_failures: int = 3,
-        clean_reads: int = 50,
-        debts: Debts | None = None,
+        pending: PendingReplies | None = None,
         spin_s: float = SPIN_S,
     ) -> None:
         """Prepare the packets.
 
         Args:
-            port: the line.
+            port: the line; its servos have a return delay of 0.
             ids: servos, in the order of all arrays here.
             goal_address: of the goal register, 4 bytes.
             read_address: of the block.
             read_bytes: its length.
             fast: begin with fast sync read.
             latency_s: how long adapter and driver may hold bytes back, at most.
-            return_delay_s: of each servo.
-            fast_failures: fast reads failing in a row until plain ones are used.
-            clean_reads: clean reads in a row until the order is the usual one again.
-            debts: answers still open on this port, shared by all who ask on it; None: nobody else.
-            spin_s: on a device, sleep until so long before the answer should be complete, then look
-                without sleeping, at most twice as long: shorter cycles, more CPU; 0: sleep always.
+            pending: pending replies of this port, shared by all who send requests on it; None: only
+                this cycle does.
+            spin_s: on a device, sleep until so long before the reply should be complete, then poll
+                without sleeping, at most twice as long: shorter cycles, more CPU; 0: always sleep.
 
         """
         self._port = port
-        self._asking = port if isinstance(port, AskingPort) else None
-        self._count = len(ids)
         self._goals = GroupWrite(ids, goal_address)
-        self._express: Express | None = None
+        self._fast_path: SerialFastPath | None = None
         self._ids = tuple(ids)
-        self._natural = tuple(range(len(ids)))
-        self._order = self._natural
-        self._questions: dict[tuple[bool, int, tuple[int, ...]], GroupQuestion] = {}
+        self._default_order = tuple(range(len(ids)))
+        self._order = self._default_order
+        self._requests: dict[tuple[bool, int, tuple[int, ...]], GroupReadRequest] = {}
         self._read_address = read_address
         self._length = read_bytes
         self._latency_s = latency_s
-        self._return_delay_s = return_delay_s
-        self._fast_failures = fast_failures
-        self._clean_reads = clean_reads
         self._failed_in_a_row = 0
         self._clean_in_a_row = 0
-        self._debts = debts if debts is not None else Debts(port.clock)
+        self._pending = pending if pending is not None else PendingReplies(port.clock)
         self._missed = np.zeros(len(ids), np.intp)
         self._sent_until_s = port.clock.now_s()
-        self._usual = GroupQuestion(ids, read_address, read_bytes, fast=fast)
-        if isinstance(port, FilePort) and port.file is not None:
-            delay_s = self._delay_s(self._usual)
-            self._express = Express(
-                port, self._goals, self._usual, delay_s=delay_s, latency_s=latency_s, spin_s=spin_s
+        self._default_request = GroupReadRequest(ids, read_address, read_bytes, fast=fast)
+        if isinstance(port, DescriptorPort) and port.descriptor is not None:
+            self._fast_path = SerialFastPath(
+                port, self._goals, self._default_request, latency_s=latency_s, spin_s=spin_s
             )
         self.fast = fast
         """Whether the next read is a fast one."""
         self.counters = CycleCounters()
 
     def write_goals(self, goals: NDArray[np.int32]) -> None:
-        """Send raw goals (N,); servos do not answer a sync write."""
-        if self._express is None:
+        """Send raw goals (N,); servos do not reply to a sync write."""
+        if self._fast_path is None:
             self._send(self._goals.encode(goals))
             return
-        sent = self._express.write(goals)
+        sent = self._fast_path.write(goals)
         if not sent:
             self._send(self._goals.encode(goals))
         elif sent < self._goals.size:
             self._port.write(self._goals.encode(goals)[sent:])
 
-    def turn(self, goals: NDArray[np.int32]) -> GroupAnswer:
+    def transact(self, goals: NDArray[np.int32]) -> GroupReadReply:
         """``write_goals`` and ``read`` in one: both packets leave in one write, back to back.
 
         Raises:
@@ -130,8 +125,8 @@ class GroupCycle:
         """
         return self._read(goals)
 
-    def read(self) -> GroupAnswer:
-        """Ask all servos for their block; ``data`` is (N, read_bytes).
+    def read(self) -> GroupReadReply:
+        """Read the block of all servos; ``data`` is (N, read_bytes).
 
         Raises:
             PortError: the port is gone.
@@ -139,161 +134,147 @@ class GroupCycle:
         """
         return self._read(None)
 
-    def _read(self, goals: NDArray[np.int32] | None) -> GroupAnswer:
-        """Ask, behind goals if there are any."""
+    def _read(self, goals: NDArray[np.int32] | None) -> GroupReadReply:
+        """Send the request, behind goals if there are any, and receive the reply."""
         self.counters.reads += 1
-        express, question, order = self._express, self._question(), self._order
+        fast_path, request, order = self._fast_path, self._next_request(), self._order
         raw = None
-        if express is not None and question is self._usual:
-            found = express.turn(goals)
-            if isinstance(found, GroupAnswer):
+        if fast_path is not None and request is self._default_request:
+            found = fast_path.transact(goals)
+            if isinstance(found, GroupReadReply):
                 self._succeeded()
                 return found
             if found is not None:
-                raw, answer = self._go_on(question, found, express.left_s)
+                raw, reply = self._receive_rest(request, found, fast_path.remaining_s)
         if raw is None:
-            raw, answer = self._ask(question, goals)
-        heard = answer.answered
-        if not self._debts.none:
-            answer = self._believed(question, answer)
-        if answer.clean and answer.complete:
+            raw, reply = self._transact(request, goals)
+        responded = reply.answered
+        if not self._pending.empty:
+            reply = self._without_late(request, reply)
+        if reply.clean and reply.complete:
             self._succeeded()
         else:
-            self._failed(question, answer, heard, timed_out=len(raw) < question.answer_bytes)
-        if order == self._natural and self._length == answer.data.shape[1]:
-            return answer
+            self._failed(request, reply, responded, timed_out=len(raw) < request.reply_bytes)
+        if order == self._default_order and self._length == reply.data.shape[1]:
+            return reply
         back = np.argsort(order)
-        return GroupAnswer(
-            answer.data[back, : self._length],
-            answer.valid[back],
-            answer.error[back],
-            answer.answered[back],
-            answer.clean,
+        return GroupReadReply(
+            reply.data[back, : self._length],
+            reply.valid[back],
+            reply.error[back],
+            reply.answered[back],
+            reply.clean,
         )
 
-    def _believed(self, question: GroupQuestion, answer: GroupAnswer) -> GroupAnswer:
-        """The answer without what may be that to an older question."""
-        known = np.array(
-            [not self._debts.open(i, question.length, fast=question.fast) for i in question.ids]
+    def _without_late(self, request: GroupReadRequest, reply: GroupReadReply) -> GroupReadReply:
+        """The reply without the results that may belong to an older request."""
+        new = np.array(
+            [
+                not self._pending.is_pending(i, request.length, fast=request.fast)
+                for i in request.ids
+            ]
         )
-        if known.all():
-            return answer
-        error = np.where(known, answer.error, 0).astype(np.uint8)
-        return GroupAnswer(
-            answer.data, answer.valid & known, error, answer.answered & known, clean=False
+        if new.all():
+            return reply
+        error = np.where(new, reply.error, 0).astype(np.uint8)
+        return GroupReadReply(
+            reply.data, reply.valid & new, error, reply.answered & new, clean=False
         )
 
-    def _question(self) -> GroupQuestion:
-        length = self._length
-        if self._order is self._natural and self.fast is self._usual.fast and self._debts.none:
-            return self._usual
-        if not self._debts.none:
-            listening = [self._ids[k] for k in np.flatnonzero(self._missed < _PATIENCE)]
-            length = self._debts.free_length(listening, length, fast=self.fast)
+    def _next_request(self) -> GroupReadRequest:
+        """The default request, unless order, kind or length must differ now."""
+        length, default = self._length, self._default_request
+        none_pending = self._pending.empty
+        if self._order is self._default_order and self.fast is default.fast and none_pending:
+            return default
+        if not none_pending:
+            responding = [self._ids[k] for k in np.flatnonzero(self._missed < _MISSED_LIMIT)]
+            length = self._pending.free_length(responding, length, fast=self.fast)
         key = (self.fast, length, self._order)
-        question = self._questions.get(key)
-        if question is None:
-            if len(self._questions) >= _KEPT_QUESTIONS:
-                self._questions.clear()
+        request = self._requests.get(key)
+        if request is None:
+            if len(self._requests) >= _KEPT_REQUESTS:
+                self._requests.clear()
             ids = [self._ids[k] for k in self._order]
-            question = GroupQuestion(ids, self._read_address, length, fast=self.fast)
-            self._questions[key] = question
-        return question
+            request = GroupReadRequest(ids, self._read_address, length, fast=self.fast)
+            self._requests[key] = request
+        return request
 
     def _send(self, packet: bytes) -> None:
-        self._note_sent(len(packet))
-        self._port.write(packet)
-
-    def _note_sent(self, count: int) -> float:
-        """Note when bytes will have left the host (a write does not wait for that); and now."""
-        now_s, wire_s = self._port.clock.now_s(), self._wire_s(count)
-        if self._express is None:
+        """Write, and note when the bytes will have left the host (a write does not wait for it)."""
+        now_s, wire_s = self._port.clock.now_s(), self._wire_s(len(packet))
+        if self._fast_path is None:
             self._sent_until_s = max(now_s, self._sent_until_s) + wire_s
         else:
-            self._sent_until_s = now_s + self._express.occupy(wire_s)
-        return now_s
+            self._sent_until_s = now_s + self._fast_path.reserve_line(wire_s)
+        self._port.write(packet)
 
-    def _go_on(
-        self, question: GroupQuestion, raw: bytes, left_s: float
-    ) -> tuple[bytes, GroupAnswer]:
-        """Take what still comes to what has come."""
-        deadline_s, missing = self._port.clock.now_s() + left_s, question.answer_bytes - len(raw)
+    def _transact(
+        self, request: GroupReadRequest, goals: NDArray[np.int32] | None
+    ) -> tuple[bytes, GroupReadReply]:
+        """Send, and receive until the reply is complete or the deadline has passed."""
+        goal_packet = b"" if goals is None else self._goals.encode(goals)
+        self._port.clearPort()
+        self._send(goal_packet + request.packet)
+        wait_s = self._wire_s(request.reply_bytes) + self._latency_s
+        return self._receive(request, b"", self._sent_until_s + wait_s)
+
+    def _receive_rest(
+        self, request: GroupReadRequest, raw: bytes, remaining_s: float
+    ) -> tuple[bytes, GroupReadReply]:
+        """Receive the rest of an irregular reply of which ``raw`` has arrived."""
+        return self._receive(request, raw, self._port.clock.now_s() + remaining_s)
+
+    def _receive(
+        self, request: GroupReadRequest, raw: bytes, deadline_s: float
+    ) -> tuple[bytes, GroupReadReply]:
+        """Receive and parse the reply, and then what stuffing has added to it."""
+        missing = request.reply_bytes - len(raw)
         if missing > 0:
             raw += self._port.read_until(missing, deadline_s)
-        return self._complete(question, raw, deadline_s)
-
-    def _answer_s(self, question: GroupQuestion) -> float:
-        """How long the answer takes, return delays included."""
-        return self._wire_s(question.answer_bytes) + self._delay_s(question)
-
-    def _delay_s(self, question: GroupQuestion) -> float:
-        return (1 if question.fast else self._count) * self._return_delay_s
-
-    def _ask(
-        self, question: GroupQuestion, goals: NDArray[np.int32] | None
-    ) -> tuple[bytes, GroupAnswer]:
-        """Ask, and take all that comes until the answer is complete or the deadline has passed."""
-        port, before = self._port, b"" if goals is None else self._goals.encode(goals)
-        request = before + question.request
-        wait_s = self._answer_s(question)
-        if self._asking is not None:
-            now_s = self._note_sent(len(request))
-            deadline_s = self._sent_until_s + wait_s + self._latency_s
-            raw = self._asking.ask(request, question.answer_bytes, deadline_s - now_s)
-        else:
-            port.clearPort()
-            self._send(request)
-            deadline_s = self._sent_until_s + wait_s + self._latency_s
-            raw = port.read_until(question.answer_bytes, deadline_s)
-        return self._complete(question, raw, deadline_s)
-
-    def _complete(
-        self, question: GroupQuestion, raw: bytes, deadline_s: float
-    ) -> tuple[bytes, GroupAnswer]:
-        """Read the answer, and take what stuffing has added to it."""
-        answer = question.parse(raw)
-        while len(raw) >= question.answer_bytes and not answer.complete:
-            more = question.missing_bytes(raw)  # stuffed bytes come on top
+        reply = request.parse(raw)
+        while len(raw) >= request.reply_bytes and not reply.complete:
+            more = request.missing_bytes(raw)  # stuffed bytes come on top
             got = self._port.read_until(more, deadline_s + self._wire_s(more)) if more else b""
             if not got:
                 break
             raw += got
-            answer = question.parse(raw)
-        return raw, answer
+            reply = request.parse(raw)
+        return raw, reply
 
     def _wire_s(self, count: int) -> float:
-        return count * 10.0 / self._port.getBaudRate()
+        return count * BITS_PER_BYTE / self._port.getBaudRate()
 
     def _succeeded(self) -> None:
         self._clean_in_a_row += 1
         if self._clean_in_a_row == 1:
             self._failed_in_a_row = 0
             self._missed[:] = 0
-        if self._clean_in_a_row >= self._clean_reads:
-            self._order = self._natural
+        if self._clean_in_a_row >= _CLEAN_READS:
+            self._order = self._default_order
 
     def _failed(
         self,
-        question: GroupQuestion,
-        answer: GroupAnswer,
-        heard: NDArray[np.bool_],
+        request: GroupReadRequest,
+        reply: GroupReadReply,
+        responded: Bools,
         *,
         timed_out: bool,
     ) -> None:
-        """Count, and prepare for what may still come; ``heard`` is who said anything at all."""
+        """Count, and prepare for late replies; ``responded``: who sent any status packet at all."""
         self.counters.timeouts += timed_out
         self.counters.unclean += not timed_out
         self._clean_in_a_row = 0
         self._failed_in_a_row += 1
-        if self.fast and self._failed_in_a_row >= self._fast_failures:
+        if self.fast and self._failed_in_a_row >= FAST_FAILURES:
             self.fast = False
             self.counters.fast_given_up += 1
         order = self._order
         asked = list(order)
-        self._missed[asked] = np.where(heard, 0, self._missed[asked] + 1)
-        missing = np.flatnonzero(~answer.answered)
-        self._debts.owe([question.ids[k] for k in missing], question.length, fast=question.fast)
-        if not heard.all():
-            first = int(np.argmin(heard))  # those behind it had no chance
+        self._missed[asked] = np.where(responded, 0, self._missed[asked] + 1)
+        missing = np.flatnonzero(~reply.answered)
+        self._pending.add([request.ids[k] for k in missing], request.length, fast=request.fast)
+        if not responded.all():
+            first = int(np.argmin(responded))  # those behind it could not respond
             self._order = (*order[:first], *order[first + 1 :], order[first])
         self.counters.drained_bytes += self._port.drain_until_quiet(self._latency_s)

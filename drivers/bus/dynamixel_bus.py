@@ -18,8 +18,8 @@ from typing import TypeVar
 
 import dynamixel_sdk as sdk
 
-from snakewalk.drivers.bus.control_cycle import GroupCycle
-from snakewalk.drivers.bus.pending_replies import Debts
+from snakewalk.drivers.bus.control_cycle import ControlCycle
+from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.bus.probe import Probe, probe
 from snakewalk.drivers.bus.register_io import check_accepted, read_register, write_register
 from snakewalk.drivers.errors import BusError, NoAnswerError
@@ -66,7 +66,7 @@ class DynamixelBus:
         self.latency_s = latency_s
         """How long adapter and driver may hold bytes back (FTDI: its latency timer)."""
         self._tries = max(1, tries)
-        self._debts = Debts(port.clock)
+        self._pending = PendingReplies(port.clock)
         self._sdk = sdk.PacketHandler(2.0)
 
     def ping(self, servo_id: int) -> Found:
@@ -80,7 +80,7 @@ class DynamixelBus:
         def once() -> Found:
             number, result, error = self._sdk.ping(self.port, servo_id)
             if result != sdk.COMM_SUCCESS:
-                self._debts.owe([servo_id], _PING_BYTES, fast=False)
+                self._pending.add([servo_id], _PING_BYTES, fast=False)
             self._came(result, servo_id, "ping")
             return Found(servo_id, number, None, bool(error & ALERT))
 
@@ -98,14 +98,14 @@ class DynamixelBus:
 
     def scan(self) -> dict[int, Found]:
         """All servos at the port's baud rate, by a broadcast ping; takes most of a second."""
-        answers, _ = self._guarded(lambda: self._sdk.broadcastPing(self.port))
+        replies, _ = self._guarded(lambda: self._sdk.broadcastPing(self.port))
         return {
             servo_id: Found(servo_id, number, firmware, False)
-            for servo_id, (number, firmware) in sorted(answers.items())
+            for servo_id, (number, firmware) in sorted(replies.items())
         }
 
     def probe(self, servo_id: int, asked: int = 5) -> Probe:
-        """Ping and listen to the end: finds two servos of one ID, which a ping does not."""
+        """Ping and receive to the end: finds two servos of one ID, which a ping does not."""
         return probe(self.port, servo_id, asked, self.latency_s)
 
     def read(self, servo_id: int, name: str) -> int:
@@ -119,7 +119,7 @@ class DynamixelBus:
         """
         register = self.table.register(name)
         data = self._retry(
-            lambda: read_register(self.port, servo_id, register, self.latency_s, self._debts)
+            lambda: read_register(self.port, servo_id, register, self.latency_s, self._pending)
         )
         return register.decode(data)
 
@@ -135,7 +135,9 @@ class DynamixelBus:
         register = self.table.register(name)
         data = register.encode(value)
         self._retry(
-            lambda: write_register(self.port, servo_id, register, data, self.latency_s, self._debts)
+            lambda: write_register(
+                self.port, servo_id, register, data, self.latency_s, self._pending
+            )
         )
 
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
@@ -176,7 +178,7 @@ class DynamixelBus:
 
         self._retry(once)
 
-    def cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> GroupCycle:
+    def cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> ControlCycle:
         """Codec of the control cycle for these servos: Goal Position out, current to position in.
 
         Raises:
@@ -185,7 +187,7 @@ class DynamixelBus:
         """
         return self.block(servo_ids, "Present Current", "Present Position", fast=fast)
 
-    def slow_cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> GroupCycle:
+    def slow_cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> ControlCycle:
         """Codec that reads voltage and temperature.
 
         Raises:
@@ -196,7 +198,7 @@ class DynamixelBus:
 
     def block(
         self, servo_ids: Sequence[int], first: str, last: str, *, fast: bool = True
-    ) -> GroupCycle:
+    ) -> ControlCycle:
         """Codec that reads the registers from ``first`` to ``last``, both included.
 
         Raises:
@@ -204,7 +206,7 @@ class DynamixelBus:
 
         """
         start, end = self.table[first].address, self.table[last].address + self.table[last].size
-        return GroupCycle(
+        return ControlCycle(
             self.port,
             servo_ids,
             goal_address=self.table["Goal Position"].address,
@@ -212,7 +214,7 @@ class DynamixelBus:
             read_bytes=end - start,
             fast=fast,
             latency_s=self.latency_s,
-            debts=self._debts,
+            pending=self._pending,
         )
 
     def _retry(self, once: Callable[[], T]) -> T:

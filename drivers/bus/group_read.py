@@ -1,8 +1,8 @@
-"""Answers of many servos to one (fast) sync read: bytes to one result per servo.
+"""Group reads: one (fast) sync read to many servos, and their reply as one result per servo.
 
-The plain case, all answers there and none stuffed, is one compiled or vectorised pass
-(``drivers.protocol.frames``). Everything else goes the slow way and yields what can be proved
-to belong to the question, servo by servo.
+The regular reply, complete and without stuffing, is decoded in one compiled pass
+(``drivers.protocol.frames``). Any other reply is searched for the results that can be proved to
+belong to the request, servo by servo.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bytes
+from snakewalk.config.arrays import Bools, Bytes
 from snakewalk.drivers.protocol.crc import crc16
 from snakewalk.drivers.protocol.frames import FLAWLESS, HEAD, IRREGULAR, read_fast, read_plain
 from snakewalk.drivers.protocol.packet import (
@@ -23,47 +23,47 @@ from snakewalk.drivers.protocol.packet import (
     StatusPacket,
     encode_instruction,
 )
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 
 S = TypeVar("S", bound=np.generic)
 _RESULT = 0x7F
 
 
-class GroupAnswer(NamedTuple):
-    """One result per servo, in the order asked."""
+class GroupReadReply(NamedTuple):
+    """One result per servo, in the order of the request."""
 
     data: Bytes
-    """(N, length) the block read; meaningless where not ``valid``."""
-    valid: NDArray[np.bool_]
-    """(N,) answered in this cycle, with the right CRC and length and without a result error."""
+    """(N, length) the block; meaningless where not ``valid``."""
+    valid: Bools
+    """(N,) replied in this cycle, with the right CRC and length and without a result error."""
     error: Bytes
-    """(N,) error byte of the answer; 0 where there was none."""
-    answered: NDArray[np.bool_]
-    """(N,) whether a status packet came at all."""
+    """(N,) error byte of the reply; 0 where there was none."""
+    answered: Bools
+    """(N,) whether a status packet arrived at all."""
     clean: bool
-    """Nothing but the expected bytes was on the line."""
+    """Whether only the expected bytes were on the line."""
     whole: bool = False
-    """Known to be complete, as it came in one piece."""
+    """Known to be complete: a regular reply."""
 
     @property
     def complete(self) -> bool:
-        """Whether all have answered."""
+        """Whether all servos have replied."""
         return self.whole or int(np.count_nonzero(self.answered)) == len(self.answered)
 
 
-class GroupQuestion:
+class GroupReadRequest:
     """One sync read of ``length`` bytes at ``address`` from ``ids``, fast or plain."""
 
     def __init__(self, ids: Sequence[int], address: int, length: int, *, fast: bool) -> None:
         params = address.to_bytes(2, "little") + length.to_bytes(2, "little") + bytes(ids)
         kind = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ
-        self.request = encode_instruction(InstructionPacket(BROADCAST_ID, kind, params))
+        self.packet = encode_instruction(InstructionPacket(BROADCAST_ID, kind, params))
         self.fast = fast
         self.frame_bytes = length + (4 if fast else 11)
-        """Of one servo's share of the answer, without stuffing."""
+        """Of one servo in the reply, without stuffing."""
         self.ids = tuple(ids)
         self.length = length
-        """Of the block asked for."""
+        """Of the block."""
         self._index = {servo_id: k for k, servo_id in enumerate(ids)}
         count = len(self.ids)
         share = (count * self.frame_bytes + 1).to_bytes(2, "little")
@@ -74,41 +74,41 @@ class GroupQuestion:
         )
         heads = self._fast_head if fast else heads
         self.heads = np.frombuffer(heads, np.uint8).reshape(-1, HEAD).copy()
-        """(N, 8) how the answers must begin; (1, 8) if fast."""
+        """(N, 8) expected heads of the replies; (1, 8) if fast."""
         self._id_bytes = np.array(self.ids, np.uint8)
         self._error = np.zeros(count, np.uint8)
-        self._all_there = _constant(np.ones(count, np.bool_))
+        self._all = _constant(np.ones(count, np.bool_))
         self._no_error = _constant(np.zeros(count, np.uint8))
-        self.answer_bytes = (len(self._fast_head) if fast else 0) + count * self.frame_bytes
-        """Length of the whole answer when nothing is stuffed."""
+        self.reply_bytes = (len(self._fast_head) if fast else 0) + count * self.frame_bytes
+        """Length of the whole reply without stuffing."""
 
-    def parse(self, raw: bytes) -> GroupAnswer:
-        """Find each servo's result in all that came between the question and its deadline."""
-        if len(raw) == self.answer_bytes:
-            answer = self._regular(np.frombuffer(raw, np.uint8))
-            if answer is not None:
-                return answer
+    def parse(self, raw: bytes) -> GroupReadReply:
+        """Find each servo's result in the bytes that arrived before the deadline."""
+        if len(raw) == self.reply_bytes:
+            reply = self._regular(np.frombuffer(raw, np.uint8))
+            if reply is not None:
+                return reply
         return self._salvage_fast(raw) if self.fast else self._salvage_plain(raw)
 
-    def regular(self, found: int, data: Bytes, error: Bytes) -> GroupAnswer:
-        """All replies as they should be: what the frame reader found; ``data`` is kept."""
-        there = self._all_there
+    def regular(self, found: int, data: Bytes, error: Bytes) -> GroupReadReply:
+        """Regular reply: ``found`` is what the frame reader returned; ``data`` is kept."""
+        everyone = self._all
         if found == FLAWLESS:
-            return GroupAnswer(data, there, self._no_error, there, clean=True, whole=True)
+            return GroupReadReply(data, everyone, self._no_error, everyone, clean=True, whole=True)
         error = error.copy()
-        return GroupAnswer(data, (error & _RESULT) == 0, error, there, clean=True, whole=True)
+        return GroupReadReply(data, (error & _RESULT) == 0, error, everyone, clean=True, whole=True)
 
     def missing_bytes(self, raw: bytes) -> int:
-        """How many bytes more would complete plain answers that stuffing made longer; 0 if none."""
+        """How many bytes more would complete plain replies that stuffing made longer; 0 if none."""
         if self.fast:
             return 0
-        reader = PacketReader()
-        seen = {p.servo_id for p in reader.feed(raw)}
-        missing = sum(servo_id not in seen for servo_id in self.ids)
+        reader = PacketParser()
+        complete = {p.servo_id for p in reader.feed(raw)}
+        missing = sum(servo_id not in complete for servo_id in self.ids)
         return max(1, missing * self.frame_bytes - reader.pending) if missing else 0
 
-    def _regular(self, raw: Bytes) -> GroupAnswer | None:
-        """All answers as they should be; None if anything is otherwise."""
+    def _regular(self, raw: Bytes) -> GroupReadReply | None:
+        """The reply if it is regular, else None."""
         data = np.empty((len(self.ids), self.length), np.uint8)
         if self.fast:
             found = read_fast(raw, self.heads[0], self._id_bytes, data, self._error)
@@ -118,27 +118,27 @@ class GroupQuestion:
             return None
         return self.regular(found, data, self._error)
 
-    def _salvage_plain(self, raw: bytes) -> GroupAnswer:
-        reader = PacketReader()
+    def _salvage_plain(self, raw: bytes) -> GroupReadReply:
+        reader = PacketParser()
         packets = reader.feed(raw)
-        strange = reader.dropped_bytes + reader.pending
+        unexpected = reader.dropped_bytes + reader.pending
         found: dict[int, StatusPacket] = {}
         twice: set[int] = set()
         for packet in packets:
             if not isinstance(packet, StatusPacket) or packet.servo_id not in self._index:
-                strange += 1
+                unexpected += 1
             elif len(packet.params) not in (self.length, 0):
-                strange += 1  # the answer to another question: an older one
+                unexpected += 1  # the reply to another, older request
             elif packet.servo_id in found:
                 twice.add(packet.servo_id)
             else:
                 found[packet.servo_id] = packet
         for servo_id in twice:
             del found[servo_id]  # which of the two is new cannot be known
-        return self._partial(found, clean=not strange and not twice)
+        return self._partial(found, clean=not unexpected and not twice)
 
-    def _salvage_fast(self, raw: bytes) -> GroupAnswer:
-        """Shares in front of the first damage, each proved by its CRC of everything so far."""
+    def _salvage_fast(self, raw: bytes) -> GroupReadReply:
+        """Results in front of the first damage, each proved by its CRC of everything so far."""
         found: dict[int, StatusPacket] = {}
         start = raw.find(self._fast_head)
         if start < 0:
@@ -157,7 +157,7 @@ class GroupQuestion:
             at += self.frame_bytes
         return self._partial(found, clean=start == 0 and at == len(raw))
 
-    def _partial(self, found: dict[int, StatusPacket], *, clean: bool) -> GroupAnswer:
+    def _partial(self, found: dict[int, StatusPacket], *, clean: bool) -> GroupReadReply:
         count = len(self.ids)
         data = np.zeros((count, self.length), np.uint8)
         valid, answered = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
@@ -165,11 +165,11 @@ class GroupQuestion:
         for servo_id, packet in found.items():
             k = self._index[servo_id]
             answered[k], error[k] = True, packet.error
-            # an error status may come without data: an answer, but no value
+            # an error status may lack data: a reply, but no value
             if packet.result == 0 and len(packet.params) == self.length:
                 data[k] = np.frombuffer(packet.params, np.uint8)
                 valid[k] = True
-        return GroupAnswer(data, valid, error, answered, clean)
+        return GroupReadReply(data, valid, error, answered, clean)
 
 
 def _constant(array: NDArray[S]) -> NDArray[S]:

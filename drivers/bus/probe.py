@@ -1,7 +1,7 @@
-"""Pings that are listened to until the line is quiet: who shares an ID, whose answers are damaged.
+"""Pings that receive until the line is quiet: which servos share an ID, whose replies are damaged.
 
-Servos with the same ID answer at the same time. Their bytes run into each other, or, where return
-delays or clocks differ, both arrive; one strict ping would show neither.
+Servos with the same ID reply at the same time. Their bytes collide, or both replies arrive where
+return delays or clocks differ; one strict ping would show neither.
 """
 
 from dataclasses import dataclass
@@ -14,25 +14,25 @@ from snakewalk.drivers.protocol.packet import (
     StatusPacket,
     encode_instruction,
 )
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 
-_ANSWER_BYTES = STATUS_BYTES + 3
+_REPLY_BYTES = STATUS_BYTES + 3
 _SETTLE_S = 2e-3
-"""Longest return delay (0.5 ms) and then some."""
+"""Longer than the longest return delay (0.508 ms)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """What came of pinging one ID several times."""
+    """Result of pinging one ID several times."""
 
     servo_id: int
     asked: int
     answered: int
-    """Pings with at least one good answer."""
+    """Pings with at least one good reply."""
     doubled: int
-    """Good answers beyond one a ping: two servos; a late one makes up for a missing one."""
+    """Good replies beyond one a ping: two servos; a late reply makes up for a missing one."""
     damaged: int
-    """Pings after which bytes came that are no packet: two servos, or a bad line."""
+    """Pings after which bytes arrived that are no packet: two servos, or a bad line."""
 
 
 def probe(port: BytePort, servo_id: int, asked: int, latency_s: float) -> Probe:
@@ -44,17 +44,17 @@ def probe(port: BytePort, servo_id: int, asked: int, latency_s: float) -> Probe:
     """
     packet = encode_instruction(InstructionPacket(servo_id, Instruction.PING))
     answered = total = damaged = 0
-    wait_s = (len(packet) + 2 * _ANSWER_BYTES) * BITS_PER_BYTE / port.getBaudRate()
+    wait_s = (len(packet) + 2 * _REPLY_BYTES) * BITS_PER_BYTE / port.getBaudRate()
     for _ in range(asked):
         port.clearPort()
         port.write(packet)
         deadline_s = port.clock.now_s() + wait_s + _SETTLE_S + latency_s
-        reader = PacketReader()
-        answers = 0
-        while data := port.read_until(_ANSWER_BYTES, deadline_s):
-            for answer in reader.feed(data):
-                answers += isinstance(answer, StatusPacket) and answer.servo_id == servo_id
-        answered += answers > 0
-        total += answers
+        reader = PacketParser()
+        replies = 0
+        while data := port.read_until(_REPLY_BYTES, deadline_s):
+            for reply in reader.feed(data):
+                replies += isinstance(reply, StatusPacket) and reply.servo_id == servo_id
+        answered += replies > 0
+        total += replies
         damaged += reader.dropped_bytes + reader.pending > 0
     return Probe(servo_id, asked, answered, max(0, total - asked), damaged)

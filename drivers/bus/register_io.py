@@ -1,7 +1,7 @@
-"""One instruction to one servo and its status packet, strictly: the way around the SDK."""
+"""Reading and writing one register of one servo, with a strict codec in place of the SDK's."""
 
 from snakewalk.drivers.bus.budget import BITS_PER_BYTE, STATUS_BYTES
-from snakewalk.drivers.bus.pending_replies import Debts
+from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.errors import BusError, NoAnswerError, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import Register
@@ -13,36 +13,35 @@ from snakewalk.drivers.protocol.packet import (
     StatusPacket,
     encode_instruction,
 )
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 
-_ANSWER_S = 0.034
-"""What the SDK, too, grants a servo for thinking and the adapter for passing on."""
+_REPLY_S = 0.034
+"""Time for servo and adapter beside the wire; the SDK's packet time-out has the same."""
 
 
 def read_register(
-    port: BytePort, servo_id: int, register: Register, latency_s: float, debts: Debts | None = None
+    port: BytePort, servo_id: int, register: Register, latency_s: float, pending: PendingReplies
 ) -> bytes:
     """Bytes of a register.
 
-    Asks for more bytes than the register has while an answer of its length is open.
+    Requests more bytes than the register has while a reply of its length is pending.
 
     Raises:
         NoAnswerError: nobody answered.
         ServoError: the servo refused.
-        BusError: the answer has another length.
+        BusError: the reply has a wrong length.
 
     """
     what = f"read {register.name}"
-    debts = debts if debts is not None else Debts(port.clock)
     length = register.size
-    if not debts.none:
-        length = debts.free_length([servo_id], length, fast=False)
+    if not pending.empty:
+        length = pending.free_length([servo_id], length, fast=False)
     span = register.address.to_bytes(2, "little") + length.to_bytes(2, "little")
     packet = InstructionPacket(servo_id, Instruction.READ, span)
     try:
-        status = _exchange(port, packet, what, length, latency_s, debts)
+        status = _exchange(port, packet, what, length, latency_s, pending)
     except NoAnswerError:
-        debts.owe([servo_id], length, fast=False)
+        pending.add([servo_id], length, fast=False)
         raise
     if len(status.params) != length:
         raise BusError(f"servo {servo_id}: {what}: {len(status.params)} bytes came, not {length}")
@@ -55,7 +54,7 @@ def write_register(
     register: Register,
     data: bytes,
     latency_s: float,
-    debts: Debts | None = None,
+    pending: PendingReplies,
 ) -> None:
     """Write ``data`` to a register.
 
@@ -64,10 +63,9 @@ def write_register(
         ServoError: the servo refused.
 
     """
-    debts = debts if debts is not None else Debts(port.clock)
     params = register.address.to_bytes(2, "little") + data
     packet = InstructionPacket(servo_id, Instruction.WRITE, params)
-    _exchange(port, packet, f"write {register.name}", 0, latency_s, debts)
+    _exchange(port, packet, f"write {register.name}", 0, latency_s, pending)
 
 
 def check_accepted(servo_id: int, what: str, error: int) -> None:
@@ -85,31 +83,31 @@ def _exchange(
     what: str,
     data_bytes: int,
     latency_s: float,
-    debts: Debts,
+    pending: PendingReplies,
 ) -> StatusPacket:
-    reader = PacketReader()
+    reader = PacketParser()
     raw, expected = encode_instruction(packet), STATUS_BYTES + data_bytes
     port.clearPort()
     port.write(raw)
     wire_s = (len(raw) + expected) * BITS_PER_BYTE / port.getBaudRate()
-    deadline_s = port.clock.now_s() + wire_s + _ANSWER_S + latency_s
+    deadline_s = port.clock.now_s() + wire_s + _REPLY_S + latency_s
     missing = expected
     while data := port.read_until(missing, deadline_s):
-        for answer in reader.feed(data):
+        for reply in reader.feed(data):
             if (
-                isinstance(answer, StatusPacket)
-                and answer.servo_id == packet.servo_id
-                and not _old(answer, data_bytes, debts)
+                isinstance(reply, StatusPacket)
+                and reply.servo_id == packet.servo_id
+                and not _is_other(reply, data_bytes, pending)
             ):
-                check_accepted(packet.servo_id, what, answer.error)
-                return answer
+                check_accepted(packet.servo_id, what, reply.error)
+                return reply
         missing = max(1, expected - reader.pending)  # stuffing or noise made it longer
     raise NoAnswerError(f"servo {packet.servo_id}: {what}: no answer at {port.getBaudRate()} baud")
 
 
-def _old(answer: StatusPacket, data_bytes: int, debts: Debts) -> bool:
-    """Whether an answer is known to be that to another question."""
-    length = len(answer.params)
-    if length == data_bytes or answer.result:
+def _is_other(reply: StatusPacket, data_bytes: int, pending: PendingReplies) -> bool:
+    """Whether a reply is known to belong to another request."""
+    length = len(reply.params)
+    if length == data_bytes or reply.result:
         return False
-    return length == 0 or data_bytes == 0 or debts.open(answer.servo_id, length, fast=False)
+    return length == 0 or data_bytes == 0 or pending.is_pending(reply.servo_id, length, fast=False)

@@ -1,7 +1,7 @@
-"""Cycles while all goes as it should, nearly all of it compiled.
+"""The regular control cycle on a serial device, nearly all of it compiled.
 
-It takes only what is exactly as expected. Anything else is handed back as it came, and the careful
-way of ``GroupCycle`` goes on with it.
+The fast path accepts only replies that are exactly as expected. Anything else is handed back as it
+arrived, and ``ControlCycle`` continues with it.
 """
 
 import numpy as np
@@ -9,49 +9,49 @@ from numba import boolean, int32, int64, intp, types, uint8, uintp
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bytes
-from snakewalk.drivers.bus.group_read import GroupAnswer, GroupQuestion
+from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.compiling import compiled
-from snakewalk.drivers.port.byte_port import FilePort
-from snakewalk.drivers.port.serial_wait import listen, now_ns, put
+from snakewalk.drivers.port.byte_port import DescriptorPort
+from snakewalk.drivers.port.serial_wait import now_ns, receive, send
 from snakewalk.drivers.protocol.frames import FLAWLESS, HEAD, IRREGULAR, fill, read_fast, read_plain
 
 _NO_GOALS = np.zeros(0, np.int32)
-_BITS_NS = 10_000_000_000
-"""Ten bits a byte: times bytes, by the baud rate."""
+_BYTE_NS_BAUD = 10_000_000_000
+"""Ten bits a byte: times bytes, divided by the baud rate, ns."""
 
 
-HABIT = 0
-"""In a plan, 2 numbers: as ``new_habit`` makes them."""
-FREE_NS, BEGUN_NS, LEFT_NS = 2, 3, 4
-"""When what was sent has left the line; when the question was put; after a cycle that went wrong,
-how long its answer may still take."""
-WRITE_BYTES, ASK_BYTES, HEADS_END, IDS_END, ERROR_END = 5, 6, 7, 8, 9
-"""Length of the sync write and of the question behind it; where in ``work`` the heads that an
-answer must have end, the IDs, and the error bytes; behind them is the answer."""
+LATENCY_ESTIMATE = 0
+"""In a plan, 2 numbers: from ``new_latency_estimate``."""
+FREE_NS, BEGUN_NS, REMAINING_NS = 2, 3, 4
+"""When all sent bytes have left the line; when the request was sent; how long the reply of an
+irregular cycle may still take."""
+WRITE_BYTES, REQUEST_BYTES, HEADS_END, IDS_END, ERROR_END = 5, 6, 7, 8, 9
+"""Length of the sync write and of the request behind it; where in ``work`` the expected heads of
+the replies end, the IDs, and the error bytes. The reply stands behind them."""
 FAST = 10
-"""1: the answer is one to a fast read."""
-WRITE_NS, ASK_NS, ANSWER_NS, LATENCY_NS = 11, 12, 13, 14
-"""How long the packets are on the line, and what may delay the answer."""
+"""1: the request is a fast read."""
+WRITE_NS, REQUEST_NS, REPLY_NS, LATENCY_NS = 11, 12, 13, 14
+"""How long the packets are on the line, and how much later the reply may be."""
 SPIN_NS = 15
-"""As ``listen`` has it."""
+"""Argument of ``receive``."""
 PLAN_SIZE = 16
 _write = types.ExternalFunction("write", intp(int32, intp, uintp))
 _ROW, _ROWS = uint8[::1], uint8[:, ::1]
 
 
 @compiled(int64(int64[::1], int64, int64))
-def _occupy(plan: NDArray[np.int64], from_ns: int, wire_ns: int) -> int:
-    """Note what was sent at ``from_ns``; how long from then until it has left the line, ns."""
+def _reserve_line(plan: NDArray[np.int64], from_ns: int, wire_ns: int) -> int:
+    """Note what was sent at ``from_ns``; returns how long until it has left the line, ns."""
     plan[FREE_NS] = max(from_ns, plan[FREE_NS]) + wire_ns
     return int(plan[FREE_NS] - from_ns)
 
 
 @compiled(int64(int32, _ROW, int32[::1], int64[::1]))
-def _send(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64]) -> int:
-    """Put ``values`` into the sync write and send it; how many bytes were taken.
+def _send_goals(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64]) -> int:
+    """Fill ``values`` into the sync write and send it; returns how many bytes were taken.
 
-    None are where the frame must be stuffed, or the device is gone or full.
+    None are taken where the frame must be stuffed, or the device is gone or full.
     """
     frame = work[: plan[WRITE_BYTES]]
     if not fill(frame, values):
@@ -59,139 +59,136 @@ def _send(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int6
     begun_ns = now_ns()
     sent = max(0, int(_write(fd, frame.ctypes.data, len(frame))))
     if sent > 0:
-        _occupy(plan, begun_ns, plan[WRITE_NS])
+        _reserve_line(plan, begun_ns, plan[WRITE_NS])
     return sent
 
 
 @compiled(int64(int32, _ROW, int32[::1], int64[::1]))
-def _ask(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64]) -> int:
-    """Put the question, behind ``values`` if there are any; how many bytes were taken.
+def _send_request(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64]) -> int:
+    """Discard the input, send the request, behind ``values`` if there are any.
 
-    What had come before is thrown away.
+    Returns how many bytes were taken.
     """
     begin = int(plan[WRITE_BYTES])
-    end = begin + int(plan[ASK_BYTES])
+    end = begin + int(plan[REQUEST_BYTES])
     if len(values) > 0:
         if not fill(work[:begin], values):
             return 0
         begin = 0
     plan[BEGUN_NS] = now_ns()
-    return int(put(fd, work[begin:end]))
+    return int(send(fd, work[begin:end]))
 
 
 @compiled(int64(int32, _ROW, _ROWS, boolean, int64[::1]), nogil=True)
-def _hear(fd: int, work: Bytes, data: Bytes, with_goals: bool, plan: NDArray[np.int64]) -> int:
-    """Wait for the answer, and read it.
+def _receive(fd: int, work: Bytes, data: Bytes, with_goals: bool, plan: NDArray[np.int64]) -> int:
+    """Wait for the reply and decode it.
 
     Args:
-        fd: does not block.
-        work: packets, what is expected, and what has come, in the order that the plan says.
+        fd: descriptor, non-blocking.
+        work: packets, what is expected, and the reply, in the order of the plan.
         data: (N, length) filled, unless irregular.
-        with_goals: whether the question went behind goals.
+        with_goals: whether the request was sent behind goals.
         plan: (``PLAN_SIZE``,) the numbers above.
 
     Returns:
-        What the frame reader says of a complete answer; ``-1 - n``: only ``n`` bytes have come.
+        What the frame reader says of a complete reply; ``-1 - n``: only ``n`` bytes arrived.
 
     """
-    begun_ns, wire_ns = int(plan[BEGUN_NS]), int(plan[ASK_NS])
+    begun_ns, wire_ns = int(plan[BEGUN_NS]), int(plan[REQUEST_NS])
     if with_goals:
         wire_ns += int(plan[WRITE_NS])
-    least_ns = _occupy(plan, begun_ns, wire_ns) + int(plan[ANSWER_NS])
+    least_ns = _reserve_line(plan, begun_ns, wire_ns) + int(plan[REPLY_NS])
     wait_ns = least_ns + int(plan[LATENCY_NS])
-    asked = int(plan[WRITE_BYTES] + plan[ASK_BYTES])
+    request_end = int(plan[WRITE_BYTES] + plan[REQUEST_BYTES])
     heads_end, ids_end, error_end = plan[HEADS_END], plan[IDS_END], plan[ERROR_END]
-    answer, error = work[error_end:], work[ids_end:error_end]
-    habit = plan[HABIT : HABIT + 2]
-    got = listen(fd, answer, begun_ns, least_ns, wait_ns, plan[SPIN_NS], habit)
-    if got < len(answer):
+    reply, error = work[error_end:], work[ids_end:error_end]
+    latency_estimate = plan[LATENCY_ESTIMATE : LATENCY_ESTIMATE + 2]
+    got = receive(fd, reply, begun_ns, least_ns, wait_ns, plan[SPIN_NS], latency_estimate)
+    if got < len(reply):
         found = -1 - int(got)
     elif plan[FAST]:
-        head, ids = work[asked:heads_end], work[heads_end:ids_end]
-        found = int(read_fast(answer, head, ids, data, error))
+        head, ids = work[request_end:heads_end], work[heads_end:ids_end]
+        found = int(read_fast(reply, head, ids, data, error))
     else:
-        heads = work[asked:heads_end].reshape(len(data), HEAD)
-        found = int(read_plain(answer, heads, data, error))
+        heads = work[request_end:heads_end].reshape(len(data), HEAD)
+        found = int(read_plain(reply, heads, data, error))
     if found <= 0:
-        plan[LEFT_NS] = begun_ns + wait_ns - now_ns()
+        plan[REMAINING_NS] = begun_ns + wait_ns - now_ns()
     return found
 
 
-class Express:
-    """One question to servos on ``port``, alone or behind their goals."""
+class SerialFastPath:
+    """One group read of servos on ``port``, alone or behind their goals."""
 
     def __init__(
         self,
-        port: FilePort,
+        port: DescriptorPort,
         goals: GroupWrite,
-        question: GroupQuestion,
+        request: GroupReadRequest,
         *,
-        delay_s: float,
         latency_s: float,
         spin_s: float,
     ) -> None:
         """Prepare the packets.
 
         Args:
-            port: with a file.
-            goals: what ``write`` and ``turn`` send.
-            question: what is asked.
-            delay_s: of the servos, in one answer.
-            latency_s: as ``GroupCycle`` has it.
-            spin_s: as ``GroupCycle`` has it.
+            port: with a descriptor.
+            goals: the sync write of ``write`` and ``transact``.
+            request: the group read.
+            latency_s: how long adapter and driver may hold bytes back, at most.
+            spin_s: argument of ``ControlCycle``.
 
         """
-        self._port, self._question = port, question
-        count = len(question.ids)
+        self._port, self._request = port, request
+        count = len(request.ids)
         self._values = np.zeros(count, np.int32)
-        self._shape = (count, question.length)
-        head = goals.template(), question.request, question.heads, question.ids
+        self._shape = (count, request.length)
+        head = goals.template(), request.packet, request.heads, request.ids
         parts = [np.frombuffer(bytes(part), np.uint8) for part in head]
         ends = np.cumsum([len(part) for part in parts])
-        answer_at = int(ends[3]) + count
-        self._work = np.zeros(answer_at + question.answer_bytes, np.uint8)
+        reply_at = int(ends[3]) + count
+        self._work = np.zeros(reply_at + request.reply_bytes, np.uint8)
         self._work[: ends[3]] = np.concatenate(parts)
-        self._write_bytes, self._asked = int(ends[0]), int(ends[1])
-        self._error, self._answer = self._work[ends[3] : answer_at], self._work[answer_at:]
+        self._write_bytes, self._request_end = int(ends[0]), int(ends[1])
+        self._error, self._reply = self._work[ends[3] : reply_at], self._work[reply_at:]
         self._plan = np.zeros(PLAN_SIZE, np.int64)
-        self._plan[WRITE_BYTES], self._plan[ASK_BYTES] = ends[0], ends[1] - ends[0]
-        self._plan[HEADS_END : ERROR_END + 1] = ends[2], ends[3], answer_at
-        self._plan[FAST] = question.fast
+        self._plan[WRITE_BYTES], self._plan[REQUEST_BYTES] = ends[0], ends[1] - ends[0]
+        self._plan[HEADS_END : ERROR_END + 1] = ends[2], ends[3], reply_at
+        self._plan[FAST] = request.fast
         self._plan[LATENCY_NS], self._plan[SPIN_NS] = latency_s * 1e9, spin_s * 1e9
-        self._delay_ns = int(delay_s * 1e9)
         self._baud = 0
 
-    def occupy(self, wire_s: float) -> float:
-        """Note that something else is sent now; how long until all has left the line, s."""
-        return float(_occupy(self._plan, now_ns(), int(wire_s * 1e9)) * 1e-9)
+    def reserve_line(self, wire_s: float) -> float:
+        """Note that something else is sent now; returns how long until all has left the line, s."""
+        return float(_reserve_line(self._plan, now_ns(), int(wire_s * 1e9)) * 1e-9)
 
     @property
-    def left_s(self) -> float:
-        """How long the answer to a cycle that went wrong may still take."""
-        return float(self._plan[LEFT_NS] * 1e-9)
+    def remaining_s(self) -> float:
+        """How long the reply of an irregular cycle may still take."""
+        return float(self._plan[REMAINING_NS] * 1e-9)
 
     def write(self, goals: NDArray[np.int32]) -> int:
-        """Send goals (N,); how many bytes the device has taken, 0 if it must go another way."""
-        fd = self._port.file
+        """Send goals (N,); returns how many bytes were taken, 0 where the port must send them."""
+        fd = self._port.descriptor
         if fd is None:
             return 0
         if self._port.getBaudRate() != self._baud:
-            self._reckon()
+            self._update_wire_times()
         values = self._values
         values[:] = goals
-        return int(_send(fd, self._work, values, self._plan))
+        return int(_send_goals(fd, self._work, values, self._plan))
 
-    def turn(self, goals: NDArray[np.int32] | None) -> GroupAnswer | bytes | None:
-        """Ask, behind ``goals`` (N,) if there are any.
+    def transact(self, goals: NDArray[np.int32] | None) -> GroupReadReply | bytes | None:
+        """Send the request, behind ``goals`` (N,) if there are any, and receive the reply.
 
         Returns:
-            The answer; or what has come, if it is not as expected; or None if nothing was sent.
+            The reply; the bytes that arrived, if they are irregular; None if nothing was sent.
 
         Raises:
             PortError: the port is gone.
 
         """
-        fd = self._port.file
+        fd = self._port.descriptor
         if fd is None:
             return None
         values = _NO_GOALS
@@ -199,28 +196,28 @@ class Express:
             values = self._values
             values[:] = goals
         work, plan = self._work, self._plan
-        sent = _ask(fd, work, values, plan)
+        sent = _send_request(fd, work, values, plan)
         # from here on the bytes are on the line: time that costs nothing
         begin = self._write_bytes if goals is None else 0
-        if sent < self._asked - begin:
+        if sent < self._request_end - begin:
             if not sent:
                 return None
-            self._port.write(work[begin + sent : self._asked].tobytes())
+            self._port.write(work[begin + sent : self._request_end].tobytes())
         if self._port.getBaudRate() != self._baud:
-            self._reckon()
+            self._update_wire_times()
         data = np.empty(self._shape, np.uint8)
-        answer = self._question.regular(FLAWLESS, data, self._error)
-        found = _hear(fd, work, data, goals is not None, plan)
+        reply = self._request.regular(FLAWLESS, data, self._error)
+        found = _receive(fd, work, data, goals is not None, plan)
         if found == FLAWLESS:
-            return answer
+            return reply
         if found > IRREGULAR:
-            return self._question.regular(found, data, self._error)
-        return self._answer[: None if found == IRREGULAR else -1 - found].tobytes()
+            return self._request.regular(found, data, self._error)
+        return self._reply[: None if found == IRREGULAR else -1 - found].tobytes()
 
-    def _reckon(self) -> None:
-        """Times on the line at the port's present speed."""
+    def _update_wire_times(self) -> None:
+        """Times on the line at the port's present baud rate."""
         self._baud = baud = self._port.getBaudRate()
         plan = self._plan
-        for time, count in ((WRITE_NS, plan[WRITE_BYTES]), (ASK_NS, plan[ASK_BYTES])):
-            plan[time] = int(count) * _BITS_NS // baud
-        plan[ANSWER_NS] = len(self._answer) * _BITS_NS // baud + self._delay_ns
+        counts = int(plan[WRITE_BYTES]), int(plan[REQUEST_BYTES]), len(self._reply)
+        for time, count in zip((WRITE_NS, REQUEST_NS, REPLY_NS), counts, strict=True):
+            plan[time] = count * _BYTE_NS_BAUD // baud

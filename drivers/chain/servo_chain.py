@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.arrays import Bools, Floats, Int32s
 from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.bus.control_cycle import CycleCounters, GroupCycle
+from snakewalk.drivers.bus.control_cycle import ControlCycle, CycleCounters
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.chain.joint_codec import GoalTicks, Readings
+from snakewalk.drivers.chain.joint_codec import GoalEncoder, Readings
 from snakewalk.drivers.chain.recheck import Recheck, recheck
 from snakewalk.drivers.chain.start_up import (
     Inspection,
@@ -25,7 +24,7 @@ from snakewalk.drivers.protocol.registers import WATCHDOG_UNIT_S, ServoUnits
 from snakewalk.drivers.types import JointCommand, JointState
 
 _FIRST_READS = 5
-"""Tries to get one complete answer at the start."""
+"""Tries to get one complete reply at the start."""
 
 
 class ServoChain:
@@ -69,14 +68,14 @@ class ServoChain:
         self._watchdog_s = watchdog_s
         self._slow_every = slow_every
         self._fast = fast
-        self._ticks = GoalTicks(self._units, goal_limits_raw(robot, self._units))
+        self._goals = GoalEncoder(self._units, goal_limits_raw(robot, self._units))
         self._readings = Readings(robot.joint_count, bus.table, self._units)
-        self._cycle: GroupCycle = bus.cycle(robot.servo_ids, fast=fast)
-        self._slow: GroupCycle = bus.slow_cycle(robot.servo_ids, fast=fast)
-        self._alive = AliveCheck(bus, robot.servo_ids, fast=fast)
+        self._cycle: ControlCycle = bus.cycle(robot.servo_ids, fast=fast)
+        self._slow: ControlCycle = bus.slow_cycle(robot.servo_ids, fast=fast)
+        self._liveness = LivenessCheck(bus, robot.servo_ids, fast=fast)
         self._reads = 0
         self._armed = False
-        self._spoke_at_s = -np.inf
+        self._sent_at_s = -np.inf
 
     @property
     def joint_count(self) -> int:
@@ -120,7 +119,7 @@ class ServoChain:
         fast = self._fast and self.inspection.fast_reads
         self._cycle = bus.cycle(ids, fast=fast)
         self._slow = bus.slow_cycle(ids, fast=fast)
-        self._alive = AliveCheck(bus, ids, fast=fast)
+        self._liveness = LivenessCheck(bus, ids, fast=fast)
         self._reads = 0
         state = self._first_state()
         check_pose(self.robot, state.position_rad)
@@ -134,7 +133,7 @@ class ServoChain:
         """Look at the chain after an interruption and compare it with what it was; moves nothing.
 
         Raises:
-            BusError: a servo does not answer.
+            BusError: a servo does not reply.
             PortError: the port is gone.
 
         """
@@ -226,18 +225,18 @@ class ServoChain:
             PortError: the port is gone.
 
         """
-        self._spoke_at_s = self._clock.now_s()
-        answer = self._cycle.read()
-        for joint in self._readings.take(answer, self._clock.now_s()):
+        self._sent_at_s = self._clock.now_s()
+        reply = self._cycle.read()
+        for joint in self._readings.update(reply, self._clock.now_s()):
             self._read_alarm(int(joint))
-        turn = self._reads % self._slow_every
+        place = self._reads % self._slow_every
         self._reads += 1
-        if turn == 0:
-            self._readings.take_slow(self._slow.read())
-        elif self._armed and turn == self._slow_every // 3:
-            self._alive.torque()
-        elif self._armed and turn == 2 * self._slow_every // 3:
-            self._alive.watchdog()
+        if place == 0:
+            self._readings.update_slow(self._slow.read())
+        elif self._armed and place == self._slow_every // 3:
+            self._liveness.torque()
+        elif self._armed and place == 2 * self._slow_every // 3:
+            self._liveness.watchdog()
         return self._readings.state(self._clock.now_s())
 
     def write(self, command: JointCommand) -> None:
@@ -249,17 +248,17 @@ class ServoChain:
             PortError: the port is gone.
 
         """
-        pause_s = self._clock.now_s() - self._spoke_at_s
+        pause_s = self._clock.now_s() - self._sent_at_s
         if self._armed and pause_s > self._watchdog_s:
             raise BusError(
                 f"{pause_s:.2f} s without a packet: the bus watchdog ({self._watchdog_s:g} s) has "
                 "stopped the servos"
             )
         self._send_goals(command.goal_rad)
-        self._spoke_at_s = self._clock.now_s()
+        self._sent_at_s = self._clock.now_s()
 
-    def _send_goals(self, goal_rad: Floats) -> NDArray[np.int32]:
-        goals = self._ticks.of(goal_rad)
+    def _send_goals(self, goal_rad: Floats) -> Int32s:
+        goals = self._goals.encode(goal_rad)
         self._cycle.write_goals(goals)
         return goals
 
@@ -280,7 +279,7 @@ class ServoChain:
     def _read_alarm(self, joint: int) -> None:
         servo_id = self.robot.servo_ids[joint]
         try:
-            self._readings.take_alarm(joint, self._bus.read(servo_id, "Hardware Error Status"))
+            self._readings.update_alarm(joint, self._bus.read(servo_id, "Hardware Error Status"))
         except BusError:
             return  # the error byte carries the alert already; asked again in the next cycle
 
@@ -289,8 +288,8 @@ WATCHDOG_TRIPPED = 0xFF
 """Bus Watchdog(98) reads -1 in its error state (e-manual)."""
 
 
-class AliveCheck:
-    """Two one-byte group reads, each a small part of a cycle's wire time."""
+class LivenessCheck:
+    """Whether torque is still on and no watchdog has expired: two group reads of one byte."""
 
     def __init__(self, bus: DynamixelBus, servo_ids: Sequence[int], *, fast: bool) -> None:
         self._ids = tuple(servo_ids)
@@ -298,29 +297,29 @@ class AliveCheck:
         self._watchdog = bus.block(servo_ids, "Bus Watchdog", "Bus Watchdog", fast=fast)
 
     def torque(self) -> None:
-        """Check that torque is on; servos that do not answer are not judged.
+        """Check that torque is on; servos that do not reply are not judged.
 
         Raises:
             BusError: torque is off.
             PortError: the port is gone.
 
         """
-        answer = self._torque.read()
-        self._complain(answer.valid & (answer.data[:, 0] == 0), "torque is off: has it rebooted?")
+        reply = self._torque.read()
+        self._raise_for(reply.valid & (reply.data[:, 0] == 0), "torque is off: has it rebooted?")
 
     def watchdog(self) -> None:
-        """Check that no watchdog has run out; servos that do not answer are not judged.
+        """Check that no watchdog has run out; servos that do not reply are not judged.
 
         Raises:
-            BusError: one has.
+            BusError: a watchdog has expired.
             PortError: the port is gone.
 
         """
-        answer = self._watchdog.read()
-        tripped = answer.valid & (answer.data[:, 0] == WATCHDOG_TRIPPED)
-        self._complain(tripped, "its bus watchdog has stopped it")
+        reply = self._watchdog.read()
+        tripped = reply.valid & (reply.data[:, 0] == WATCHDOG_TRIPPED)
+        self._raise_for(tripped, "its bus watchdog has stopped it")
 
-    def _complain(self, bad: Bools, what: str) -> None:
+    def _raise_for(self, bad: Bools, what: str) -> None:
         if bad.any():
             which = ", ".join(str(i) for i, b in zip(self._ids, bad, strict=True) if b)
             raise BusError(f"servo {which}: {what}")

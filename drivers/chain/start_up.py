@@ -1,6 +1,6 @@
 """From unknown servos to a chain that holds its pose: what is checked and set, in which order.
 
-The order answers what users of such buses report: goals not synced before torque-on, return delays
+The order replies what users of such buses report: goals not synced before torque-on, return delays
 of 500 us a servo, alarms that were there before, turn counts lost at a reboot.
 """
 

@@ -1,8 +1,8 @@
 """The byte port: the seam below the protocol, where metal and simulation are exchanged.
 
-It is the port that the DYNAMIXEL SDK's packet handlers are duck-typed on (its own method names,
-milliseconds), widened by what the cycle codec needs (seconds, deadlines). So one object carries
-both, and nothing above can tell what answers.
+The port offers what the DYNAMIXEL SDK's packet handlers call (the SDK's own method names,
+milliseconds), and what the control cycle needs (seconds, deadlines). So one object serves both, and
+nothing above it can tell whether metal or simulation replies.
 """
 
 # ruff: noqa: N802 - the SDK chose the names
@@ -17,7 +17,7 @@ class SdkPort(Protocol):
     """What ``dynamixel_sdk`` calls; names and units are its own."""
 
     is_using: bool
-    """True between an instruction and its answer; whoever catches an exception clears it."""
+    """True between an instruction and its reply; whoever catches an exception clears it."""
 
     def openPort(self) -> bool:
         """Open (again) at the current baud rate; True on success."""
@@ -57,7 +57,7 @@ class SdkPort(Protocol):
         ...
 
     def setPacketTimeout(self, packet_length: int) -> None:
-        """Start the time-out for an answer of so many bytes."""
+        """Start the time-out for a reply of so many bytes."""
         ...
 
     def setPacketTimeoutMillis(self, msec: float) -> None:
@@ -104,38 +104,25 @@ class BytePort(SdkPort, Protocol):
     def drain_until_quiet(self, quiet_s: float) -> int:
         """Throw bytes away until none has come for ``quiet_s``; the number thrown away.
 
-        Waits ``quiet_s`` at least, so that an answer still on its way cannot be taken for that to
-        the next question.
+        Waits ``quiet_s`` at least, so that a late reply cannot be taken for that to the next
+        request.
         """
         ...
 
 
 @runtime_checkable
-class AskingPort(Protocol):
-    """A byte port that asks and listens in one go, with nothing of ours in between."""
+class DescriptorPort(Protocol):
+    """A byte port whose file descriptor compiled code may write and read directly."""
 
-    def ask(self, request: bytes, count: int, wait_s: float) -> bytes:
-        """Forget what has come, send ``request``, wait for ``count`` bytes.
-
-        Returns what has arrived, at most ``count`` bytes: fewer mean that ``wait_s`` have passed
-        since the request was taken.
-        """
-        ...
-
-
-@runtime_checkable
-class FilePort(Protocol):
-    """A byte port on a file that compiled code may write and read in its place."""
-
-    file: int | None
-    """Descriptor, does not block; None: there is no compiler, or it is closed: use the port."""
+    descriptor: int | None
+    """Non-blocking; None: the port is closed, or only its methods may be used."""
 
     def getBaudRate(self) -> int:
-        """As ``SdkPort`` says."""
+        """Method of ``SdkPort``."""
         ...
 
     def write(self, data: bytes) -> None:
-        """As ``BytePort`` says."""
+        """Method of ``BytePort``."""
         ...
 
 

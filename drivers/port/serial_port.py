@@ -7,26 +7,21 @@ from __future__ import annotations
 import errno
 import os
 import select
-import sys
 import termios
 from contextlib import suppress
 from types import TracebackType
 
-import numpy as np
 import serial
 from serial.tools import list_ports
 
 from snakewalk.drivers.clock import Clock, WallClock
-from snakewalk.drivers.compiling import COMPILES
 from snakewalk.drivers.errors import PortError
 
 _LATENCY_MS = 16.0
-"""What an FTDI adapter may hold bytes back by default (its ``latency_timer``)."""
+"""How long an FTDI adapter holds bytes back by default (its ``latency_timer``)."""
 _PROGRAM_S = 0.02
 """How late a program at the other end of a pseudo-terminal may be: it has to be scheduled."""
 _NOISE_LIMIT_BYTES = 1 << 16
-_LONGEST = 1 << 13
-"""Bytes of an answer that one compiled exchange takes."""
 _STUCK_S = 1.0
 """After so long a device that takes no more bytes is gone."""
 
@@ -47,14 +42,8 @@ class SerialPort:
         self._timeout_at_s = 0.0
         self._serial: serial.Serial | None = None
         self._readable, self._writable = select.poll(), select.poll()
-        self._answer = np.empty(_LONGEST, np.uint8)
-        self._exchange = None
-        self.file: int | None = None
-        """Descriptor for compiled code, while there is any and the port is open."""
-        if sys.platform == "linux" and COMPILES:
-            from snakewalk.drivers.port.serial_wait import exchange  # noqa: PLC0415  slow, optional
-
-            self._exchange = exchange
+        self.descriptor: int | None = None
+        """File descriptor while the port is open, for compiled code."""
         self._open()
 
     def __enter__(self) -> SerialPort:
@@ -90,7 +79,7 @@ class SerialPort:
 
     @property
     def latency_s(self) -> float:
-        """How long bytes may be held back on this side, for ``DynamixelBus(latency_s=...)``."""
+        """How long bytes may be held back on this side, the ``latency_s`` of ``DynamixelBus``."""
         if os.path.realpath(self._device).startswith("/dev/pts/"):
             return _PROGRAM_S
         timer_ms = self.latency_timer_ms
@@ -98,11 +87,11 @@ class SerialPort:
 
     def write(self, data: bytes) -> None:
         """Send all of ``data``."""
-        fd = self._descriptor
+        fd = self._fileno
         try:
             sent = 0
             while True:
-                # said to be writable, a full device may still take nothing
+                # a device that polls as writable may still take nothing when it is full
                 with suppress(BlockingIOError):
                     sent += os.write(fd, data[sent:])
                 if sent == len(data):
@@ -110,45 +99,24 @@ class SerialPort:
                 if not self._writable.poll(_STUCK_S * 1e3):
                     raise PortError(f"{self._device}: takes no more bytes")
         except OSError as error:
-            raise self._gone(error) from error
+            raise self._lost(error) from error
 
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Wait for ``count`` bytes, at most until ``deadline_s``."""
-        fd = self._descriptor
+        fd = self._fileno
         got = b""
         try:
             while len(got) < count:
-                left_s = max(0.0, deadline_s - self._clock.now_s())
-                if not self._readable.poll(left_s * 1e3):
+                remaining_s = max(0.0, deadline_s - self._clock.now_s())
+                if not self._readable.poll(remaining_s * 1e3):
                     break
                 more = os.read(fd, count - len(got))
                 if not more:
                     raise OSError(errno.EIO, "ready to be read, but empty")
                 got += more
         except OSError as error:
-            raise self._gone(error) from error
+            raise self._lost(error) from error
         return got
-
-    def ask(self, request: bytes, count: int, wait_s: float) -> bytes:
-        """Forget what has come, send ``request``, wait for ``count`` bytes.
-
-        Raises:
-            PortError: the port is gone.
-
-        """
-        if self._exchange is None or count > _LONGEST:
-            self.clearPort()
-            self.write(request)
-            return self.read_until(count, self._clock.now_s() + wait_s)
-        question, answer = np.frombuffer(request, np.uint8), self._answer[:count]
-        begun_s = self._clock.now_s()
-        got = self._exchange(self._descriptor, question, answer, int(wait_s * 1e9))
-        if got == count:
-            return answer.tobytes()
-        if got < 0:
-            self.write(request[-1 - got :])
-            begun_s, got = self._clock.now_s(), 0
-        return answer[:got].tobytes() + self.read_until(count - got, begun_s + wait_s)
 
     def drain_until_quiet(self, quiet_s: float) -> int:
         """Throw bytes away until none has come for ``quiet_s``.
@@ -157,20 +125,20 @@ class SerialPort:
             PortError: the line never falls quiet.
 
         """
-        thrown = 0
+        drained = 0
         quiet_at_s = self._clock.now_s() + quiet_s
         while self._clock.now_s() < quiet_at_s:
             waiting = max(1, self.getBytesAvailable())
             got = len(self.read_until(waiting, quiet_at_s))
             if got:
-                thrown += got
+                drained += got
                 quiet_at_s = self._clock.now_s() + quiet_s
-            if thrown > _NOISE_LIMIT_BYTES:
+            if drained > _NOISE_LIMIT_BYTES:
                 raise PortError(
                     f"{self._device}: the line does not fall quiet; something else talks on it, "
                     "or the baud rate is wrong"
                 )
-        return thrown
+        return drained
 
     # what the SDK calls
 
@@ -182,14 +150,14 @@ class SerialPort:
     def closePort(self) -> None:
         if self._serial is not None:
             self._serial.close()
-            self._serial = self.file = None
+            self._serial = self.descriptor = None
         self.is_using = False
 
     def clearPort(self) -> None:
         try:
             self._line.reset_input_buffer()
         except (serial.SerialException, OSError, termios.error) as error:
-            raise self._gone(error) from error
+            raise self._lost(error) from error
 
     def setBaudRate(self, baudrate: int) -> bool:
         try:
@@ -206,7 +174,7 @@ class SerialPort:
         try:
             return int(self._line.in_waiting)
         except (serial.SerialException, OSError) as error:
-            raise self._gone(error) from error
+            raise self._lost(error) from error
 
     def readPort(self, length: int) -> bytes:
         """Up to ``length`` bytes; sleeps for the first one, so that the SDK does not spin."""
@@ -236,7 +204,7 @@ class SerialPort:
         return self._serial
 
     @property
-    def _descriptor(self) -> int:
+    def _fileno(self) -> int:
         return int(self._line.fileno())
 
     def _open(self) -> None:
@@ -244,8 +212,8 @@ class SerialPort:
             self._serial = serial.Serial(self._device, self._baud, timeout=0.0, exclusive=True)
             self._serial.reset_input_buffer()
         except (serial.SerialException, OSError, ValueError) as error:
-            raise PortError(self._why(error)) from error
-        self.file = int(self._serial.fileno()) if self._exchange is not None else None
+            raise self._open_error(error) from error
+        self.descriptor = int(self._serial.fileno())
         self._readable, self._writable = select.poll(), select.poll()
         self._readable.register(self._serial.fileno(), select.POLLIN)
         self._writable.register(self._serial.fileno(), select.POLLOUT)
@@ -253,11 +221,14 @@ class SerialPort:
         with suppress(ValueError, NotImplementedError):
             self._serial.set_low_latency_mode(True)
 
-    def _gone(self, error: Exception) -> PortError:
+    def _lost(self, error: Exception) -> PortError:
         self.is_using = False
         return PortError(f"{self._device}: the port is gone: {error}")
 
-    def _why(self, error: Exception) -> str:
+    def _open_error(self, error: Exception) -> PortError:
+        return PortError(self._open_fault(error))
+
+    def _open_fault(self, error: Exception) -> str:
         number = getattr(error, "errno", None)
         if number == errno.ENOENT:
             there = ", ".join(sorted(port.device for port in list_ports.comports()))

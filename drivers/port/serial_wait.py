@@ -1,19 +1,20 @@
-"""Question and answer on a serial device in one go: forget, write, nap, look; between no Python.
+"""Send a request on a serial device, sleep, and receive its reply, without Python in between.
 
-Needs numba, and a C library as Linux has it. It does what goes smoothly. On a signal, an error, or
-when time is up it returns short, and the careful methods of ``SerialPort`` go on from there and
-find out what it was. Compiled when this is imported, never in a cycle.
+The loops are compiled when this module is imported, never in a cycle, and use the C library of
+Linux. They handle the regular case only. After a signal, an error or the deadline they return
+early, and the methods of ``SerialPort`` continue from there and find the cause.
 
-When an answer is complete is known beforehand, to within what driver and operating system add. So
-the host sleeps through the time in which the answer comes, instead of waking up for each piece of
-it, is awake a little before the end, and looks until it is there: that takes less of the processor
-than being woken, and no time. How late (or early) the end really is, is learnt from cycle to cycle.
+The time at which a reply is complete is known from its length, to within what the driver and the
+operating system add. So the host sleeps while the reply arrives, wakes shortly before its end, and
+then polls until it is complete. This takes less of the processor than one wake-up for each piece,
+and no extra time. How late (or early) replies really are is estimated from cycle to cycle.
 """
 
 import numpy as np
 from numba import int32, int64, intp, types, uint8, uintp
 from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Bytes
 from snakewalk.drivers.compiling import compiled
 
 _tcflush = types.ExternalFunction("tcflush", int32(int32, int32))
@@ -26,19 +27,20 @@ _POLLIN = 1
 _SECOND_NS = 1_000_000_000
 _TCIFLUSH = 0
 _PIECE = 64
-"""The kernel hands a terminal's bytes over in pieces of this size; a smaller one was the last."""
-_SLACK_NS = 50_000
-"""How much later than told Linux ends a program's sleep, so that it may end several at once."""
-_LEARNT = 8
-"""An answer moves what is expected by one part in so many."""
+"""The kernel hands over a terminal's bytes in pieces of this size; a smaller one was the last."""
+_TIMER_SLACK_NS = 50_000
+"""Linux ends a sleep up to this much late, so that it can end several at once (prctl(2))."""
+_GAIN = 8
+"""A reply moves the latency estimate by one part in so many (ours)."""
 _LONGEST_STREAK = 16
 _RAW = types.Array(uint8, 1, "C", readonly=True)
 LATE, STREAK = 0, 1
-"""In a ``habit``: how much later than told answers are complete, ns; those too early, in a row."""
+"""Indices of a latency estimate: how much later than computed replies are complete, ns; number of
+early replies in a row."""
 
 
-def new_habit() -> NDArray[np.int64]:
-    """Nothing learnt yet."""
+def new_latency_estimate() -> NDArray[np.int64]:
+    """(2,) estimate before the first reply."""
     return np.zeros(2, np.int64)
 
 
@@ -55,85 +57,86 @@ def now_ns() -> int:
 
 
 @compiled(int64(int64[::1], int64, int64, int64))
-def learn(habit: NDArray[np.int64], late_ns: int, least_ns: int, spin_ns: int) -> int:
-    """Take in that an answer was complete ``late_ns`` after it was expected at the earliest.
+def update(latency_estimate: NDArray[np.int64], late_ns: int, least_ns: int, spin_ns: int) -> int:
+    """Update the estimate: a reply was complete ``late_ns`` after its earliest possible time.
 
-    One that was there before anybody looked (``late_ns`` = -``least_ns``) may have been there for
-    long: each in a row makes the next nap shorter by twice as much, until there is none.
+    A reply that was complete before the first poll (``late_ns`` = -``least_ns``) may have been
+    complete for long: each one in a row shortens the next sleep by twice as much, down to none.
     """
     if late_ns <= -least_ns:
-        earlier = spin_ns << habit[STREAK]
-        habit[STREAK] = min(habit[STREAK] + 1, _LONGEST_STREAK)
-        habit[LATE] = max(habit[LATE] - earlier, -least_ns)
+        earlier = spin_ns << latency_estimate[STREAK]
+        latency_estimate[STREAK] = min(latency_estimate[STREAK] + 1, _LONGEST_STREAK)
+        latency_estimate[LATE] = max(latency_estimate[LATE] - earlier, -least_ns)
     else:
-        off_ns = min(max(late_ns - habit[LATE], -spin_ns), spin_ns)
-        habit[STREAK] = 0
-        habit[LATE] += off_ns // _LEARNT
-    return int(habit[LATE])
+        off_ns = min(max(late_ns - latency_estimate[LATE], -spin_ns), spin_ns)
+        latency_estimate[STREAK] = 0
+        latency_estimate[LATE] += off_ns // _GAIN
+    return int(latency_estimate[LATE])
 
 
 @compiled(int64(int32, _RAW))
-def put(fd: int, request: NDArray[np.uint8]) -> int:
-    """Forget what has come, send ``request``; how many bytes of it were taken."""
+def send(fd: int, request: Bytes) -> int:
+    """Discard the input buffer and send ``request``; returns how many bytes were taken."""
     _tcflush(fd, _TCIFLUSH)
     return max(0, int(_write(fd, request.ctypes.data, len(request))))
 
 
 @compiled(int64(int32, uint8[::1], int64, int64, int64, int64, int64[::1]), nogil=True)
-def listen(
+def receive(
     fd: int,
-    answer: NDArray[np.uint8],
+    reply: Bytes,
     begun_ns: int,
     least_ns: int,
     wait_ns: int,
     spin_ns: int,
-    habit: NDArray[np.int64],
+    latency_estimate: NDArray[np.int64],
 ) -> int:
-    """How many bytes have come into ``answer``: all that it has room for, or those in time.
+    """Receive into ``reply`` until it is full or the deadline has passed; returns the byte count.
 
     Args:
-        fd: does not block.
-        answer: filled; at least 1 byte.
-        begun_ns: when the question was put.
-        least_ns: until the last byte can have come at the earliest, from then.
-        wait_ns: at most, from then.
-        spin_ns: for so long before the answer is expected, and after, look without sleeping; 0:
-            sleep until something comes, and again, until it is all.
-        habit: (2,) as ``new_habit`` makes it; learns.
+        fd: descriptor, non-blocking.
+        reply: (n,) filled; at least 1 byte.
+        begun_ns: when the request was sent.
+        least_ns: from then until the last byte can have arrived at the earliest.
+        wait_ns: from then until the deadline.
+        spin_ns: for so long before and after the expected end, poll without sleeping; 0: sleep
+            until bytes arrive, again and again, until the reply is complete.
+        latency_estimate: (2,) from ``new_latency_estimate``; updated.
 
     """
     time = np.empty(2, np.int64)  # struct timespec
-    awaited = np.empty(1, np.int64)  # struct pollfd: descriptor, events, events found
-    here, count = answer.ctypes.data, len(answer)
+    awaited = np.empty(1, np.int64)  # struct pollfd: descriptor, events, returned events
+    here, count = reply.ctypes.data, len(reply)
     got = 0
     if spin_ns > 0:
-        expected_ns = begun_ns + least_ns + int(habit[LATE])
-        nap_ns = expected_ns - spin_ns - _SLACK_NS - _now_ns(time)
-        if nap_ns > 0:
-            time[0], time[1] = divmod(nap_ns, _SECOND_NS)
+        expected_ns = begun_ns + least_ns + int(latency_estimate[LATE])
+        sleep_ns = expected_ns - spin_ns - _TIMER_SLACK_NS - _now_ns(time)
+        if sleep_ns > 0:
+            time[0], time[1] = divmod(sleep_ns, _SECOND_NS)
             if _ppoll(0, 0, time.ctypes.data, 0) < 0:
                 return got  # a signal
         here_ns = _now_ns(time)
-        in_time = nap_ns > 0 and here_ns < expected_ns
-        looked = False
-        while not looked or here_ns < expected_ns + spin_ns:
+        in_time = sleep_ns > 0 and here_ns < expected_ns
+        polled = False
+        while not polled or here_ns < expected_ns + spin_ns:
             more = int(_read(fd, here + got, count - got))
             got += max(more, 0)
             if got == count:
-                if looked:
-                    learn(habit, _now_ns(time) - begun_ns - least_ns, least_ns, spin_ns)
-                elif in_time:  # else it is the host that was late
-                    learn(habit, -least_ns, least_ns, spin_ns)
+                if polled:
+                    late_ns = _now_ns(time) - begun_ns - least_ns
+                    update(latency_estimate, late_ns, least_ns, spin_ns)
+                elif in_time:  # else the host was late, not the reply early
+                    update(latency_estimate, -least_ns, least_ns, spin_ns)
                 return got
-            looked = more < _PIECE
+            polled = more < _PIECE
             here_ns = _now_ns(time)
     end_ns = begun_ns + wait_ns
     while True:
-        left_ns = max(0, end_ns - _now_ns(time))
-        time[0], time[1] = divmod(left_ns, _SECOND_NS)
+        remaining_ns = max(0, end_ns - _now_ns(time))
+        time[0], time[1] = divmod(remaining_ns, _SECOND_NS)
         awaited[0] = fd | _POLLIN << 32
         if _ppoll(awaited.ctypes.data, 1, time.ctypes.data, 0) <= 0:
-            return got  # time is up, or a signal
+            return got  # the deadline, or a signal
         more = int(_read(fd, here + got, count - got))
         if more <= 0:
             return got  # the device is gone
@@ -143,20 +146,6 @@ def listen(
             got += max(more, 0)
         if got == count:
             if spin_ns > 0:
-                learn(habit, _now_ns(time) - begun_ns - least_ns, least_ns, spin_ns)
+                late_ns = _now_ns(time) - begun_ns - least_ns
+                update(latency_estimate, late_ns, least_ns, spin_ns)
             return got
-
-
-@compiled(int64(int32, _RAW, uint8[::1], int64), nogil=True)
-def exchange(fd: int, request: NDArray[np.uint8], answer: NDArray[np.uint8], wait_ns: int) -> int:
-    """``put`` and ``listen``, whenever the answer may come.
-
-    Returns:
-        How many bytes have come; ``-1 - n``: only ``n`` bytes of the request were taken.
-
-    """
-    begun_ns = now_ns()
-    sent = put(fd, request)
-    if sent != len(request):
-        return -1 - sent
-    return int(listen(fd, answer, begun_ns, 0, wait_ns, 0, np.zeros(2, np.int64)))

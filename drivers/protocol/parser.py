@@ -16,7 +16,7 @@ from snakewalk.drivers.protocol.packet import (
 _FIXED = 7  # header, id and length field, in front of what the length counts
 
 
-class PacketReader:
+class PacketParser:
     """Cuts a byte stream into packets; what is not one is skipped and counted.
 
     A header whose length or CRC is wrong costs only its first byte: the search goes on right

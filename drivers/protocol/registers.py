@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from enum import IntFlag
 
 import numpy as np
-from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats, SignedInts
 from snakewalk.drivers.errors import ControlTableError
@@ -84,17 +83,6 @@ class ServoUnits:
     def position_rad(self, raw: SignedInts) -> Floats:
         """Angles, rad; 0 is straight."""
         return np.asarray((raw - float(self.zero_position)) * self.rad_per_position)
-
-    def position_raw(self, angle_rad: Floats) -> NDArray[np.int32]:
-        """Nearest raw positions.
-
-        Raises:
-            ValueError: an angle is not finite.
-
-        """
-        if np.count_nonzero(np.isfinite(angle_rad)) < angle_rad.size:
-            raise ValueError("an angle is not finite")
-        return np.rint(angle_rad / self.rad_per_position + self.zero_position).astype(np.int32)
 
     def velocity_rad_s(self, raw: SignedInts) -> Floats:
         """Velocities, rad/s."""

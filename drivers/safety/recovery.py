@@ -46,7 +46,7 @@ class Recovery:
         patience_s: float = 10.0,
         limit: int = 3,
         confirm: Callable[[str], bool] | None = None,
-        say: Callable[[str], None] = lambda line: None,
+        on_event: Callable[[str], None] = lambda line: None,
     ) -> None:
         """Prepare.
 
@@ -57,14 +57,14 @@ class Recovery:
             patience_s: how long to wait for port and servos.
             limit: interruptions in one run after which none is mended any more.
             confirm: asks an operator; gets what was found; without one ``confirm`` means no.
-            say: told of every step, for the log.
+            on_event: gets every step as one line, for the log.
 
         """
         self._chain, self._port, self._clock = chain, port, port.clock
         self._policy, self._patience_s, self._left = policy, patience_s, limit
-        self._confirm, self._say = confirm, say
+        self._confirm, self._on_event = confirm, on_event
 
-    def bring_back(self, reason: str, stopped: Callable[[], str | None]) -> JointState | None:
+    def recover(self, reason: str, stopped: Callable[[], str | None]) -> JointState | None:
         """Hold, wait, verify, ask, go on; None if it must not or cannot go on.
 
         Args:
@@ -78,16 +78,16 @@ class Recovery:
         if self._policy == "stop" or self._left <= 0:
             return None
         self._left -= 1
-        self._say(f"interrupted: {reason}; the servos hold")
+        self._on_event(f"interrupted: {reason}; the servos hold")
         found = self._wait(self._clock, stopped)
         if found is None:
             return None
-        self._say(f"verified: {found}")
+        self._on_event(f"verified: {found}")
         if self._policy == "confirm" and not (self._confirm and self._confirm(str(found))):
-            self._say("not confirmed")
+            self._on_event("not confirmed")
             return None
         state = self._chain.resume(found)
-        self._say("going on from where it stands")
+        self._on_event("going on from where it stands")
         return state
 
     def _wait(self, clock: Clock, stopped: Callable[[], str | None]) -> Recheck | None:
@@ -110,7 +110,7 @@ class Recovery:
                 last = str(error)
             why = stopped()
             if why is not None or clock.now_s() >= give_up_s:
-                self._say(f"given up: {why or last}")
+                self._on_event(f"given up: {why or last}")
                 return None
             clock.sleep_until_s(clock.now_s() + _RETRY_S)
 

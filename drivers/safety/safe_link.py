@@ -7,15 +7,9 @@ from types import FrameType, TracebackType
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError, SafetyTrippedError
 from snakewalk.drivers.link import JointLink
+from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
-from snakewalk.drivers.safety.vet import (
-    SafetyLimits,
-    SafetyMemory,
-    Verdict,
-    judge,
-    stale_fault,
-    vet,
-)
+from snakewalk.drivers.safety.vet import SafetyMemory, Verdict, check_state, stale_fault, vet
 from snakewalk.drivers.types import JointCommand, JointState
 
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
@@ -99,7 +93,7 @@ class SafeLink:
         self._touched = True
         state = self._link.enable()
         self._state, self._memory = state, SafetyMemory.at_rest(state)
-        self._judge(state, self._memory)
+        self._check(state, self._memory)
         self._refuse_if_tripped()
         return state
 
@@ -118,16 +112,16 @@ class SafeLink:
         try:
             state = self._link.read()
         except DriverError as fault:
-            return self._bring_back(str(fault), fault)
+            return self._recover(str(fault), fault)
         if self._memory is None:
             self._state = state
             return state
         if self._recovery is not None and self.tripped is None:
             stale = stale_fault(state, self._limits, self._clock.now_s())
             if stale is not None:
-                return self._bring_back(stale, None)
+                return self._recover(stale, None)
         self._state = state
-        self._judge(state, self._memory)
+        self._check(state, self._memory)
         return state
 
     def write(self, command: JointCommand) -> None:
@@ -153,11 +147,14 @@ class SafeLink:
         try:
             self._link.write(JointCommand(command.time_s, verdict.goal_rad))
         except DriverError as fault:
-            self._bring_back(str(fault), fault)
+            self._recover(str(fault), fault)
         else:  # if the program stood still in between, the next step counts from here
             memory = verdict.memory
             self._memory = SafetyMemory(
-                self._clock.now_s(), memory.goal_rad, memory.over_current_since_s, memory.sound
+                self._clock.now_s(),
+                memory.goal_rad,
+                memory.over_current_since_s,
+                memory.checked_state,
             )
 
     def request_stop(self, reason: str) -> None:
@@ -176,12 +173,12 @@ class SafeLink:
         self.tripped = None
         self._stop_requested = None
 
-    def _bring_back(self, reason: str, fault: DriverError | None) -> JointState:
+    def _recover(self, reason: str, fault: DriverError | None) -> JointState:
         """Let the recovery mend what broke; else latch and raise."""
         state = None
         if self._recovery is not None and self._memory is not None:
             try:
-                state = self._recovery.bring_back(reason, lambda: self._stop_requested)
+                state = self._recovery.recover(reason, lambda: self._stop_requested)
             except DriverError as again:
                 fault = again
                 reason = f"{reason}; while going on: {again}"
@@ -190,11 +187,11 @@ class SafeLink:
             raise SafetyTrippedError(str(self.tripped)) from fault
         self.recoveries += 1
         self._state, self._memory = state, SafetyMemory.at_rest(state)
-        self._judge(state, self._memory)
+        self._check(state, self._memory)
         return state
 
-    def _judge(self, state: JointState, memory: SafetyMemory) -> None:
-        fault, self._memory = judge(state, memory, self._limits, self._clock.now_s())
+    def _check(self, state: JointState, memory: SafetyMemory) -> None:
+        fault, self._memory = check_state(state, memory, self._limits, self._clock.now_s())
         fault = self._stop_requested or fault
         if fault is not None:
             self._trip(fault)

@@ -1,12 +1,11 @@
-"""What may pass to the servos: a pure function, below every source of motion.
+"""Vetting: a pure function that decides which command passes, below every source of motion.
 
-Small excesses are clamped: joint limits, rate, and lead (goal minus measured, which is what makes
-torque). What no healthy run shows is vetoed: numbers that are none, a joint forced beyond its
+Small excesses are clamped: joint limits, rate, and lead (goal minus measured, which makes the
+torque). What no healthy run shows is vetoed: values that are not numbers, a joint forced beyond its
 limit, an alarm, lasting over-current, heat, supply voltage, a state that is too old.
 """
 
 import math
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -14,63 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools, Bytes, Floats
-from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import SafetyConfig
-from snakewalk.drivers.compiling import compiled, seen
+from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.protocol.packet import ALERT
 from snakewalk.drivers.protocol.registers import alarm_names
+from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.types import JointCommand, JointState
 
-_FLOATS, _BYTES = seen(), seen("uint8")
+_FLOATS, _BYTES = readonly_array(), readonly_array("uint8")
 
 
-@dataclass(frozen=True, slots=True)
-class SafetyLimits:
-    """Limits of one robot; a value at its limit is inside."""
-
-    limit_rad: Floats
-    """(J,) half range of the goals."""
-    limit_slack_rad: float
-    """How far beyond it a joint may be *measured*: bent by force, or by overshoot."""
-    goal_rate_rad_s: float
-    goal_lead_rad: float
-    """Goal minus measured."""
-    current_limit_a: float
-    current_time_s: float
-    """How long the current may be exceeded."""
-    temperature_limit_c: float
-    voltage_min_v: float
-    voltage_max_v: float
-    stale_limit_s: float
-
-    @staticmethod
-    def from_config(robot: RobotConfig, safety: SafetyConfig) -> "SafetyLimits":
-        """Limits as the run's files say."""
-        return SafetyLimits(
-            limit_rad=np.array(robot.limit_rad),
-            limit_slack_rad=0.2,
-            goal_rate_rad_s=safety.goal_rate_rad_s,
-            goal_lead_rad=safety.goal_lead_rad,
-            current_limit_a=safety.current_limit_a,
-            current_time_s=safety.current_time_s,
-            temperature_limit_c=safety.temperature_limit_c,
-            voltage_min_v=safety.voltage_min_v,
-            voltage_max_v=safety.voltage_max_v,
-            stale_limit_s=safety.stale_limit_s,
-        )
-
-
-class Sound(NamedTuple):
-    """A state that kept limits: the same two again can only have aged."""
+class CheckedState(NamedTuple):
+    """A state that kept limits: checked again against the same limits it can only have aged."""
 
     state: JointState
     limits: SafetyLimits
-    oldest_s: float
+    age_max_s: float
     """Greatest age in it."""
 
 
 class SafetyMemory(NamedTuple):
-    """What the next judgement needs of the last one."""
+    """What the next check needs of the last one."""
 
     time_s: float
     """When ``goal_rad`` was sent."""
@@ -78,23 +40,23 @@ class SafetyMemory(NamedTuple):
     """(J,) last goals that passed; at the start the measured angles."""
     over_current_since_s: Floats
     """(J,) time of the first reading above the limit; NaN below it."""
-    sound: Sound | None = None
-    """What was judged last, if it was well."""
+    checked_state: CheckedState | None = None
+    """The state that was checked last, if it kept the limits."""
 
     @staticmethod
     def at_rest(state: JointState) -> "SafetyMemory":
         """Memory of joints that hold the pose in ``state``."""
         held = np.array(state.position_rad, float)
-        return SafetyMemory(state.time_s, held, _never(len(held)))
+        return SafetyMemory(state.time_s, held, _no_overcurrent(len(held)))
 
 
 class Verdict(NamedTuple):
-    """What becomes of one command."""
+    """Result of vetting one command."""
 
     goal_rad: Floats
-    """(J,) goals that may be sent; the last ones again where there is a veto."""
+    """(J,) goals that may be sent; on a veto the last ones again."""
     veto: str | None
-    """Why nothing may pass any more, one line; None: pass."""
+    """Why nothing may pass any more, one line; None: the command passes."""
     clamped: Bools
     """(J,) goals that were changed."""
     memory: SafetyMemory
@@ -108,63 +70,63 @@ def vet(
     limits: SafetyLimits,
     now_s: float,
 ) -> Verdict:
-    """Judge a command against the newest state.
+    """Vet a command against the newest state.
 
     Where clamps disagree the joint limit wins over the lead, and the lead over the rate: a smaller
     lead is a smaller torque.
     """
-    veto, seen = judge(state, last, limits, now_s)
+    veto, checked = check_state(state, last, limits, now_s)
     veto = veto or _command_fault(command, limits)
     if veto is not None:
-        return Verdict(last.goal_rad, veto, np.zeros(len(last.goal_rad), np.bool_), seen)
+        return Verdict(last.goal_rad, veto, np.zeros(len(last.goal_rad), np.bool_), checked)
     # After a pause the allowance does not pile up: never more than that of one stale limit
     dt_s = min(max(now_s - last.time_s, 0.0), limits.stale_limit_s)
     step, lead = limits.goal_rate_rad_s * dt_s, limits.goal_lead_rad
     goal, clamped = np.empty(len(last.goal_rad)), np.empty(len(last.goal_rad), np.bool_)
-    wanted, measured = np.asarray(command.goal_rad, float), np.asarray(state.position_rad, float)
-    _clamp(wanted, last.goal_rad, measured, limits.limit_rad, step, lead, goal, clamped)
+    requested, measured = np.asarray(command.goal_rad, float), np.asarray(state.position_rad, float)
+    _clamp(requested, last.goal_rad, measured, limits.limit_rad, step, lead, goal, clamped)
     goal.setflags(write=False)
-    memory = SafetyMemory(now_s, goal, seen.over_current_since_s, seen.sound)
+    memory = SafetyMemory(now_s, goal, checked.over_current_since_s, checked.checked_state)
     return Verdict(goal, None, clamped, memory)
 
 
-def judge(
+def check_state(
     state: JointState, last: SafetyMemory, limits: SafetyLimits, now_s: float
 ) -> tuple[str | None, SafetyMemory]:
-    """First reason to stop that the state gives, None if there is none; and what to remember.
+    """First reason to stop that the state gives, or None, and the new memory.
 
-    What a state was found to be does not change when it is asked again, but for its age.
+    The result for a state does not change when it is checked again, except for its age.
     """
-    sound, aged_s = last.sound, now_s - state.time_s
-    if sound is not None and sound.state is state and sound.limits is limits:
-        if sound.oldest_s + aged_s <= limits.stale_limit_s:
+    checked, aged_s = last.checked_state, now_s - state.time_s
+    if checked is not None and checked.state is state and checked.limits is limits:
+        if checked.age_max_s + aged_s <= limits.stale_limit_s:
             return None, last
         return stale_fault(state, limits, now_s), last
-    since_s, oldest_s = last.over_current_since_s, _oldest_s(state, last, limits)
-    if not oldest_s + aged_s <= limits.stale_limit_s:  # too old, or not plainly well (NaN)
+    since_s, age_max_s = last.over_current_since_s, _age_max_s(state, last, limits)
+    if not age_max_s + aged_s <= limits.stale_limit_s:  # too old, or the quick check failed (NaN)
         since_s = over_current_since_s(state, last, limits)
         fault = state_fault(state, since_s, limits, now_s)
         if fault is not None:
             return fault, SafetyMemory(last.time_s, last.goal_rad, since_s)
-        oldest_s = float(np.maximum.reduce(state.age_s))
-    sound = Sound(state, limits, oldest_s)
-    return None, SafetyMemory(last.time_s, last.goal_rad, since_s, sound)
+        age_max_s = float(np.maximum.reduce(state.age_s))
+    checked = CheckedState(state, limits, age_max_s)
+    return None, SafetyMemory(last.time_s, last.goal_rad, since_s, checked)
 
 
 def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> Floats:
-    """(J,) since when each current is above the limit; a joint not read keeps its time."""
+    """(J,) since when each current is above the limit; a joint that was not read keeps its time."""
     since = last.over_current_since_s
     over = np.abs(state.current_a) > limits.current_limit_a
     if not over.any() and not np.isfinite(since).any():
-        return _never(len(since))
+        return _no_overcurrent(len(since))
     started = np.where(np.isnan(since), state.time_s, since)
     return np.where(state.valid, np.where(over, started, np.nan), since)
 
 
 def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | None:
-    """First joint that was not read for too long; None if there is none."""
+    """The first joint that was not read for too long, as one line; None if there is none."""
     since_s = now_s - state.time_s
-    # the oldest stands for all, as rounding keeps their order; of a NaN this is not true
+    # the greatest age stands for all, as rounding keeps the order; not so for a NaN
     if np.maximum.reduce(state.age_s) + since_s <= limits.stale_limit_s:
         return None
     age_s = state.age_s + since_s
@@ -185,7 +147,7 @@ def state_fault(
     over_s = state.time_s - over_since_s
     alarm = (state.hardware_error != 0) | ((state.error & ALERT) != 0)
     numbers = np.stack([state.position_rad, state.velocity_rad_s, state.current_a])
-    # not (a <= b) also stops at a NaN, where a > b would let it pass
+    # not (a <= b) also stops at a NaN, which a > b would let pass
     checks: tuple[tuple[Any, NDArray[Any], str], ...] = (
         (~np.isfinite(numbers).all(axis=0), numbers.sum(axis=0), "measured {}: not a number"),
         (alarm, state.hardware_error, "alarm"),
@@ -206,21 +168,21 @@ def state_fault(
     for bad, values, what in checks:
         if bad.any():
             joint = int(np.argmax(bad))
-            said = f"joint {joint}: " + what.format(values[joint])
+            fault = f"joint {joint}: " + what.format(values[joint])
             names = alarm_names(int(values[joint])) if what == "alarm" else ""
-            return f"{said}: {names}" if names else said
+            return f"{fault}: {names}" if names else fault
     return None
 
 
-def _oldest_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> float:
-    """Greatest age of a state in which no check can find anything; NaN if that is not plain.
+def _age_max_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> float:
+    """Greatest age of a state that passes the quick check; NaN if it does not.
 
-    It costs a tenth of the checks, and is stricter: what is not plain is left to them.
+    The quick check costs a tenth of ``state_fault`` and is stricter: what fails it is left to that.
     """
-    if last.over_current_since_s is not _never(len(last.over_current_since_s)):
+    if last.over_current_since_s is not _no_overcurrent(len(last.over_current_since_s)):
         return math.nan
     try:
-        return _oldest_of(
+        return _quick_check(
             *(state.position_rad, state.velocity_rad_s, state.current_a),
             *(state.temperature_c, state.voltage_v, state.age_s),
             *(state.error, state.hardware_error),
@@ -228,7 +190,7 @@ def _oldest_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> fl
             *(limits.limit_slack_rad, limits.current_limit_a, limits.temperature_limit_c),
             *(limits.voltage_min_v, limits.voltage_max_v),
         )
-    except TypeError:  # a link with another kind of numbers: the checks themselves take any
+    except TypeError:  # a link with other number types: state_fault takes any
         return math.nan
 
 
@@ -236,7 +198,7 @@ def _oldest_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> fl
     f"float64({_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, {_BYTES}, {_BYTES},"
     f" {_FLOATS}, float64, float64, float64, float64, float64)"
 )
-def _oldest_of(
+def _quick_check(
     position_rad: Floats,
     velocity_rad_s: Floats,
     current_a: Floats,
@@ -247,27 +209,27 @@ def _oldest_of(
     hardware_error: Bytes,
     limit_rad: Floats,
     slack_rad: float,
-    most_a: float,
-    hottest_c: float,
-    least_v: float,
-    most_v: float,
+    current_max_a: float,
+    temperature_max_c: float,
+    voltage_min_v: float,
+    voltage_max_v: float,
 ) -> float:
-    """Greatest age, if every value is a number inside its limits and no error shows; else NaN."""
-    oldest_s = -np.inf
+    """Greatest age if every value is a number inside its limits and there is no error; else NaN."""
+    age_max_s = -np.inf
     for k in range(len(position_rad)):
-        # a comparison with a NaN is false: what was not read is not inside
+        # a comparison with a NaN is false, so a value that was not read is not inside
         inside = (
             abs(position_rad[k]) <= limit_rad[k] + slack_rad
             and abs(velocity_rad_s[k]) < np.inf
-            and abs(current_a[k]) <= most_a
-            and temperature_c[k] <= hottest_c
-            and least_v <= voltage_v[k] <= most_v
+            and abs(current_a[k]) <= current_max_a
+            and temperature_c[k] <= temperature_max_c
+            and voltage_min_v <= voltage_v[k] <= voltage_max_v
             and age_s[k] < np.inf
         )
         if not inside or error[k] or hardware_error[k]:
             return np.nan
-        oldest_s = max(oldest_s, age_s[k])
-    return oldest_s
+        age_max_s = max(age_max_s, age_s[k])
+    return age_max_s
 
 
 @compiled(
@@ -275,7 +237,7 @@ def _oldest_of(
     " float64[::1], boolean[::1])"
 )
 def _clamp(
-    wanted_rad: Floats,
+    requested_rad: Floats,
     last_rad: Floats,
     position_rad: Floats,
     limit_rad: Floats,
@@ -284,17 +246,17 @@ def _clamp(
     goal_rad: Floats,
     clamped: Bools,
 ) -> None:
-    """Goals within rate, lead and limit, in this order, and which of them were changed."""
-    for k in range(len(wanted_rad)):
-        goal = min(max(wanted_rad[k], last_rad[k] - step_rad), last_rad[k] + step_rad)
+    """Clamp goals to rate, lead and limit, in this order; note which were changed."""
+    for k in range(len(requested_rad)):
+        goal = min(max(requested_rad[k], last_rad[k] - step_rad), last_rad[k] + step_rad)
         goal = min(max(goal, position_rad[k] - lead_rad), position_rad[k] + lead_rad)
         goal = min(max(goal, -limit_rad[k]), limit_rad[k])
-        goal_rad[k], clamped[k] = goal, goal != wanted_rad[k]
+        goal_rad[k], clamped[k] = goal, goal != requested_rad[k]
 
 
 @cache
-def _never(joints: int) -> Floats:
-    """(J,) NaN, read-only: that no current is above its limit, told by identity."""
+def _no_overcurrent(joints: int) -> Floats:
+    """(J,) NaN, read-only: no current is above its limit. One array per J, compared by identity."""
     since_s = np.full(joints, np.nan)
     since_s.setflags(write=False)
     return since_s

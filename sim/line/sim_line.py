@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.drivers.protocol.packet import BROADCAST_ID, HEADER, Instruction, InstructionPacket
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.group_fast_path import GroupPath
 from snakewalk.sim.line.id_directory import IdDirectory
@@ -45,7 +45,7 @@ class SimLine(Wire):
         self.tamper = tamper
         self._handler = InstructionHandler(self.firmware, baud)
         self._group = GroupPath(self._handler)
-        self._reader = PacketReader()
+        self._reader = PacketParser()
         self._asked = b""
         self.setBaudRate(baud)
 

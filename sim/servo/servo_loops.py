@@ -1,6 +1,6 @@
 """What every control cycle asks of the servos, as loops over servos and bytes.
 
-Compiled where numba is installed, else run as they stand, to the same bytes. Arguments are arrays
+Compiled; as ``py_func`` they give the same bytes. Arguments are arrays
 and plain numbers: numba takes five times longer to look at a tuple than at an array.
 """
 
@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import AnyInts, Bytes, Floats, Indices, Ints
-from snakewalk.drivers.compiling import compiled, seen
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 # as numba writes them; what is only read may be read-only, and a register's column has gaps
-_READ = seen("uint8", layout="C")
+_READ = readonly_array("uint8", layout="C")
 _TABLE = "uint8[:, ::1]"
-_CRC = seen("uint16", layout="C")
-_PLACES = seen("int64", layout="C")
-_SEEN = seen(layout="C")
-_FRAME = seen(dimensions=2, layout="C")
+_CRC = readonly_array("uint16", layout="C")
+_PLACES = readonly_array("int64", layout="C")
+_SEEN = readonly_array(layout="C")
+_FRAME = readonly_array(dimensions=2, layout="C")
 
 
 @compiled(f"int64({_READ}, int64, int64, int64, {_CRC})")
@@ -104,7 +104,7 @@ def fill_replies(
 
 
 @compiled(
-    f"void({_READ}, {_PLACES}, {_TABLE}, int64, int64, {seen('int64', 2, 'C')},"
+    f"void({_READ}, {_PLACES}, {_TABLE}, int64, int64, {readonly_array('int64', 2, 'C')},"
     f" {_FRAME}, float64, float64[::1], boolean[::1])"
 )
 def accept_goals(
@@ -172,7 +172,10 @@ def warm_up(temperature_c: Floats, heat_j: Floats, slice_s: float, thermal: Floa
         heat_j[row] = 0.0
 
 
-@compiled(f"boolean({_SEEN}, {seen('uint8')}, int64, {seen('uint16')}, {seen('uint16')})")
+@compiled(
+    f"boolean({_SEEN}, {readonly_array('uint8')}, int64, {readonly_array('uint16')},"
+    f" {readonly_array('uint16')})"
+)
 def out_of_range(
     temperature_c: Floats,
     hottest_c: AnyInts,

@@ -17,7 +17,7 @@ from snakewalk.drivers.protocol.packet import (
     encode_instruction,
     encode_status,
 )
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 
 Span = tuple[int, int]
 """Address and length of a block."""
@@ -66,7 +66,7 @@ class Decoder:
         self._tables: dict[int, ControlTable] = {
             servo_id: load_control_table(each) for servo_id, each in (models or {}).items()
         }
-        self._reader = PacketReader()
+        self._reader = PacketParser()
         self._asked: dict[int, Span] = {}
         self._fast: list[tuple[int, Span]] = []
         self._crc = self._dropped = 0

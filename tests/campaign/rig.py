@@ -15,16 +15,17 @@ from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.drivers.protocol.registers import ServoUnits
+from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Policy, Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
-from snakewalk.drivers.safety.vet import SafetyLimits
 from snakewalk.drivers.types import JointState
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
+from tests.oracles.raw_positions import raw_positions
 
 ROBOT = RobotConfig(name="campaign", joint_axes="ypypyp")
 SAFETY = SafetyConfig()
@@ -113,7 +114,7 @@ class Rig:
 
     def _raw_limits(self) -> tuple[np.ndarray, np.ndarray]:
         half = np.array(ROBOT.limit_rad)
-        return self._units.position_raw(-half), self._units.position_raw(half)
+        return raw_positions(self._units, -half), raw_positions(self._units, half)
 
     def _stamp_readings(self) -> None:
         firmware, bank = self.line.firmware, self.line.bank
@@ -144,7 +145,7 @@ class Rig:
     def _overhear(self, time_s: float, from_host: bool, data: bytes) -> None:
         if not from_host:
             return
-        for packet in PacketReader().feed(data):
+        for packet in PacketParser().feed(data):
             if (
                 isinstance(packet, InstructionPacket)
                 and packet.instruction == Instruction.SYNC_WRITE

@@ -6,6 +6,7 @@ import pytest
 from snakewalk.config.faults import FaultPlan
 from snakewalk.drivers.types import JointState
 from snakewalk.sim.line.rx_queue import RxQueue
+from tests.oracles.raw_positions import raw_positions
 
 from .campaign import Tally, campaign, run_scenario
 from .report import table
@@ -79,7 +80,7 @@ def test_the_witness_sees_goals_that_should_not_be_sent(goal: float) -> None:
     rig = Rig(FaultPlan(), "stop")
     rig.link.enable()
     rig.read()
-    rig.chain._cycle.write_goals(rig._units.position_raw(np.full(JOINTS, goal)))
+    rig.chain._cycle.write_goals(raw_positions(rig._units, np.full(JOINTS, goal)))
     rig.line.drain_until_quiet(1e-3)
     assert rig.witness.beyond_limit >= JOINTS
     assert rig.witness.too_fast == JOINTS

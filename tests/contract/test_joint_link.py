@@ -21,8 +21,8 @@ from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import ChainError, DriverError
 from snakewalk.drivers.link import JointLink
 from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
-from snakewalk.drivers.safety.vet import SafetyLimits
 from snakewalk.drivers.types import JointCommand, JointState
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.plant import Plant

@@ -8,7 +8,7 @@ from snakewalk.drivers.protocol.packet import (
     StatusPacket,
     encode_instruction,
 )
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.serve.pty import IDLE_S, PtyServer
@@ -41,7 +41,7 @@ def ask(line: SimLine, servo_id: int, code: int, params: bytes = b"") -> list[St
 
 
 def send(line: SimLine, raw: bytes) -> list[StatusPacket]:
-    packets = PacketReader().feed(exchange(line, raw))
+    packets = PacketParser().feed(exchange(line, raw))
     assert all(isinstance(packet, StatusPacket) for packet in packets)
     return packets
 

@@ -28,7 +28,7 @@ class PtyPort(SerialPort):
 
     def __init__(self, server: PtyServer, baud: int, clock: ServedClock) -> None:
         super().__init__(server.path, baud, clock)
-        self._exchange = self.file = None  # waits for real time
+        self.descriptor = None  # compiled code would wait for real time
         self._server, self._served = server, clock
         clock.server = server
 

@@ -10,8 +10,8 @@ from snakewalk.controller.runtime.loop import ticks
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
-from snakewalk.drivers.safety.vet import SafetyLimits
 from snakewalk.drivers.types import JointCommand
 
 ROBOT = RobotConfig(name="trio", joint_axes="yyy")

@@ -11,9 +11,9 @@ from snakewalk.controller.app.runs.pose_source import pose_faults, pose_source
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, Outcome, Watcher
+from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
-from snakewalk.drivers.safety.vet import SafetyLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ def execute(
             policy=safety.recovery,
             patience_s=safety.recovery_time_s,
             confirm=confirm,
-            say=lambda text: log.event(clock.now_s(), "recovery", text, "warning"),
+            on_event=lambda text: log.event(clock.now_s(), "recovery", text, "warning"),
         )
 
         def note(kind: str, text: str) -> None:

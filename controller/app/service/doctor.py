@@ -9,7 +9,7 @@ from snakewalk.controller.app.service import servo_checks as servos
 from snakewalk.controller.app.service.finding import Finding
 from snakewalk.controller.app.service.scan import has_baud, scan
 from snakewalk.drivers.bus.budget import wire_budget
-from snakewalk.drivers.bus.control_cycle import GroupCycle
+from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.start_up import FAST_READ_FIRMWARE, ServoReport, inspect
 from snakewalk.drivers.errors import BusError
@@ -72,7 +72,7 @@ def examine(
     return findings
 
 
-def line_quality(cycle: GroupCycle) -> Finding:
+def line_quality(cycle: ControlCycle) -> Finding:
     """Damaged or missing answers in many group reads, as a run does them."""
     lost = sum(not cycle.read().valid.all() for _ in range(_TEST_READS))
     found = f"{lost} of {_TEST_READS} group reads incomplete"

@@ -15,8 +15,8 @@ from snakewalk.controller.app.runs.backend import simulated
 from snakewalk.controller.kinematics.links import BodyView, body_in_world, mean_heading_rad
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.record import Laid
+from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
-from snakewalk.drivers.safety.vet import SafetyLimits
 from snakewalk.drivers.types import JointCommand
 
 FRAME_S = 1.0 / 60.0

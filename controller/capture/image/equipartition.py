@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
-from snakewalk.drivers.compiling import compiled, seen
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 TOLERANCE = 1e-9
 """Of the last point's place, in curve lengths."""
@@ -221,8 +221,8 @@ def _roots(given: _Curve, crossing: Ints) -> Iterator[float]:
 
 
 @compiled(
-    f"int64({seen(dimensions=2, layout='C')}, {seen(layout='C')}, float64,"
-    f" {seen('int64', layout='C')}, float64[:, ::1], float64[::1])"
+    f"int64({readonly_array(dimensions=2, layout='C')}, {readonly_array(layout='C')}, float64,"
+    f" {readonly_array('int64', layout='C')}, float64[:, ::1], float64[::1])"
 )
 def march(
     line: Floats, arc: Floats, chord: float, crossing: Ints, points: Floats, at: Floats

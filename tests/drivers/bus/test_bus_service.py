@@ -10,7 +10,7 @@ from snakewalk.drivers.protocol.packet import (
     StatusPacket,
     encode_status,
 )
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
@@ -27,11 +27,11 @@ def bus(line: SimLine) -> DynamixelBus:
     return DynamixelBus(line)
 
 
-def one_servo(answer: StatusPacket | bytes, asked: list[InstructionPacket]) -> ScriptedPort:
-    raw = answer if isinstance(answer, bytes) else encode_status(answer)
+def one_servo(reply: StatusPacket | bytes, asked: list[InstructionPacket]) -> ScriptedPort:
+    raw = reply if isinstance(reply, bytes) else encode_status(reply)
 
     def script(data: bytes) -> list[tuple[float, bytes]]:
-        asked.extend(PacketReader().feed(data))  # type: ignore[arg-type]
+        asked.extend(PacketParser().feed(data))  # type: ignore[arg-type]
         written = asked[-1].instruction == Instruction.WRITE
         return [(1e-3, encode_status(StatusPacket(1, 0)) if written else raw)]
 
@@ -140,10 +140,10 @@ def test_reboot_switches_torque_off(bus: DynamixelBus, line: SimLine) -> None:
 
 @pytest.mark.parametrize("lag_s", [0.03, 0.045, 0.08, 0.12, 0.2])
 def test_a_late_answer_is_not_that_to_another_register(lag_s: float) -> None:
-    """All answers late by the same time: what is read is right, or nothing."""
+    """All replies late by the same time: what is read is right, or nothing."""
 
     def script(raw: bytes) -> list[tuple[float, bytes]]:
-        (packet,) = PacketReader().feed(raw)
+        (packet,) = PacketParser().feed(raw)
         assert isinstance(packet, InstructionPacket)
         if packet.instruction == Instruction.WRITE:
             return [(lag_s, encode_status(StatusPacket(1, 0)))]

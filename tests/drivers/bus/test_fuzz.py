@@ -5,7 +5,7 @@ import random
 import numpy as np
 import pytest
 
-from snakewalk.drivers.bus.group_read import GroupQuestion
+from snakewalk.drivers.bus.group_read import GroupReadRequest
 from snakewalk.drivers.errors import DriverError
 from snakewalk.drivers.protocol.packet import (
     BROADCAST_ID,
@@ -15,7 +15,7 @@ from snakewalk.drivers.protocol.packet import (
     encode_instruction,
     encode_status,
 )
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
@@ -82,7 +82,7 @@ def fuzz_reader(streams: int, seed: int) -> None:
     rng = random.Random(seed)
     chance_hits = 0
     for _ in range(streams):
-        reader = PacketReader(MAX_LENGTH)
+        reader = PacketParser(MAX_LENGTH)
         data = stream(rng)
         cut = rng.randrange(len(data) + 1)
         reader.feed(data[:cut])
@@ -99,7 +99,7 @@ def fuzz_reader(streams: int, seed: int) -> None:
 
 def fuzz_group_answer(streams: int, seed: int) -> None:
     rng = random.Random(seed)
-    questions = {kind: GroupQuestion(IDS, 126, 10, fast=kind) for kind in (False, True)}
+    requests = {kind: GroupReadRequest(IDS, 126, 10, fast=kind) for kind in (False, True)}
     wrong = 0
     for _ in range(streams):
         kind = rng.random() < 0.5
@@ -112,10 +112,10 @@ def fuzz_group_answer(streams: int, seed: int) -> None:
                 encode_status(StatusPacket(i, 0, b)) for i, b in zip(IDS, blocks, strict=True)
             )
         )
-        answer = questions[kind].parse(stream(rng) if rng.random() < 0.2 else mutated(rng, raw))
-        assert answer.data.shape == (4, 10)
-        assert not (answer.valid & ~answer.answered).any()
-        wrong += bool((answer.data[answer.valid] != true[answer.valid]).any())
+        reply = requests[kind].parse(stream(rng) if rng.random() < 0.2 else mutated(rng, raw))
+        assert reply.data.shape == (4, 10)
+        assert not (reply.valid & ~reply.answered).any()
+        wrong += bool((reply.data[reply.valid] != true[reply.valid]).any())
     assert wrong <= 2 + streams / 20_000  # a CRC of 16 bits
 
 

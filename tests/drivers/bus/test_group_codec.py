@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from snakewalk.drivers.bus import group_read, group_write
-from snakewalk.drivers.bus.group_read import GroupQuestion
+from snakewalk.drivers.bus.group_read import GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.protocol import frames
 from snakewalk.drivers.protocol.crc import crc16
@@ -87,22 +87,22 @@ def test_goals_are_a_sync_write_stuffed_where_needed(compiled: bool, goals: list
 @given(blocks)
 def test_plain_answers_with_any_stuffing(compiled: bool, data: list[bytes]) -> None:
     with loops(compiled):
-        question = GroupQuestion(range(1, len(data) + 1), 126, 10, fast=False)
-        answer = question.parse(plain(data))
-        assert [row.tobytes() for row in answer.data] == data
-        assert answer.valid.all()
-        assert answer.clean
+        request = GroupReadRequest(range(1, len(data) + 1), 126, 10, fast=False)
+        reply = request.parse(plain(data))
+        assert [row.tobytes() for row in reply.data] == data
+        assert reply.valid.all()
+        assert reply.clean
 
 
 @both_ways
 @given(blocks)
 def test_fast_answers_are_never_unstuffed(compiled: bool, data: list[bytes]) -> None:
     with loops(compiled):
-        question = GroupQuestion(range(1, len(data) + 1), 126, 10, fast=True)
-        answer = question.parse(fast(data))
-        assert [row.tobytes() for row in answer.data] == data
-        assert answer.valid.all()
-        assert answer.clean
+        request = GroupReadRequest(range(1, len(data) + 1), 126, 10, fast=True)
+        reply = request.parse(fast(data))
+        assert [row.tobytes() for row in reply.data] == data
+        assert reply.valid.all()
+        assert reply.clean
 
 
 @both_ways
@@ -112,7 +112,7 @@ def test_what_is_valid_after_damage_is_what_was_sent(
     compiled: bool, data: list[bytes], is_fast: bool, draw: st.DataObject
 ) -> None:
     with loops(compiled):
-        question = GroupQuestion(range(1, len(data) + 1), 126, 10, fast=is_fast)
+        request = GroupReadRequest(range(1, len(data) + 1), 126, 10, fast=is_fast)
         raw = bytearray(fast(data) if is_fast else plain(data))
         start = draw.draw(st.integers(0, len(raw) - 1))
         del raw[start : start + draw.draw(st.integers(0, 5))]
@@ -120,27 +120,27 @@ def test_what_is_valid_after_damage_is_what_was_sent(
             at = draw.draw(st.integers(0, max(0, len(raw) - 1)))
             if raw:
                 raw[at] ^= draw.draw(st.integers(0, 255))
-        answer = question.parse(bytes(raw))
-        for k in np.flatnonzero(answer.valid):
-            assert answer.data[k].tobytes() == data[k]
+        reply = request.parse(bytes(raw))
+        for k in np.flatnonzero(reply.valid):
+            assert reply.data[k].tobytes() == data[k]
 
 
 @given(st.integers(0, 15))
 def test_one_lost_servo_costs_one_servo(lost: int) -> None:
     data = [bytes([k]) * 10 for k in range(16)]
     shares = [plain(data)[21 * k : 21 * (k + 1)] for k in range(16)]
-    answer = GroupQuestion(range(1, 17), 126, 10, fast=False).parse(
+    reply = GroupReadRequest(range(1, 17), 126, 10, fast=False).parse(
         b"".join(share for k, share in enumerate(shares) if k != lost)
     )
-    assert answer.valid.tolist() == [k != lost for k in range(16)]
-    assert answer.answered.tolist() == answer.valid.tolist()
+    assert reply.valid.tolist() == [k != lost for k in range(16)]
+    assert reply.answered.tolist() == reply.valid.tolist()
 
 
 def test_a_cut_fast_answer_gives_the_shares_before_the_cut() -> None:
     data = [bytes([k]) * 10 for k in range(4)]
-    answer = GroupQuestion([1, 2, 3, 4], 126, 10, fast=True).parse(fast(data)[: 8 + 2 * 14 + 9])
-    assert answer.valid.tolist() == [True, True, False, False]
-    assert not answer.clean
+    reply = GroupReadRequest([1, 2, 3, 4], 126, 10, fast=True).parse(fast(data)[: 8 + 2 * 14 + 9])
+    assert reply.valid.tolist() == [True, True, False, False]
+    assert not reply.clean
 
 
 @both_ways
@@ -148,36 +148,36 @@ def test_the_error_byte_of_each_servo_comes_through(compiled: bool) -> None:
     with loops(compiled):
         data = [bytes(10)] * 4
         for is_fast, build in ((False, plain), (True, fast)):
-            question = GroupQuestion([1, 2, 3, 4], 126, 10, fast=is_fast)
-            answer = question.parse(build(data, [0, 0x80, 0x03, 0x87]))
-            assert answer.error.tolist() == [0, 0x80, 0x03, 0x87]
-            assert answer.valid.tolist() == [True, True, False, False]  # an alert still has values
-            assert answer.answered.all()
+            request = GroupReadRequest([1, 2, 3, 4], 126, 10, fast=is_fast)
+            reply = request.parse(build(data, [0, 0x80, 0x03, 0x87]))
+            assert reply.error.tolist() == [0, 0x80, 0x03, 0x87]
+            assert reply.valid.tolist() == [True, True, False, False]  # an alert still has values
+            assert reply.answered.all()
 
 
 def test_an_error_without_data_is_an_answer_but_no_value() -> None:
     raw = plain([bytes(10)]) + encode_status(StatusPacket(2, 0x07)) + encode_status(
         StatusPacket(3, 0, bytes(10))
     )  # fmt: skip
-    answer = GroupQuestion([1, 2, 3], 126, 10, fast=False).parse(raw)
-    assert answer.valid.tolist() == [True, False, True]
-    assert answer.answered.all()
-    assert answer.error[1] == 7
+    reply = GroupReadRequest([1, 2, 3], 126, 10, fast=False).parse(raw)
+    assert reply.valid.tolist() == [True, False, True]
+    assert reply.answered.all()
+    assert reply.error[1] == 7
 
 
 def test_two_answers_of_one_servo_are_none() -> None:
     raw = plain([b"a" * 10, b"b" * 10]) + encode_status(StatusPacket(1, 0, b"c" * 10))
-    answer = GroupQuestion([1, 2], 126, 10, fast=False).parse(raw)
-    assert answer.valid.tolist() == [False, True]
-    assert not answer.clean
+    reply = GroupReadRequest([1, 2], 126, 10, fast=False).parse(raw)
+    assert reply.valid.tolist() == [False, True]
+    assert not reply.clean
 
 
 def test_an_answer_of_another_length_is_not_this_questions() -> None:
-    question = GroupQuestion([1, 2], 126, 11, fast=False)
-    answer = question.parse(plain([b"a" * 10, b"b" * 10]))
-    assert not answer.valid.any()
-    fast_question = GroupQuestion([1, 2], 126, 11, fast=True)
-    assert not fast_question.parse(fast([b"a" * 10, b"b" * 10])).valid.any()
+    request = GroupReadRequest([1, 2], 126, 11, fast=False)
+    reply = request.parse(plain([b"a" * 10, b"b" * 10]))
+    assert not reply.valid.any()
+    fast_request = GroupReadRequest([1, 2], 126, 11, fast=True)
+    assert not fast_request.parse(fast([b"a" * 10, b"b" * 10])).valid.any()
 
 
 @pytest.mark.parametrize("is_fast", [False, True])
@@ -193,8 +193,8 @@ def test_compiled_or_not_the_loops_refuse_and_accept_the_same(
     found = []
     for compiled in (True, False):
         with loops(compiled):
-            question = GroupQuestion([1, 2, 3], 126, 10, fast=is_fast)
-            found.append(question._regular(np.frombuffer(raw, np.uint8)))
+            request = GroupReadRequest([1, 2, 3], 126, 10, fast=is_fast)
+            found.append(request._regular(np.frombuffer(raw, np.uint8)))
     one, other = found
     if one is None or other is None:
         assert one is other

@@ -11,7 +11,7 @@ import dynamixel_sdk as sdk
 import numpy as np
 import pytest
 
-from snakewalk.drivers.bus.control_cycle import GroupCycle
+from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.errors import NoAnswerError, PortError, ServoError
 from snakewalk.drivers.port.serial_port import SerialPort
@@ -22,7 +22,7 @@ from snakewalk.drivers.protocol.packet import (
     stuff,
     unstuff,
 )
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
@@ -51,7 +51,7 @@ def test_transmit_stuffing_is_never_applied() -> None:
     port = ScriptedPort(lambda raw: sent.append(raw) or [])
     PH.write4ByteTxRx(port, 1, 116, HEADER_LIKE)
     assert b"\xff\xff\xfd\xfd" not in sent[0]
-    assert PacketReader().feed(sent[0]) == []  # a strict servo takes it for damage
+    assert PacketParser().feed(sent[0]) == []  # a strict servo takes it for damage
     assert PH.write4ByteTxRx(line, 1, 20, -131073)[0] == sdk.COMM_RX_TIMEOUT
 
     DynamixelBus(line).write(1, "Homing Offset", -131073)
@@ -82,7 +82,7 @@ def test_group_reads_drop_the_error_byte() -> None:
         assert all(len(data) == 10 for data in reads.data_dict.values())  # and nothing beside it
 
     for fast in (False, True):
-        assert GroupCycle(line, [1, 2], fast=fast).read().error.tolist() == [0, 0x80]
+        assert ControlCycle(line, [1, 2], fast=fast).read().error.tolist() == [0, 0x80]
 
 
 def test_an_error_in_a_group_read_counts_as_its_value() -> None:
@@ -97,9 +97,9 @@ def test_an_error_in_a_group_read_counts_as_its_value() -> None:
     assert reads.txRxPacket() == sdk.COMM_SUCCESS
     assert reads.getData(2, 132, 4) == 0x11111111
 
-    answer = GroupCycle(ScriptedPort(script), (1, 2), fast=False).read()
-    assert answer.answered.all()
-    assert answer.valid.tolist() == [True, False]
+    reply = ControlCycle(ScriptedPort(script), (1, 2), fast=False).read()
+    assert reply.answered.all()
+    assert reply.valid.tolist() == [True, False]
 
 
 @pytest.mark.parametrize("how", ["txRxPacket", "fastSyncRead"])
@@ -109,11 +109,11 @@ def test_one_missing_servo_loses_the_whole_group(how: str) -> None:
     assert getattr(reads, how)() != sdk.COMM_SUCCESS
     assert [reads.getData(i, 132, 4) for i in (1, 2, 4)] == [0, 0, 0]  # zeros, not "unknown"
 
-    cycle = GroupCycle(line, IDS, fast=how == "fastSyncRead")
+    cycle = ControlCycle(line, IDS, fast=how == "fastSyncRead")
     for _ in range(4):
-        answer = cycle.read()
-    assert answer.valid.tolist() == [True, True, False, True]
-    assert answer.data[answer.valid][:, 6:10].copy().view("<i4").ravel().tolist() == [2048] * 3
+        reply = cycle.read()
+    assert reply.valid.tolist() == [True, True, False, True]
+    assert reply.data[reply.valid][:, 6:10].copy().view("<i4").ravel().tolist() == [2048] * 3
 
 
 def test_an_error_without_data_is_success_and_then_an_index_error() -> None:
@@ -181,11 +181,11 @@ def test_after_a_stall_a_fast_read_returns_the_cycle_before() -> None:
         return once
 
     def by_us(port: ScriptedPort) -> Callable[[], set[int]]:
-        cycle = GroupCycle(port, IDS, fast=True)
+        cycle = ControlCycle(port, IDS, fast=True)
 
         def once() -> set[int]:
-            answer = cycle.read()
-            return set(answer.data[answer.valid].ravel().tolist())
+            reply = cycle.read()
+            return set(reply.data[reply.valid].ravel().tolist())
 
         return once
 
@@ -261,6 +261,6 @@ def test_their_packets_are_ours_where_nothing_needs_stuffing() -> None:
         sent: list[bytes] = []
         port = ScriptedPort(lambda raw, sent=sent: sent.append(raw) or [])
         PH.writeTxOnly(port, servo_id, address, len(data), list(data))
-        (packet,) = PacketReader().feed(sent[0]) if b"\xff\xff\xfd" not in data else (None,)
+        (packet,) = PacketParser().feed(sent[0]) if b"\xff\xff\xfd" not in data else (None,)
         if packet is not None:
             assert packet == InstructionPacket(servo_id, 3, address.to_bytes(2, "little") + data)

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from snakewalk.drivers.bus.budget import wire_budget
-from snakewalk.drivers.bus.group_read import GroupQuestion
+from snakewalk.drivers.bus.group_read import GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.errors import BudgetError
 
@@ -21,11 +21,11 @@ def test_the_measured_wire_limits(baud: int, fast: bool, cycle_ms: float) -> Non
 @given(st.integers(1, 64), st.booleans(), st.integers(1, 30))
 def test_bytes_are_those_that_the_codec_sends_and_awaits(n: int, fast: bool, length: int) -> None:
     ids = range(1, n + 1)
-    question = GroupQuestion(ids, 126, length, fast=fast)
+    request = GroupReadRequest(ids, 126, length, fast=fast)
     budget = wire_budget(n, 1_000_000, fast=fast, read_bytes=length)
     assert budget.write_bytes == len(GroupWrite(ids, 116).encode(np.zeros(n, np.int32)))
-    assert budget.request_bytes == len(question.request)
-    assert budget.answer_bytes == question.answer_bytes
+    assert budget.request_bytes == len(request.packet)
+    assert budget.reply_bytes == request.reply_bytes
 
 
 def test_a_rate_above_the_limit_is_refused_with_the_limit() -> None:

@@ -9,7 +9,7 @@ from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.chain.start_up import inspect
 from snakewalk.drivers.errors import BusError, ChainError
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.drivers.types import JointCommand
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
@@ -32,11 +32,11 @@ class Recorder(SimLine):
         self.heard: list[InstructionPacket] = []
 
     def write(self, data: bytes) -> None:
-        self.heard.extend(PacketReader().feed(data))  # type: ignore[arg-type]
+        self.heard.extend(PacketParser().feed(data))  # type: ignore[arg-type]
         super().write(data)
 
     def writePort(self, packet: bytes | list[int]) -> int:
-        self.heard.extend(PacketReader().feed(bytes(packet)))  # type: ignore[arg-type]
+        self.heard.extend(PacketParser().feed(bytes(packet)))  # type: ignore[arg-type]
         return super().writePort(packet)
 
     def writes(self) -> list[tuple[int, int, bytes]]:

@@ -43,8 +43,8 @@ def test_a_deadline_returns_what_came(pair: tuple[int, SerialPort]) -> None:
 
 def test_draining_and_clearing_throw_away(pair: tuple[int, SerialPort]) -> None:
     master, port = pair
-    os.write(master, b"late answer")
-    assert port.drain_until_quiet(0.01) == len(b"late answer")
+    os.write(master, b"late reply")
+    assert port.drain_until_quiet(0.01) == len(b"late reply")
     os.write(master, b"more")
     port.clearPort()
     assert port.read_until(1, port.clock.now_s()) == b""
@@ -98,19 +98,16 @@ def test_a_closed_port_says_so(pair: tuple[int, SerialPort]) -> None:
     port.write(b"x")
 
 
-@pytest.mark.parametrize("call", ["write", "read", "ask", "clear", "waiting"])
-@pytest.mark.parametrize("compiled", [True, False])
-def test_a_port_that_vanishes_is_a_port_error(call: str, compiled: bool) -> None:
+@pytest.mark.parametrize("call", ["write", "read", "transact", "clear", "waiting"])
+def test_a_port_that_vanishes_is_a_port_error(call: str) -> None:
     master, slave = os.openpty()
     port = SerialPort(os.ttyname(slave), 57_600)
     os.close(slave)
     os.close(master)
-    if not compiled:
-        port._exchange = None
     calls = {
         "write": lambda: port.write(b"x"),
         "read": lambda: port.read_until(1, 0.0),
-        "ask": lambda: port.ask(b"x", 1, 1.0),
+        "transact": lambda: transact(port, b"x", 1, 1.0),
         "clear": port.clearPort,
         "waiting": port.getBytesAvailable,
     }
@@ -121,61 +118,59 @@ def test_a_port_that_vanishes_is_a_port_error(call: str, compiled: bool) -> None
     port.closePort()
 
 
-@pytest.fixture(params=[True, False], ids=["compiled", "python"])
-def asking(pair: tuple[int, SerialPort], request: pytest.FixtureRequest) -> tuple[int, SerialPort]:
-    if not request.param:
-        pair[1]._exchange = None
-    elif pair[1]._exchange is None:
-        pytest.skip("numba is not installed")
-    return pair
+def transact(port: SerialPort, request: bytes, count: int, wait_s: float) -> bytes:
+    """Request and reply, as ``ControlCycle`` does it where nothing is compiled."""
+    port.clearPort()
+    port.write(request)
+    return port.read_until(count, port.clock.now_s() + wait_s)
 
 
-def servo(master: int, request: bytes, *answers: bytes) -> threading.Thread:
-    """Answers piece by piece once the whole request is there."""
+def servo(master: int, request: bytes, *replies: bytes) -> threading.Thread:
+    """Replies piece by piece once the whole request is there."""
 
     def serve() -> None:
-        heard = b""
-        while len(heard) < len(request):
-            heard += os.read(master, 4096)
-        for answer in answers if heard == request else ():
-            os.write(master, answer)
+        received = b""
+        while len(received) < len(request):
+            received += os.read(master, 4096)
+        for reply in replies if received == request else ():
+            os.write(master, reply)
 
     thread = threading.Thread(target=serve)
     thread.start()
     return thread
 
 
-def test_an_exchange_forgets_what_came_before_it(asking: tuple[int, SerialPort]) -> None:
-    master, port = asking
-    os.write(master, b"an older answer")
-    thread = servo(master, b"question", b"a" * 100, b"b" * 64, b"c" * 64, b"d" * 72)
+def test_a_transaction_discards_what_arrived_before_it(pair: tuple[int, SerialPort]) -> None:
+    master, port = pair
+    os.write(master, b"an older reply")
+    thread = servo(master, b"request", b"a" * 100, b"b" * 64, b"c" * 64, b"d" * 72)
     whole = b"a" * 100 + b"b" * 64 + b"c" * 64 + b"d" * 72
-    assert port.ask(b"question", 300, 5.0) == whole
+    assert transact(port, b"request", 300, 5.0) == whole
     thread.join()
 
 
-def test_an_exchange_ends_at_its_deadline_with_what_came(asking: tuple[int, SerialPort]) -> None:
-    master, port = asking
-    thread = servo(master, b"question", b"short")
+def test_a_transaction_ends_at_its_deadline_with_what_arrived(pair: tuple[int, SerialPort]) -> None:
+    master, port = pair
+    thread = servo(master, b"request", b"short")
     now = port.clock.now_s()
-    assert port.ask(b"question", 300, 0.2) == b"short"
+    assert transact(port, b"request", 300, 0.2) == b"short"
     assert port.clock.now_s() >= now + 0.2
     thread.join()
 
 
-def test_an_exchange_takes_no_more_than_it_asked_for(asking: tuple[int, SerialPort]) -> None:
-    master, port = asking
-    thread = servo(master, b"question", b"answer and more")
-    assert port.ask(b"question", 6, 5.0) == b"answer"
+def test_a_transaction_takes_no_more_than_requested(pair: tuple[int, SerialPort]) -> None:
+    master, port = pair
+    thread = servo(master, b"request", b"answer and more")
+    assert transact(port, b"request", 6, 5.0) == b"answer"
     assert port.read_until(9, port.clock.now_s() + 5.0) == b" and more"
     thread.join()
 
 
-def test_a_question_longer_than_the_devices_buffer(asking: tuple[int, SerialPort]) -> None:
-    master, port = asking
-    question = bytes(range(256)) * 80
-    thread = servo(master, question, b"answer")
-    assert port.ask(question, 6, 5.0) == b"answer"
+def test_a_request_longer_than_the_devices_buffer(pair: tuple[int, SerialPort]) -> None:
+    master, port = pair
+    request = bytes(range(256)) * 80
+    thread = servo(master, request, b"answer")
+    assert transact(port, request, 6, 5.0) == b"answer"
     thread.join()
 
 

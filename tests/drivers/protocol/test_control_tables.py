@@ -10,6 +10,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.control_table import load_control_table, model_numbers, model_of
 from snakewalk.drivers.protocol.registers import ServoUnits
+from tests.oracles.raw_positions import raw_positions
 
 XM430 = load_control_table("XM430-W350")
 UNITS = ServoUnits.of(XM430)
@@ -78,7 +79,7 @@ def test_scales_of_the_xm430() -> None:
 
 @given(st.floats(-3.1, 3.1))
 def test_angles_survive_to_half_a_step(angle: float) -> None:
-    raw = UNITS.position_raw(np.array([angle]))
+    raw = raw_positions(UNITS, np.array([angle]))
     assert abs(UNITS.position_rad(raw)[0] - angle) <= UNITS.rad_per_position / 2 + 1e-12
 
 
@@ -94,4 +95,4 @@ def test_a_current_without_a_known_unit_is_an_error_not_a_zero() -> None:
 
 def test_not_a_number_is_no_goal() -> None:
     with pytest.raises(ValueError, match="finite"):
-        UNITS.position_raw(np.array([0.0, np.nan]))
+        raw_positions(UNITS, np.array([0.0, np.nan]))

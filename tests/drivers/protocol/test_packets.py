@@ -14,7 +14,7 @@ from snakewalk.drivers.protocol.packet import (
     encode_instruction,
     encode_status,
 )
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 
 Do = Instruction
 MANUAL = [  # e-manual, DYNAMIXEL Protocol 2.0, Instruction Details, XM430-W210
@@ -67,7 +67,7 @@ def encode(packet: InstructionPacket | StatusPacket) -> bytes:
 def test_worked_packets_both_ways(packet: InstructionPacket | StatusPacket, text: str) -> None:
     raw = bytes.fromhex(text)
     assert encode(packet) == raw
-    assert PacketReader().feed(raw) == [packet]
+    assert PacketParser().feed(raw) == [packet]
 
 
 class Recorder:
@@ -107,7 +107,7 @@ def test_round_trip_in_pieces_of_any_size(
     packets: list[InstructionPacket | StatusPacket], size: int
 ) -> None:
     raw = b"".join(encode(packet) for packet in packets)
-    reader = PacketReader()
+    reader = PacketParser()
     pieces = (raw[k : k + size] for k in range(0, len(raw), size))
     assert [packet for piece in pieces for packet in reader.feed(piece)] == packets
     assert (reader.pending, reader.dropped_bytes, reader.crc_errors) == (0, 0, 0)

@@ -12,7 +12,7 @@ from snakewalk.drivers.protocol.packet import (
     encode_instruction,
     encode_status,
 )
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 
 PING = InstructionPacket(1, 1)
 PING_RAW = encode_instruction(PING)
@@ -25,7 +25,7 @@ def framed(servo_id: int, body: bytes) -> bytes:
 
 
 def test_reset_forgets_and_counts() -> None:
-    reader = PacketReader()
+    reader = PacketParser()
     reader.feed(PING_RAW[:9])
     assert (reader.pending, reader.dropped_bytes) == (9, 0)
     reader.reset()
@@ -37,25 +37,25 @@ def test_reset_forgets_and_counts() -> None:
 def test_lengths_of_two_bytes(size: int) -> None:
     packet = InstructionPacket(1, 3, bytes(range(250)) * 17)
     packet = InstructionPacket(1, 3, packet.params[:size])
-    assert PacketReader().feed(encode_instruction(packet) + PING_RAW) == [packet, PING]
+    assert PacketParser().feed(encode_instruction(packet) + PING_RAW) == [packet, PING]
 
 
 def test_the_longest_packet_that_is_believed() -> None:
     packet = InstructionPacket(1, 3, bytes(17))
     raw = encode_instruction(packet)
-    assert PacketReader(20).feed(raw) == [packet]
-    reader = PacketReader(19)
+    assert PacketParser(20).feed(raw) == [packet]
+    reader = PacketParser(19)
     assert reader.feed(raw + PING_RAW) == [PING]
     assert reader.dropped_bytes == len(raw)
 
 
 def test_a_status_packet_without_an_error_byte_is_none() -> None:
-    assert PacketReader().feed(framed(1, b"\x55") + PING_RAW) == [PING]
+    assert PacketParser().feed(framed(1, b"\x55") + PING_RAW) == [PING]
 
 
 def test_a_frame_without_an_instruction_is_none() -> None:
     for servo_id in range(253):
-        assert PacketReader().feed(framed(servo_id, b"") + PING_RAW) == [PING]
+        assert PacketParser().feed(framed(servo_id, b"") + PING_RAW) == [PING]
 
 
 def test_instructions_whose_crc_begins_like_a_status_packet() -> None:
@@ -63,26 +63,26 @@ def test_instructions_whose_crc_begins_like_a_status_packet() -> None:
     met = [raw for raw in raws if raw[8] == 0x55]
     assert met
     for raw in met:
-        (packet,) = PacketReader().feed(raw)
+        (packet,) = PacketParser().feed(raw)
         assert packet == InstructionPacket(raw[4], raw[7])
 
 
 @pytest.mark.parametrize(("servo_id", "possible"), [(252, True), (253, False), (255, False)])
 def test_ids(servo_id: int, possible: bool) -> None:
-    packets = PacketReader().feed(framed(servo_id, b"\x01") + PING_RAW)
+    packets = PacketParser().feed(framed(servo_id, b"\x01") + PING_RAW)
     assert packets == ([InstructionPacket(servo_id, 1)] if possible else []) + [PING]
 
 
 def test_a_frame_with_broken_stuffing_is_counted_as_dropped() -> None:
     broken = framed(1, b"\x03\xff\xff\xfd\x00")
-    reader = PacketReader()
+    reader = PacketParser()
     assert reader.feed(b"\x00\x01" + broken + PING_RAW) == [PING]
     assert (reader.stuffing_errors, reader.dropped_bytes) == (1, 2 + len(broken))
 
 
 @pytest.mark.parametrize("noise", [b"\x00", b"\x00\x01", b"\x00\x01\x02", b"\xff\xfe\x00"])
 def test_noise_that_begins_no_header_is_not_kept(noise: bytes) -> None:
-    reader = PacketReader()
+    reader = PacketParser()
     reader.feed(noise)
     assert (reader.pending, reader.dropped_bytes) == (0, len(noise))
 
@@ -92,7 +92,7 @@ def test_the_end_of_a_packet_is_not_kept_as_the_beginning_of_a_header() -> None:
     met = [raw for raw in raws if raw.endswith(b"\xff")]
     assert met
     for raw in met:
-        reader = PacketReader()
+        reader = PacketParser()
         assert len(reader.feed(raw)) == 1
         assert (reader.pending, reader.dropped_bytes) == (0, 0)
 

@@ -10,9 +10,9 @@ from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import ChainError, PortError, SafetyTrippedError
+from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Policy, Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
-from snakewalk.drivers.safety.vet import SafetyLimits
 from snakewalk.drivers.types import JointCommand
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
@@ -48,9 +48,9 @@ class Rig:
     def __init__(self, policy: Policy, confirm: Callable[[str], bool] | None = None) -> None:
         self.line = LooseLine(ServoBank(ROBOT.servo_ids), BenchPlant(4, start_rad=0.1))
         self.chain = ServoChain(DynamixelBus(self.line), ROBOT, watchdog_s=WATCHDOG_S)
-        self.said: list[str] = []
+        self.events: list[str] = []
         recovery = Recovery(
-            self.chain, self.line, policy=policy, confirm=confirm, say=self.said.append
+            self.chain, self.line, policy=policy, confirm=confirm, on_event=self.events.append
         )
         limits = SafetyLimits.from_config(ROBOT, SafetyConfig())
         self.link = SafeLink(self.chain, limits, self.line.clock, recovery)
@@ -111,8 +111,8 @@ def test_a_vanished_port_that_returns(rig: Rig) -> None:
     assert np.abs(held - before).max() < 0.15  # ran on for one watchdog time at most
     assert rig.torque() == [1] * 4
     assert rig.link.recoveries == 1
-    assert rig.said[-1] == "going on from where it stands"
-    assert "moved by at most" in rig.said[1]
+    assert rig.events[-1] == "going on from where it stands"
+    assert "moved by at most" in rig.events[1]
     goal = rig.goal
     rig.cycles(40)
     assert rig.position == pytest.approx(np.full(4, goal + 0.4), abs=0.1)  # the goal is not lost
@@ -150,8 +150,8 @@ def test_a_servo_that_reboots_is_noticed_and_set_up_again(rig: Rig) -> None:
     rig.line.bank["Goal Current"][1] = 1193  # as after power-on
     rig.cycles(16)
     assert rig.link.recoveries == 1
-    assert rig.said[0] == "interrupted: servo 2: torque is off: has it rebooted?; the servos hold"
-    assert rig.said[1].endswith("torque off at joint 1")
+    assert rig.events[0] == "interrupted: servo 2: torque is off: has it rebooted?; the servos hold"
+    assert rig.events[1].endswith("torque off at joint 1")
     assert rig.torque() == [1] * 4
     assert rig.line.bank["Goal Current"][1] == round(0.6 / 2.69e-3)
     assert rig.line.bank["Bus Watchdog"].tolist() == [10] * 4
@@ -179,7 +179,7 @@ def test_a_tripped_watchdog_is_noticed_though_the_host_talks(rig: Rig) -> None:
     rig.line.bank["Bus Watchdog"][2] = 0xFF
     rig.line.firmware.apply_registers()
     rig.cycles(16)
-    assert "servo 3: its bus watchdog has stopped it" in rig.said[0]
+    assert "servo 3: its bus watchdog has stopped it" in rig.events[0]
     assert rig.line.bank["Bus Watchdog"].tolist() == [10] * 4
 
 
@@ -191,7 +191,7 @@ def test_policy_stop_switches_torque_off_when_the_port_is_back() -> None:
         rig.cycles(1)
     rig.line.drain_until_quiet(1e-3)
     assert rig.torque() == [0] * 4
-    assert rig.said == []
+    assert rig.events == []
 
 
 @pytest.mark.parametrize("yes", [True, False])
@@ -237,8 +237,8 @@ def test_what_is_not_as_it_was_does_not_go_on(
     before = rig.position
     with pytest.raises(SafetyTrippedError):
         rig.cycles(1)
-    assert said in rig.said[-1]
-    assert rig.said[-1].startswith("given up: ")
+    assert said in rig.events[-1]
+    assert rig.events[-1].startswith("given up: ")
     assert rig.link.recoveries == 0
     assert np.abs(rig.position - before).max() < 0.3  # only its own motion before the watchdog
     assert not any(rig.torque()[k] for k in range(4) if rig.line.bank["ID"][k] < 5)
@@ -260,7 +260,7 @@ def test_a_stop_button_ends_the_waiting(rig: Rig) -> None:
     start_s = rig.line.clock.now_s()
     with pytest.raises(SafetyTrippedError):
         rig.link.read()
-    assert rig.said[-1] == "given up: stop button"
+    assert rig.events[-1] == "given up: stop button"
     assert rig.line.clock.now_s() - start_s < 0.5
 
 
@@ -278,7 +278,7 @@ def test_an_alarm_is_never_mended(rig: Rig) -> None:
     rig.alter("Hardware Error Status", 1, 0x20)
     with pytest.raises(SafetyTrippedError, match="overload"):
         rig.cycles(3)
-    assert rig.said == []
+    assert rig.events == []
     assert rig.torque() == [0] * 4
 
 

@@ -8,7 +8,8 @@ import pytest
 
 from snakewalk.config.loader import load_robot
 from snakewalk.config.run import SafetyConfig
-from snakewalk.drivers.safety.vet import SafetyLimits, SafetyMemory, _oldest_s, vet
+from snakewalk.drivers.safety.limits import SafetyLimits
+from snakewalk.drivers.safety.vet import SafetyMemory, _age_max_s, vet
 from snakewalk.drivers.types import JointCommand
 
 from .test_safety_vet import (
@@ -16,10 +17,10 @@ from .test_safety_vet import (
     NOW,
     J,
     TestVetoesAtTheirBoundary,
-    judge,
     memory,
     one,
     state,
+    vetted,
 )
 
 
@@ -29,7 +30,7 @@ def test_a_joint_may_be_bent_a_little_beyond_its_limit() -> None:
 
 
 def test_a_clock_that_runs_back_allows_no_step() -> None:
-    verdict = judge(1.0, last=memory(goal=0.3, dt_s=-1.0))
+    verdict = vetted(1.0, last=memory(goal=0.3, dt_s=-1.0))
     assert verdict.veto is None
     assert verdict.goal_rad.tolist() == [0.3] * J
 
@@ -41,28 +42,28 @@ def test_the_limit_wins_over_rate_and_lead(joint: int) -> None:
         bent = state(position_rad=one(sign * (limit + 0.15), joint))
         held = memory()
         held.goal_rad[joint] = sign * (limit + 0.15)
-        verdict = judge(one(sign * 3.0, joint), bent, held)
+        verdict = vetted(one(sign * 3.0, joint), bent, held)
         assert verdict.veto is None
         assert verdict.goal_rad[joint] == sign * limit
 
 
 def test_a_verdict_cannot_be_changed_afterwards() -> None:
     with pytest.raises(ValueError, match="read-only"):
-        judge(0.01).goal_rad[0] = 3.0
+        vetted(0.01).goal_rad[0] = 3.0
 
 
 @pytest.mark.parametrize("joint", range(J))
 @pytest.mark.parametrize("name", ["position_rad", "velocity_rad_s", "current_a"])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_the_joint_that_measures_no_number_is_named(joint: int, name: str, bad: float) -> None:
-    verdict = judge(now=state(**{name: one(bad, joint)}))
+    verdict = vetted(now=state(**{name: one(bad, joint)}))
     assert verdict.veto == f"joint {joint}: measured {bad}: not a number"
 
 
 @pytest.fixture
 def _long_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every check by itself, without the quick look that nothing is the matter."""
-    monkeypatch.setattr("snakewalk.drivers.safety.vet._oldest_s", lambda *_: np.nan)
+    monkeypatch.setattr("snakewalk.drivers.safety.vet._age_max_s", lambda *_: np.nan)
 
 
 @pytest.mark.usefixtures("_long_way")
@@ -72,28 +73,28 @@ class TestVetoesTheLongWay(TestVetoesAtTheirBoundary):
 
 def test_a_goal_far_away_is_a_number_all_the_same() -> None:
     with np.errstate(over="ignore"):
-        verdict = judge(one(1e200, 1))
+        verdict = vetted(one(1e200, 1))
     assert verdict.veto is None
     assert verdict.clamped.tolist() == [False, True, False]
 
 
 def test_a_state_judged_before_is_still_watched_for_its_age() -> None:
     now = state()
-    first = judge(0.05, now)
+    first = vetted(0.05, now)
     assert first.veto is None
-    assert first.memory.sound is not None
-    again = judge(0.05, now, first.memory, NOW + 0.1 + 1e-3)
+    assert first.memory.checked_state is not None
+    again = vetted(0.05, now, first.memory, NOW + 0.1 + 1e-3)
     assert again.veto == "joint 0: not read for 0.101 s"
-    assert judge(0.05, now, first.memory, NOW + 0.1 - 1e-3).veto is None
+    assert vetted(0.05, now, first.memory, NOW + 0.1 - 1e-3).veto is None
 
 
 def test_a_state_that_was_read_long_ago_is_old_when_it_is_first_judged() -> None:
-    assert judge(0.0, state(time_s=NOW - 0.1 - 1e-3)).veto == "joint 0: not read for 0.101 s"
-    assert judge(0.0, state(time_s=NOW - 0.1 + 1e-3)).veto is None
+    assert vetted(0.0, state(time_s=NOW - 0.1 - 1e-3)).veto == "joint 0: not read for 0.101 s"
+    assert vetted(0.0, state(time_s=NOW - 0.1 + 1e-3)).veto is None
 
 
-def test_the_quick_look_takes_what_is_at_its_limit_and_nothing_beyond() -> None:
-    """It only spares the checks; but where it is wrong they are not asked."""
+def test_the_quick_check_passes_what_is_at_its_limit_and_nothing_beyond() -> None:
+    """It only saves the full checks; but where it is wrong they do not run."""
     bent = LIMITS.limit_rad + LIMITS.limit_slack_rad
     at_limits = state(
         position_rad=-bent,
@@ -103,7 +104,7 @@ def test_the_quick_look_takes_what_is_at_its_limit_and_nothing_beyond() -> None:
         voltage_v=np.array([LIMITS.voltage_min_v, LIMITS.voltage_max_v, 12.0]),
         age_s=np.array([0.0, 0.05, 0.01]),
     )
-    assert _oldest_s(at_limits, memory(), LIMITS) == 0.05
+    assert _age_max_s(at_limits, memory(), LIMITS) == 0.05
     beyond = {
         "position_rad": [-bent * (1.0 + 1e-12), np.full(J, np.nan)],
         "velocity_rad_s": [np.full(J, -np.inf), np.full(J, np.nan)],
@@ -119,58 +120,58 @@ def test_the_quick_look_takes_what_is_at_its_limit_and_nothing_beyond() -> None:
         "hardware_error": [np.full(J, 0x20, np.uint8)],
     }
     for name, values in beyond.items():
-        sound = getattr(at_limits, name)
+        healthy = getattr(at_limits, name)
         for value, joint in product(values, range(J)):
-            bad = at_limits._replace(**{name: np.where(np.arange(J) == joint, value, sound)})
-            assert np.isnan(_oldest_s(bad, memory(), LIMITS)), (name, joint, value)
+            bad = at_limits._replace(**{name: np.where(np.arange(J) == joint, value, healthy)})
+            assert np.isnan(_age_max_s(bad, memory(), LIMITS)), (name, joint, value)
     over = memory()._replace(over_current_since_s=one(NOW - 0.1, 1, np.nan))
-    assert np.isnan(_oldest_s(at_limits, over, LIMITS))
+    assert np.isnan(_age_max_s(at_limits, over, LIMITS))
 
 
 def test_what_one_state_or_one_set_of_limits_kept_says_nothing_of_another() -> None:
-    first = judge(0.05, state())
-    assert judge(0.05, state(current_a=np.full(J, np.nan)), first.memory).veto is not None
+    first = vetted(0.05, state())
+    assert vetted(0.05, state(current_a=np.full(J, np.nan)), first.memory).veto is not None
     now = state(position_rad=np.full(J, 0.3))
-    kept = judge(0.3, now, memory(0.3))
+    kept = vetted(0.3, now, memory(0.3))
     strict = replace(LIMITS, limit_rad=np.full(J, 0.05))
     command = JointCommand(NOW, np.full(J, 0.3))
     assert vet(command, now, kept.memory, LIMITS, NOW).veto is None
     assert "forced beyond" in str(vet(command, now, kept.memory, strict, NOW).veto)
 
 
-def test_a_state_with_a_fault_is_judged_again_and_refused_again() -> None:
+def test_a_state_with_a_fault_is_checked_again_and_refused_again() -> None:
     hot = state(temperature_c=np.full(J, 71.0))
-    first = judge(0.05, hot)
-    assert first.memory.sound is None
-    assert judge(0.05, hot, first.memory).veto == first.veto == "joint 0: 71 C: too hot"
+    first = vetted(0.05, hot)
+    assert first.memory.checked_state is None
+    assert vetted(0.05, hot, first.memory).veto == first.veto == "joint 0: 71 C: too hot"
 
 
-def test_lasting_over_current_is_no_sound_state_that_is_looked_at_only_once() -> None:
-    """The same reading again, later: the time since it began is judged by its own time."""
+def test_lasting_over_current_is_no_checked_state_that_is_kept() -> None:
+    """The same reading again, later: the time since it began is compared with its own time."""
     early = state(time_s=NOW - 1.0, current_a=one(3.0, 1))
-    begun = judge(0.0, early, now_s=NOW - 1.0)
+    begun = vetted(0.0, early, now_s=NOW - 1.0)
     assert begun.veto is None
     assert begun.memory.over_current_since_s[1] == NOW - 1.0
-    later = judge(0.0, state(current_a=one(3.0, 1)), begun.memory)
+    later = vetted(0.0, state(current_a=one(3.0, 1)), begun.memory)
     assert later.veto == "joint 1: 3.00 A for too long"
 
 
 @pytest.mark.parametrize("name", ["error", "hardware_error"])
-def test_one_error_among_sound_servos_is_no_sound_state(name: str) -> None:
+def test_one_error_among_healthy_servos_is_an_alarm(name: str) -> None:
     for joint in range(J):
         shown = np.zeros(J, np.uint8)
         shown[joint] = 0x80
-        assert "alarm" in str(judge(now=state(**{name: shown})).veto)
+        assert "alarm" in str(vetted(now=state(**{name: shown})).veto)
 
 
 @pytest.mark.parametrize("joint", range(J))
 def test_an_age_that_is_no_number_is_too_old(joint: int) -> None:
-    assert f"joint {joint}: not read" in str(judge(now=state(age_s=one(np.nan, joint))).veto)
+    assert f"joint {joint}: not read" in str(vetted(now=state(age_s=one(np.nan, joint))).veto)
 
 
 def test_goals_and_angles_of_another_kind_of_number_are_numbers() -> None:
     now = state(position_rad=np.zeros(J, np.float32))
-    assert judge(np.zeros(J, np.int64), now).veto is None
+    assert vetted(np.zeros(J, np.int64), now).veto is None
 
 
 def test_memory_at_rest_tells_that_no_current_was_too_high() -> None:
@@ -181,7 +182,7 @@ def test_memory_at_rest_tells_that_no_current_was_too_high() -> None:
 
 
 def test_the_joint_that_is_too_old_is_named_not_one_at_the_limit() -> None:
-    assert judge(now=state(age_s=np.array([0.1, 0.2, 0.0]))).veto == (
+    assert vetted(now=state(age_s=np.array([0.1, 0.2, 0.0]))).veto == (
         "joint 1: not read for 0.200 s"
     )
 
@@ -189,5 +190,5 @@ def test_the_joint_that_is_too_old_is_named_not_one_at_the_limit() -> None:
 def test_a_joint_that_was_not_read_keeps_its_time_though_none_is_above_the_limit_now() -> None:
     begun = memory()._replace(over_current_since_s=one(NOW - 0.3, 1, np.nan))
     unread = state(valid=np.array([True, False, True]))
-    assert judge(now=unread, last=begun).memory.over_current_since_s[1] == NOW - 0.3
-    assert np.isnan(judge(last=begun).memory.over_current_since_s).all()
+    assert vetted(now=unread, last=begun).memory.over_current_since_s[1] == NOW - 0.3
+    assert np.isnan(vetted(last=begun).memory.over_current_since_s).all()

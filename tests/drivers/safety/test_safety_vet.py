@@ -1,4 +1,4 @@
-"""The judgement, densely around every limit."""
+"""The safety vetting, densely around every limit."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from snakewalk.config.loader import load_robot
 from snakewalk.config.run import SafetyConfig
-from snakewalk.drivers.safety.vet import SafetyLimits, SafetyMemory, Verdict, vet
+from snakewalk.drivers.safety.limits import SafetyLimits
+from snakewalk.drivers.safety.vet import SafetyMemory, Verdict, vet
 from snakewalk.drivers.types import JointCommand, JointState
 
 J = 3
@@ -51,7 +52,7 @@ def memory(goal: float = 0.0, dt_s: float = DT) -> SafetyMemory:
     return SafetyMemory.at_rest(held)
 
 
-def judge(
+def vetted(
     goal: object = 0.0,
     now: JointState | None = None,
     last: SafetyMemory | None = None,
@@ -73,7 +74,7 @@ def one(value: float, joint: int, others: float = 0.0) -> np.ndarray:
 class TestClampsAtTheirBoundary:
     def test_rate(self, joint: int, sign: int, offset: float) -> None:
         step = 4.0 * DT
-        verdict = judge(one(sign * (step + offset), joint))
+        verdict = vetted(one(sign * (step + offset), joint))
         assert verdict.veto is None
         assert verdict.goal_rad[joint] == pytest.approx(sign * (step + min(offset, 0)), abs=1e-15)
         assert verdict.clamped[joint] == (offset > 0)
@@ -81,7 +82,7 @@ class TestClampsAtTheirBoundary:
 
     def test_lead(self, joint: int, sign: int, offset: float) -> None:
         goal = sign * (0.8 + offset)
-        verdict = judge(one(goal, joint), last=memory()._replace(goal_rad=one(goal, joint)))
+        verdict = vetted(one(goal, joint), last=memory()._replace(goal_rad=one(goal, joint)))
         assert verdict.veto is None
         assert verdict.goal_rad[joint] == pytest.approx(sign * (0.8 + min(offset, 0)), abs=1e-15)
         assert verdict.clamped[joint] == (offset > 0)
@@ -90,14 +91,14 @@ class TestClampsAtTheirBoundary:
         limit = LIMITS.limit_rad[joint]
         goal = one(sign * (limit + offset), joint)
         there = state(position_rad=one(sign * limit, joint))
-        verdict = judge(goal, there, memory()._replace(goal_rad=goal))
+        verdict = vetted(goal, there, memory()._replace(goal_rad=goal))
         assert verdict.veto is None
         assert verdict.goal_rad[joint] == sign * (limit + min(offset, 0))
         assert verdict.clamped[joint] == (offset > 0)
 
 
 def vetoed(now: JointState) -> bool:
-    verdict = judge(0.05, now)
+    verdict = vetted(0.05, now)
     if verdict.veto is not None:
         assert (verdict.goal_rad == 0.0).all()  # the last goals, not the new ones
         assert verdict.memory.time_s == NOW - DT
@@ -125,18 +126,18 @@ class TestVetoesAtTheirBoundary:
     def test_state_that_aged_since_it_was_read(self, joint: int, offset: float) -> None:
         old = state(age_s=one(0.04, joint), time_s=NOW - 0.06 - offset)
         if offset != 0:  # at the edge itself rounding decides
-            assert (judge(now=old).veto is not None) == (offset > 0)
+            assert (vetted(now=old).veto is not None) == (offset > 0)
 
     def test_current_over_time(self, joint: int, offset: float) -> None:
         hot = state(current_a=one(-3.0, joint))
         last = memory()._replace(over_current_since_s=one(NOW - 0.5 - offset, joint, np.nan))
-        verdict = judge(now=hot, last=last)
+        verdict = vetted(now=hot, last=last)
         assert (verdict.veto is not None) == (offset >= 0)
 
     def test_current_at_its_limit(self, joint: int, offset: float) -> None:
         for sign in (-1, 1):
             now = state(current_a=one(sign * (2.0 + offset), joint))
-            since = judge(now=now).memory.over_current_since_s
+            since = vetted(now=now).memory.over_current_since_s
             assert (since[joint] == NOW) == (offset > 0)
             assert np.isnan(np.delete(since, joint)).all()
 
@@ -166,11 +167,11 @@ def test_over_current_counts_only_while_it_lasts() -> None:
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("joint", range(J))
 def test_what_is_not_a_number_is_vetoed(bad: float, joint: int) -> None:
-    verdict = judge(one(bad, joint))
+    verdict = vetted(one(bad, joint))
     assert verdict.veto == f"joint {joint}: commanded {bad}: not a number"
     assert (verdict.goal_rad == 0.0).all()
     for name in ("position_rad", "velocity_rad_s", "current_a", "age_s"):
-        assert judge(now=state(**{name: one(bad, joint)})).veto is not None or (
+        assert vetted(now=state(**{name: one(bad, joint)})).veto is not None or (
             name == "age_s" and bad == -np.inf
         )
 
@@ -183,24 +184,26 @@ def test_a_command_for_another_robot_is_vetoed() -> None:
 @pytest.mark.parametrize("bit", range(8))
 def test_every_hardware_error_is_vetoed(bit: int) -> None:
     errors = np.array([0, 1 << bit, 0], np.uint8)
-    assert judge(now=state(hardware_error=errors)).veto is not None
-    alert = judge(now=state(error=np.array([0, 0, 0x80], np.uint8)))
+    assert vetted(now=state(hardware_error=errors)).veto is not None
+    alert = vetted(now=state(error=np.array([0, 0, 0x80], np.uint8)))
     assert alert.veto == "joint 2: alarm"
 
 
 def test_the_veto_names_the_alarm() -> None:
     errors = np.array([0, 0x24, 0], np.uint8)
-    assert judge(now=state(hardware_error=errors)).veto == ("joint 1: alarm: overheating, overload")
+    assert vetted(now=state(hardware_error=errors)).veto == (
+        "joint 1: alarm: overheating, overload"
+    )
 
 
 @pytest.mark.parametrize("code", range(1, 8))
 def test_a_refused_read_alone_is_no_veto(code: int) -> None:
-    assert judge(now=state(error=np.array([code, 0, 0], np.uint8))).veto is None
+    assert vetted(now=state(error=np.array([code, 0, 0], np.uint8))).veto is None
 
 
 def test_what_was_not_read_yet_is_no_reason() -> None:
     unread = np.full(J, np.nan)
-    assert judge(now=state(temperature_c=unread, voltage_v=unread)).veto is None
+    assert vetted(now=state(temperature_c=unread, voltage_v=unread)).veto is None
 
 
 angles = st.floats(-3.0, 3.0)
@@ -214,7 +217,7 @@ def test_what_passes_keeps_all_promises(
     measured = share / 3.0 * (LIMITS.limit_rad + 0.2)
     held = np.clip(last_goal, -LIMITS.limit_rad, LIMITS.limit_rad)
     last = SafetyMemory(NOW - dt_s, held, np.full(J, np.nan))
-    verdict = judge(goal, state(position_rad=measured), last)
+    verdict = vetted(goal, state(position_rad=measured), last)
     assert verdict.veto is None
     passed = verdict.goal_rad
     assert (np.abs(passed) <= LIMITS.limit_rad).all()
@@ -228,13 +231,13 @@ def test_what_passes_keeps_all_promises(
 
 @given(three)
 def test_a_vetted_goal_passes_unchanged_when_asked_again(goal: np.ndarray) -> None:
-    first = judge(goal)
+    first = vetted(goal)
     again = vet(JointCommand(NOW, first.goal_rad), state(), first.memory, LIMITS, NOW)
     assert not again.clamped.any()
 
 
 def test_a_pause_gives_no_allowance_for_a_jump() -> None:
-    verdict = judge(1.0, state(position_rad=np.full(J, 0.9)), memory(dt_s=60.0))
+    verdict = vetted(1.0, state(position_rad=np.full(J, 0.9)), memory(dt_s=60.0))
     assert verdict.goal_rad == pytest.approx(np.full(J, 4.0 * 0.1))
 
 

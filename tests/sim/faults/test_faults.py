@@ -16,7 +16,7 @@ from snakewalk.drivers.protocol.packet import (
     InstructionPacket,
     encode_instruction,
 )
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.line.sim_line import SimLine
 from tests.helpers.bus import ALL, a_line, ask, exchange, group_params, read, send, write
@@ -44,7 +44,7 @@ def wait(line: SimLine, seconds: float) -> None:
 
 
 def replying_ids(line: SimLine) -> list[int]:
-    return [status.servo_id for status in PacketReader().feed(exchange(line, READ_ALL))]
+    return [status.servo_id for status in PacketParser().feed(exchange(line, READ_ALL))]
 
 
 def test_noise_acts_in_its_window_on_its_servos() -> None:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket, encode_instruction
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
@@ -125,7 +125,7 @@ def test_behind_a_missing_servo_all_are_silent(code: int) -> None:
     params = group_params(132, 4, [1, 9, 2])
     raw = exchange(line, encode_instruction(InstructionPacket(ALL, code, params)))
     if code == PLAIN:
-        assert [status.servo_id for status in PacketReader().feed(raw)] == [1]
+        assert [status.servo_id for status in PacketParser().feed(raw)] == [1]
     else:
         assert len(raw) == 8 + 8  # a header that announces three, and one part
         assert int.from_bytes(raw[5:7], "little") == 1 + 3 * 8
@@ -164,7 +164,7 @@ def test_group_path_says_what_the_general_one_says(
         line.firmware.refresh()
         answers.append((raw, bank.table.tobytes(), line.firmware.drive.goal_rad.tolist()))
     assert answers[0] == answers[1]
-    (last,) = PacketReader().feed(answers[0][0])[-1:]
+    (last,) = PacketParser().feed(answers[0][0])[-1:]
     assert last.servo_id == (ALL if code == FAST else 3)
 
 
@@ -176,7 +176,7 @@ def test_a_header_in_the_data_is_stuffed_in_plain_answers_and_not_in_fast_ones()
     line.bank.table[0, 116:120] = np.frombuffer(block, np.uint8)
     plain = exchange(line, sync_read(PLAIN, 2, 116, 4))
     assert len(plain) == 15 + 16
-    assert [s.params for s in PacketReader().feed(plain)] == [block, b"\x00\x08\x00\x00"]
+    assert [s.params for s in PacketParser().feed(plain)] == [block, b"\x00\x08\x00\x00"]
     fast = exchange(line, sync_read(FAST, 2, 116, 4))
     assert len(fast) == 8 + 16
     assert block in fast[8:]
@@ -201,7 +201,7 @@ def test_tampering_loses_doubles_and_changes_answers() -> None:
     answers = exchange(line, sync_read(PLAIN, 3, 132, 4))
     line.tamper = None
     second = ask(line, 2, Instruction.READ, bytes((132, 0, 4, 0)))[0]
-    packets = PacketReader().feed(answers)
+    packets = PacketParser().feed(answers)
     assert packets == [second, second]
     assert answers.endswith(b"x")
 

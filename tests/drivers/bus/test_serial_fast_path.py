@@ -1,4 +1,4 @@
-"""The cycle in one compiled call, on a pseudo terminal; the other end is the test."""
+"""The serial fast path on a pseudo-terminal; the test is the other end."""
 
 import os
 import threading
@@ -9,53 +9,51 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-pytest.importorskip("numba")
-
-from snakewalk.drivers.bus.control_cycle import GroupCycle
-from snakewalk.drivers.bus.group_read import GroupAnswer, GroupQuestion
+from snakewalk.drivers.bus.control_cycle import ControlCycle
+from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
-from snakewalk.drivers.bus.serial_fast_path import ANSWER_NS, WRITE_NS, Express
+from snakewalk.drivers.bus.serial_fast_path import REPLY_NS, WRITE_NS, SerialFastPath
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.serial_port import SerialPort
-from snakewalk.drivers.port.serial_wait import LATE, learn, new_habit
+from snakewalk.drivers.port.serial_wait import LATE, new_latency_estimate, update
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
-from snakewalk.drivers.protocol.parser import PacketReader
+from snakewalk.drivers.protocol.parser import PacketParser
 
 from .test_group_codec import HEADER_LIKE, fast, plain
 
 IDS = (1, 2, 3, 4)
 FAR_S = 5.0
-"""No answer here takes so long, however busy the machine."""
-Answer = Callable[[InstructionPacket, int], bytes]
-"""A question, and the first goal that came before it -> what the servos say."""
+"""No reply here takes so long, however busy the machine."""
+Reply = Callable[[InstructionPacket, int], bytes]
+"""A request, and the first goal that was sent before it -> the servos' reply."""
 
 both_kinds = pytest.mark.parametrize("is_fast", [False, True], ids=["plain", "fast"])
-both_calls = pytest.mark.parametrize("with_goals", [False, True], ids=["read", "turn"])
+both_calls = pytest.mark.parametrize("with_goals", [False, True], ids=["read", "transact"])
 
 
 class Servos:
-    """Read all that is written to a pseudo terminal, and answer questions."""
+    """Read all that is written to a pseudo terminal, and reply to requests."""
 
     def __init__(self) -> None:
         self.master, self._slave = os.openpty()
         self.port = SerialPort(os.ttyname(self._slave), 4_000_000)
-        self.heard: list[InstructionPacket] = []
+        self.received: list[InstructionPacket] = []
         self._thread: threading.Thread | None = None
 
-    def serve(self, answer: Answer, questions: int = 1) -> None:
-        """Answer so many, in a thread."""
+    def serve(self, reply: Reply, requests: int = 1) -> None:
+        """Reply to so many, in a thread."""
 
         def run() -> None:
-            reader, goal, left = PacketReader(), 0, questions
+            reader, goal, left = PacketParser(), 0, requests
             while left:
                 for packet in reader.feed(os.read(self.master, 4096)):
                     assert isinstance(packet, InstructionPacket)
-                    self.heard.append(packet)
+                    self.received.append(packet)
                     if packet.instruction == Instruction.SYNC_WRITE:
                         goal = int.from_bytes(packet.params[5:9], "little", signed=True)
                     else:
                         left -= 1
-                        os.write(self.master, answer(packet, goal))
+                        os.write(self.master, reply(packet, goal))
 
         self._thread = threading.Thread(target=run)
         self._thread.start()
@@ -86,42 +84,40 @@ def echo(packet: InstructionPacket, goal: int) -> bytes:
     return fast(data) if packet.instruction == Instruction.FAST_SYNC_READ else plain(data)
 
 
-def express(
+def fast_path(
     servos: Servos, *, is_fast: bool, latency_s: float = FAR_S, spin_s: float = 4e-5
-) -> Express:
-    question = GroupQuestion(IDS, 126, 10, fast=is_fast)
-    return Express(
-        servos.port, GroupWrite(IDS, 116), question, delay_s=0, latency_s=latency_s, spin_s=spin_s
+) -> SerialFastPath:
+    request = GroupReadRequest(IDS, 126, 10, fast=is_fast)
+    return SerialFastPath(
+        servos.port, GroupWrite(IDS, 116), request, latency_s=latency_s, spin_s=spin_s
     )
 
 
 @both_kinds
 @both_calls
 @pytest.mark.parametrize("spin_s", [0.0, 4e-5])
-def test_question_and_answer(
-    servos: Servos, is_fast: bool, with_goals: bool, spin_s: float
-) -> None:
-    servos.serve(echo, questions=30)
-    cycle = express(servos, is_fast=is_fast, spin_s=spin_s)
+def test_request_and_reply(servos: Servos, is_fast: bool, with_goals: bool, spin_s: float) -> None:
+    servos.serve(echo, requests=30)
+    cycle = fast_path(servos, is_fast=is_fast, spin_s=spin_s)
     for k in range(30):
         goals = np.arange(k, k + 4, dtype=np.int32)
-        answer = cycle.turn(goals if with_goals else None)
-        assert isinstance(answer, GroupAnswer)
-        assert answer.valid.all()
-        assert answer.data.tolist() == [[n if with_goals else n - k] * 10 for n in goals.tolist()]
-    question = GroupQuestion(IDS, 126, 10, fast=is_fast).request
+        reply = cycle.transact(goals if with_goals else None)
+        assert isinstance(reply, GroupReadReply)
+        assert reply.valid.all()
+        assert reply.data.tolist() == [[n if with_goals else n - k] * 10 for n in goals.tolist()]
+    request = GroupReadRequest(IDS, 126, 10, fast=is_fast).packet
     written = GroupWrite(IDS, 116).encode(np.arange(29, 33)) if with_goals else b""
-    assert servos.heard[-1 - with_goals :] == PacketReader().feed(written + question)
+    assert servos.received[-1 - with_goals :] == PacketParser().feed(written + request)
 
 
-def test_answers_are_kept_apart(servos: Servos) -> None:
+def test_replies_are_kept_apart(servos: Servos) -> None:
     """What one cycle has given stays as it is in the next."""
     codes = iter([[0, 0x80, 3, 0], [7, 0, 0, 0]])
-    servos.serve(lambda packet, goal: plain(blocks(packet, goal), next(codes)), questions=2)
-    cycle = express(servos, is_fast=False)
-    first, second = (cycle.turn(np.full(4, k, np.int32)) for k in (1, 60))
-    assert isinstance(first, GroupAnswer)
-    assert isinstance(second, GroupAnswer)
+    servos.serve(lambda packet, goal: plain(blocks(packet, goal), next(codes)), requests=2)
+    cycle = fast_path(servos, is_fast=False)
+    first, second = (cycle.transact(np.full(4, k, np.int32)) for k in (1, 60))
+    assert isinstance(first, GroupReadReply)
+    assert isinstance(second, GroupReadReply)
     assert first.error.tolist() == [0, 0x80, 3, 0]
     assert first.valid.tolist() == [True, True, False, True]
     assert first.data[:, 0].tolist() == [1, 2, 3, 4]
@@ -140,44 +136,44 @@ def test_what_is_not_as_expected_is_handed_back(
     servos = Servos()
     try:
         servos.serve(lambda *_: bytes(whole))
-        cycle = express(servos, is_fast=is_fast)
-        assert cycle.turn(np.zeros(4, np.int32) if with_goals else None) == bytes(whole)
-        assert cycle.left_s < FAR_S + 1.0
+        cycle = fast_path(servos, is_fast=is_fast)
+        assert cycle.transact(np.zeros(4, np.int32) if with_goals else None) == bytes(whole)
+        assert cycle.remaining_s < FAR_S + 1.0
     finally:
         servos.close()
 
 
 @both_kinds
-def test_an_answer_cut_short_is_handed_back_at_the_deadline(servos: Servos, is_fast: bool) -> None:
+def test_a_reply_cut_short_is_handed_back_at_the_deadline(servos: Servos, is_fast: bool) -> None:
     said = fast([b"a" * 10] * 4)[:30] if is_fast else plain([b"a" * 10] * 4)[:21]
     servos.serve(lambda *_: said)
-    cycle = express(servos, is_fast=is_fast, latency_s=0.2)
-    found = cycle.turn(None)
+    cycle = fast_path(servos, is_fast=is_fast, latency_s=0.2)
+    found = cycle.transact(None)
     assert isinstance(found, bytes)
     assert said.startswith(found)
-    assert cycle.left_s <= 0.0
+    assert cycle.remaining_s <= 0.0
 
 
 def test_goals_that_must_be_stuffed_go_another_way(servos: Servos) -> None:
     goals = np.array([5, HEADER_LIKE, 5, 5], np.int32)
-    alone = express(servos, is_fast=False)
+    alone = fast_path(servos, is_fast=False)
     assert alone.write(goals) == 0
-    assert alone.turn(goals) is None
-    assert servos.heard == []
+    assert alone.transact(goals) is None
+    assert servos.received == []
     servos.serve(echo)
-    cycle = GroupCycle(servos.port, IDS, fast=False, latency_s=FAR_S)
+    cycle = ControlCycle(servos.port, IDS, fast=False, latency_s=FAR_S)
     cycle.write_goals(goals)
-    answer = cycle.turn(goals)
-    assert answer.data[:, 0].tolist() == [5, 6, 7, 8]
-    written = PacketReader().feed(GroupWrite(IDS, 116).encode(goals))
-    assert servos.heard[:2] == written * 2
+    reply = cycle.transact(goals)
+    assert reply.data[:, 0].tolist() == [5, 6, 7, 8]
+    written = PacketParser().feed(GroupWrite(IDS, 116).encode(goals))
+    assert servos.received[:2] == written * 2
 
 
-@pytest.mark.parametrize("call", ["write_goals", "turn"])
+@pytest.mark.parametrize("call", ["write_goals", "transact"])
 def test_a_full_device_is_waited_for(servos: Servos, call: str) -> None:
     """What it takes of a packet is not sent twice."""
     goals = np.arange(4, dtype=np.int32)
-    fd = servos.port.file
+    fd = servos.port.descriptor
     assert fd is not None
     filling = GroupWrite(IDS, 116).encode(goals + 9)
     try:
@@ -187,23 +183,23 @@ def test_a_full_device_is_waited_for(servos: Servos, call: str) -> None:
     except BlockingIOError:
         cut = False
     servos.serve(echo)
-    cycle = GroupCycle(servos.port, IDS, fast=False, latency_s=FAR_S)
-    if call == "turn":
-        answer = cycle.turn(goals)
+    cycle = ControlCycle(servos.port, IDS, fast=False, latency_s=FAR_S)
+    if call == "transact":
+        reply = cycle.transact(goals)
     else:
         cycle.write_goals(goals)
-        answer = cycle.read()
-    assert answer.valid.all()
-    expected = PacketReader().feed(GroupWrite(IDS, 116).encode(goals))
+        reply = cycle.read()
+    assert reply.valid.all()
+    expected = PacketParser().feed(GroupWrite(IDS, 116).encode(goals))
     if not cut:
-        assert servos.heard[-2:-1] == expected
+        assert servos.received[-2:-1] == expected
 
 
-@pytest.mark.parametrize("call", ["write_goals", "turn", "read"])
+@pytest.mark.parametrize("call", ["write_goals", "transact", "read"])
 @pytest.mark.parametrize("how", ["closed", "vanished"])
 def test_a_port_that_is_gone_is_a_port_error(call: str, how: str) -> None:
     servos = Servos()
-    cycle = GroupCycle(servos.port, IDS, latency_s=FAR_S)
+    cycle = ControlCycle(servos.port, IDS, latency_s=FAR_S)
     if how == "closed":
         servos.port.closePort()
     else:
@@ -212,7 +208,7 @@ def test_a_port_that_is_gone_is_a_port_error(call: str, how: str) -> None:
     goals = np.zeros(4, np.int32)
     calls = {
         "write_goals": lambda: cycle.write_goals(goals),
-        "turn": lambda: cycle.turn(goals),
+        "transact": lambda: cycle.transact(goals),
         "read": cycle.read,
     }
     with pytest.raises(PortError, match="is closed" if how == "closed" else "the port is gone"):
@@ -224,20 +220,20 @@ def test_a_port_that_is_gone_is_a_port_error(call: str, how: str) -> None:
 
 
 def test_a_port_that_was_opened_again_is_used_again(servos: Servos) -> None:
-    cycle = GroupCycle(servos.port, IDS, latency_s=FAR_S)
+    cycle = ControlCycle(servos.port, IDS, latency_s=FAR_S)
     servos.port.closePort()
     assert servos.port.openPort()
     servos.serve(echo)
-    assert cycle.turn(np.zeros(4, np.int32)).valid.all()
+    assert cycle.transact(np.zeros(4, np.int32)).valid.all()
 
 
 @both_kinds
-def test_a_late_answer_is_never_taken_for_a_new_one(servos: Servos, is_fast: bool) -> None:
-    """The answer to the third question comes right in front of that to the fourth."""
+def test_a_late_reply_is_never_taken_for_a_new_one(servos: Servos, is_fast: bool) -> None:
+    """The reply to the third request comes right in front of that to the fourth."""
     held: list[bytes] = []
     asked = 0
 
-    def answer(packet: InstructionPacket, goal: int) -> bytes:
+    def reply(packet: InstructionPacket, goal: int) -> bytes:
         nonlocal asked
         asked += 1
         said = echo(packet, goal)
@@ -246,11 +242,11 @@ def test_a_late_answer_is_never_taken_for_a_new_one(servos: Servos, is_fast: boo
             return b""
         return b"".join([*held, said]) if asked == 4 else said
 
-    servos.serve(answer, questions=12)
-    cycle = GroupCycle(servos.port, IDS, fast=is_fast, latency_s=0.1)
+    servos.serve(reply, requests=12)
+    cycle = ControlCycle(servos.port, IDS, fast=is_fast, latency_s=0.1)
     seen = []
     for k in range(12):
-        found = cycle.turn(np.full(4, 10 * k, np.int32))
+        found = cycle.transact(np.full(4, 10 * k, np.int32))
         now = np.arange(10 * k, 10 * k + 4)[:, None] & 0x7F
         assert (found.data == now)[found.valid].all()
         seen.append(bool(found.valid.all()))
@@ -258,12 +254,12 @@ def test_a_late_answer_is_never_taken_for_a_new_one(servos: Servos, is_fast: boo
 
 
 def test_times_follow_the_baud_rate(servos: Servos) -> None:
-    cycle = express(servos, is_fast=False)
+    cycle = fast_path(servos, is_fast=False)
     for baud in (57_600, 1_000_000):
         servos.port.setBaudRate(baud)
         assert cycle.write(np.zeros(4, np.int32)) == 34
         assert cycle._baud == baud
-        assert cycle._plan[WRITE_NS : ANSWER_NS + 1].tolist() == [
+        assert cycle._plan[WRITE_NS : REPLY_NS + 1].tolist() == [
             n * 10**10 // baud for n in (34, 18, 4 * 21)
         ]
 
@@ -272,26 +268,26 @@ late_ns = st.integers(-50_000, 2_000_000)
 
 
 @given(late_ns)
-def test_a_steady_lateness_is_learnt(lateness_ns: int) -> None:
-    habit = new_habit()
+def test_a_steady_lateness_is_estimated(lateness_ns: int) -> None:
+    latency_estimate = new_latency_estimate()
     for _ in range(1000):
-        learn(habit, lateness_ns, 1_000_000, 40_000)
-    assert abs(habit[LATE] - lateness_ns) <= 8
+        update(latency_estimate, lateness_ns, 1_000_000, 40_000)
+    assert abs(latency_estimate[LATE] - lateness_ns) <= 8
 
 
 @given(st.integers(1, 10**8))
-def test_answers_that_are_there_already_soon_end_all_naps(least_ns: int) -> None:
-    habit = new_habit()
+def test_replies_that_are_early_soon_end_all_sleeps(least_ns: int) -> None:
+    latency_estimate = new_latency_estimate()
     for _ in range(13):
-        learn(habit, -least_ns, least_ns, 40_000)
-    assert habit[LATE] == -least_ns
+        update(latency_estimate, -least_ns, least_ns, 40_000)
+    assert latency_estimate[LATE] == -least_ns
 
 
 @given(st.lists(late_ns, min_size=1, max_size=50), st.integers(-(10**9), 10**9))
-def test_one_odd_answer_hardly_changes_what_is_learnt(before: list[int], odd_ns: int) -> None:
-    habit = new_habit()
+def test_one_odd_reply_hardly_changes_the_estimate(before: list[int], odd_ns: int) -> None:
+    latency_estimate = new_latency_estimate()
     for lateness_ns in before:
-        learn(habit, lateness_ns, 2_000_000_000, 40_000)
-    was_ns = habit[LATE]
-    learn(habit, odd_ns, 2_000_000_000, 40_000)
-    assert abs(habit[LATE] - was_ns) <= 5_000
+        update(latency_estimate, lateness_ns, 2_000_000_000, 40_000)
+    was_ns = latency_estimate[LATE]
+    update(latency_estimate, odd_ns, 2_000_000_000, 40_000)
+    assert abs(latency_estimate[LATE] - was_ns) <= 5_000

@@ -1,11 +1,14 @@
-"""Bytes of the state block to numbers: those of the units, register by register."""
+"""Bytes of the state block to SI units, register by register."""
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from snakewalk.drivers.chain.joint_codec import StateBlock
+from snakewalk.drivers.chain import joint_codec
+from snakewalk.drivers.chain.joint_codec import StateDecoder, decode_state
 from snakewalk.drivers.protocol.control_table import load_control_table
 from snakewalk.drivers.protocol.registers import ServoUnits
 
@@ -14,12 +17,14 @@ small = st.integers(-(2**15), 2**15 - 1)
 large = st.integers(-(2**31), 2**31 - 1)
 
 
-@pytest.mark.parametrize("compiled", [None, False], ids=["quickest", "numpy"])
+@pytest.mark.parametrize(
+    "loop", [decode_state, decode_state.py_func], ids=["compiled", "interpreted"]
+)
 @pytest.mark.parametrize("model", MODELS)
-@settings(deadline=None)  # the first look imports a compiler
+@settings(deadline=None)  # interpreted loops are slow
 @given(raw=st.lists(st.tuples(small, large, large), min_size=1, max_size=5))
-def test_every_raw_value_becomes_what_the_units_make_of_it(
-    model: str, compiled: bool | None, raw: list[tuple[int, int, int]]
+def test_every_raw_value_is_scaled_by_its_unit(
+    model: str, loop: Callable[..., None], raw: list[tuple[int, int, int]]
 ) -> None:
     table = load_control_table(model)
     units = ServoUnits.of(table)
@@ -30,7 +35,9 @@ def test_every_raw_value_becomes_what_the_units_make_of_it(
     data = np.frombuffer(b"".join(blocks), np.uint8).reshape(-1, 10)
     current, velocity, position = (np.array(column) for column in zip(*raw, strict=True))
     found = np.zeros((3, len(raw)))
-    StateBlock(len(raw), table, units, compiled=compiled).motion(data, found)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(joint_codec, "decode_state", loop)
+        StateDecoder(table, units).decode(data, found)
     assert found[0].tolist() == units.current_a(current).tolist()
     assert found[1].tolist() == units.velocity_rad_s(velocity).tolist()
     assert found[2].tolist() == units.position_rad(position).tolist()

@@ -1,0 +1,48 @@
+"""Limits of what may pass to the servos, of one robot in one run."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import SafetyConfig
+
+LIMIT_SLACK_RAD = 0.2
+"""How far beyond its limit a joint may be measured (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyLimits:
+    """Limits of one robot; a value at its limit is allowed."""
+
+    limit_rad: Floats
+    """(J,) half range of the goals."""
+    limit_slack_rad: float
+    """How far beyond it a joint may be *measured*, bent by force or by overshoot."""
+    goal_rate_rad_s: float
+    goal_lead_rad: float
+    """Goal minus measured."""
+    current_limit_a: float
+    current_time_s: float
+    """How long the current may be exceeded."""
+    temperature_limit_c: float
+    voltage_min_v: float
+    voltage_max_v: float
+    stale_limit_s: float
+
+    @staticmethod
+    def from_config(robot: RobotConfig, safety: SafetyConfig) -> "SafetyLimits":
+        """Limits from the robot's and the run's configuration."""
+        return SafetyLimits(
+            limit_rad=np.array(robot.limit_rad),
+            limit_slack_rad=LIMIT_SLACK_RAD,
+            goal_rate_rad_s=safety.goal_rate_rad_s,
+            goal_lead_rad=safety.goal_lead_rad,
+            current_limit_a=safety.current_limit_a,
+            current_time_s=safety.current_time_s,
+            temperature_limit_c=safety.temperature_limit_c,
+            voltage_min_v=safety.voltage_min_v,
+            voltage_max_v=safety.voltage_max_v,
+            stale_limit_s=safety.stale_limit_s,
+        )
