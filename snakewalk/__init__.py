@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from snakewalk.drivers.link import JointLink
     from snakewalk.drivers.port.byte_port import BytePort
     from snakewalk.drivers.port.serial_port import SerialPort
-    from snakewalk.drivers.safety.safe_link import SafeLink
     from snakewalk.drivers.safety.limits import SafetyLimits
+    from snakewalk.drivers.safety.safe_link import SafeLink
     from snakewalk.drivers.types import BodyPose, JointCommand, JointState
     from snakewalk.sim.serve.servo_bus import ServoBus
 
