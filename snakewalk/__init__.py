@@ -116,7 +116,7 @@ _NAMES = {
     "drivers.port.byte_port": ("BytePort",),
     "drivers.port.serial_port": ("SerialPort",),
     "drivers.safety.safe_link": ("SafeLink",),
-    "drivers.safety.vet": ("SafetyLimits",),
+    "drivers.safety.limits": ("SafetyLimits",),
     "drivers.types": ("BodyPose", "JointCommand", "JointState"),
     "sim.serve.servo_bus": ("ServoBus",),
 }
