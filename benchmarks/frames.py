@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from benchmarks.rows import Row, cpu_s
 from snakewalk.config.heightfield import HeightField
-from snakewalk.controller.app.runs.prepare import prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
 from snakewalk.controller.walk.synthesis import synthesise
@@ -32,7 +32,7 @@ def world() -> HeightField:
 
 def run() -> list[Row]:
     """Measure."""
-    prepared = prepare("flat-square")
+    prepared = prepare_walk("flat-square")
     shapes = prepared.library.shapes_rad
     segment_m = prepared.robot.length_m / shapes.shape[1]
     law = SpeedLaw.printed(0.1)

@@ -25,7 +25,8 @@ from benchmarks.simulated_robot import (
     Stopwatch,
     travelling_wave,
 )
-from snakewalk.controller.app.runs.prepare import Prepared, prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
+from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.runlog.writer import RunLog
 
 TITLE = "Simulated loop against bare mj_step: 16 servos, 50 Hz, 2 ms"
@@ -40,20 +41,20 @@ Floats = NDArray[np.float64]
 
 def run() -> list[Row]:
     """Measure."""
-    prepared = prepare("flat-square", time_limit_s=SECONDS)
+    prepared = prepare_walk("flat-square", time_limit_s=SECONDS)
     steps = round(1.0 / (prepared.run.cycle_hz * prepared.run.physics_step_s))
     robot = SimulatedRobot(prepared)
     recorder = Recorder(robot.plant.mechanics.data)
-    robot.walk(NoLog(), recorder)
+    robot.walk(NoLog(), recorder.on_progress)
     model = robot.plant.mechanics.model
     costs: tuple[list[Floats], ...] = [], [], [], [], []
     with tempfile.TemporaryDirectory() as folder:
         for turn in range(ROUNDS):
             wave, walk, logged = Stopwatch(), Stopwatch(), Stopwatch()
-            SimulatedRobot(prepared).wave(SECONDS, wave)
-            SimulatedRobot(prepared).walk(NoLog(), walk)
+            SimulatedRobot(prepared).wave(SECONDS, wave.on_progress)
+            SimulatedRobot(prepared).walk(NoLog(), walk.on_progress)
             with RunLog(Path(folder) / f"{turn}.mcap") as log:
-                SimulatedRobot(prepared).walk(log, logged)
+                SimulatedRobot(prepared).walk(log, logged.on_progress)
             found = (
                 bare_s(model, recorder.states, steps),
                 body_s(prepared),
@@ -89,7 +90,7 @@ def bare_s(model: mujoco.MjModel, states: list[State], steps: int) -> Floats:
     return np.array(spent)
 
 
-def body_s(prepared: Prepared) -> Floats:
+def body_s(prepared: WalkRun) -> Floats:
     """CPU time of each cycle of the plant alone under servos that make a travelling wave, s."""
     robot = SimulatedRobot(prepared)
     drive = robot.line.firmware.drive

@@ -1,16 +1,15 @@
 """A simulated robot at the start of a run, and what watches its cycles."""
 
 import time
-from typing import Any, Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.controller.app.runs.prepare import Prepared
+from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.runlog.writer import RunLog
-from snakewalk.controller.runtime.drive import Drive
-from snakewalk.controller.runtime.guide import Guide
+from snakewalk.controller.runtime.drive import Drive, OnProgress, Progress
 from snakewalk.controller.runtime.loop import ticks
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
@@ -25,18 +24,6 @@ Floats = NDArray[np.float64]
 State = tuple[Floats, Floats, Floats, Floats]
 
 
-class Watcher(Protocol):
-    """Told of every cycle."""
-
-    def cycle(self, time_s: float, pilot: Guide | None, speed_m_s: float) -> None:
-        """After the command of a cycle has been sent."""
-        ...
-
-    def note(self, text: str) -> None:
-        """Something that the operator should know."""
-        ...
-
-
 class Recorder:
     """Keeps what the body was doing in every cycle: position, velocity, force, warm start."""
 
@@ -44,15 +31,12 @@ class Recorder:
         self._data = data
         self.states: list[State] = []
 
-    def cycle(self, time_s: float, pilot: Guide | None, speed_m_s: float) -> None:
+    def on_progress(self, progress: Progress) -> None:
         """Copy the state."""
         d = self._data
         self.states.append(
             (d.qpos.copy(), d.qvel.copy(), d.qfrc_applied.copy(), d.qacc_warmstart.copy())
         )
-
-    def note(self, text: str) -> None:
-        """Nothing."""
 
 
 class Stopwatch:
@@ -61,12 +45,9 @@ class Stopwatch:
     def __init__(self) -> None:
         self._ends: list[float] = []
 
-    def cycle(self, time_s: float, pilot: Guide | None, speed_m_s: float) -> None:
+    def on_progress(self, progress: Progress) -> None:
         """Take the time."""
         self._ends.append(time.process_time())
-
-    def note(self, text: str) -> None:
-        """Nothing."""
 
     @property
     def cycle_s(self) -> Floats:
@@ -89,7 +70,7 @@ class NoLog(RunLog):
     def walk(self, *given: Any, **named: Any) -> None:
         """Nothing."""
 
-    def path_laid(self, *given: Any, **named: Any) -> None:
+    def path_replanned(self, *given: Any, **named: Any) -> None:
         """Nothing."""
 
     def event(self, *given: Any, **named: Any) -> None:
@@ -105,7 +86,7 @@ def travelling_wave(time_s: float, joints: int) -> Floats:
 class SimulatedRobot:
     """Body, servos, line, chain and safety as ``snakewalk run`` joins them."""
 
-    def __init__(self, prepared: Prepared) -> None:
+    def __init__(self, prepared: WalkRun) -> None:
         run, robot = prepared.run, prepared.robot
         self._prepared = prepared
         self.plant = MujocoPlant(robot, prepared.world, prepared.ground, run.physics_step_s)
@@ -118,25 +99,25 @@ class SimulatedRobot:
         limits = SafetyLimits.from_config(robot, run.safety)
         self.link = SafeLink(chain, limits, self.line.clock)
 
-    def walk(self, log: RunLog, watcher: Watcher) -> None:
+    def walk(self, log: RunLog, on_progress: OnProgress) -> None:
         """Run the job until its time limit."""
         drive = Drive(
             link=self.link,
             clock=self.line.clock,
             pose=lambda _: self.plant.head_pose(),
-            pilot=self._prepared.pilot(),
+            motion=self._prepared.pilot(),
             log=log,
             robot=self._prepared.robot,
             run=self._prepared.run,
             gain=self._prepared.gain,
-            watchers=(watcher,),
             wire_busy_s=lambda: self.line.busy_s,
+            on_progress=on_progress,
         )
         tripped = drive.run().tripped
         if tripped:
             raise RuntimeError(tripped)
 
-    def wave(self, seconds: float, watcher: Watcher) -> None:
+    def wave(self, seconds: float, on_progress: OnProgress) -> None:
         """Read the joints and write a travelling wave, nothing else."""
         joints = self._prepared.robot.joint_count
         with self.link:
@@ -147,4 +128,4 @@ class SimulatedRobot:
                 self.link.read()
                 goal = travelling_wave(tick.deadline_s - start_s, joints)
                 self.link.write(JointCommand(tick.deadline_s, goal))
-                watcher.cycle(tick.deadline_s, None, 0.0)
+                on_progress(Progress(tick.deadline_s, 0.0, 0, 0.0, done=False))

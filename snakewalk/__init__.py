@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from snakewalk.config.run import RunConfig, SafetyConfig
     from snakewalk.config.world import WorldConfig
     from snakewalk.controller.app.runs.execute import execute
-    from snakewalk.controller.app.runs.prepare import prepare
-    from snakewalk.controller.app.runs.prepare_gait import prepare_gait
+    from snakewalk.controller.app.runs.factory import prepare_gait, prepare_walk
     from snakewalk.controller.app.studies.sweep_measure import measure
     from snakewalk.controller.app.studies.sweep_plan import plan_sweep
     from snakewalk.controller.gaits.gait import Gait, Needs
@@ -78,8 +77,8 @@ __all__ = [
     "make_gait",
     "measure",
     "plan_sweep",
-    "prepare",
     "prepare_gait",
+    "prepare_walk",
     "read_log",
     "summary",
     "ticks",
@@ -94,8 +93,7 @@ _NAMES = {
     "config.run": ("RunConfig", "SafetyConfig"),
     "config.world": ("WorldConfig",),
     "controller.app.runs.execute": ("execute",),
-    "controller.app.runs.prepare": ("prepare",),
-    "controller.app.runs.prepare_gait": ("prepare_gait",),
+    "controller.app.runs.factory": ("prepare_gait", "prepare_walk"),
     "controller.app.studies.sweep_measure": ("measure",),
     "controller.app.studies.sweep_plan": ("plan_sweep",),
     "controller.gaits.gait": ("Gait", "Needs"),

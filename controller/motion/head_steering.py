@@ -1,4 +1,4 @@
-"""The head looks where it is asked to while the body moves: the neck undoes what the body does."""
+"""Head steering: the neck makes up for the body's motion, so that the head keeps its direction."""
 
 from dataclasses import dataclass
 
@@ -19,8 +19,8 @@ RANGE_SHARE = 0.9
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
-    """A heading in the world, or a point in it to look at."""
+class HeadTarget:
+    """Where the head points: along a heading in the world, or at a point in it."""
 
     heading_rad: float | None = None
     point_m: tuple[float, float] | None = None
@@ -37,7 +37,7 @@ class HeadSteering:
     """Another source with its first yaw joints, the neck, taken over."""
 
     def __init__(
-        self, source: MotionSource, robot: RobotConfig, look: Look, neck_joints: int = 2
+        self, source: MotionSource, robot: RobotConfig, target: HeadTarget, neck_joints: int = 2
     ) -> None:
         """Take over the first ``neck_joints`` yaw joints of ``source``.
 
@@ -47,7 +47,7 @@ class HeadSteering:
         """
         self.needs = Needs(yaw=True, pitch=source.needs.pitch, wheels=source.needs.wheels)
         self.needs.check(robot, "head steering")
-        self.source, self.look = source, look
+        self.source, self.target = source, target
         self._neck = np.array(robot.yaw_joints[:neck_joints])
         self._robot = robot
         self._reach = RANGE_SHARE * robot.yaw_limit_rad
@@ -89,7 +89,7 @@ class HeadSteering:
             share = min(1.0, dt_s / 0.06)
             self._swing_rad_s += share * (turn / dt_s - self._swing_rad_s)
         self._last_rad = shoulders
-        wanted = float(wrap(self.look.heading_from(view.link_m[0]) - shoulders))
+        wanted = float(wrap(self.target.heading_from(view.link_m[0]) - shoulders))
         each = (wanted - LEAD_S * self._swing_rad_s) / len(self._neck)
         each = min(max(each, -self._reach), self._reach)
         angles = self._follower.step(dt_s, np.full(len(self._neck), each))

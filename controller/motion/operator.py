@@ -31,14 +31,14 @@ HALT_S = 0.5
 
 
 class Operator:
-    """Runs a gait as keys tell."""
+    """Runs a gait, and changes it by keys."""
 
     def __init__(
         self,
         motion: GaitMotion,
         robot: RobotConfig,
         keys: Callable[[], Iterable[str]],
-        say: Callable[[str, str], None],
+        on_event: Callable[[str, str], None],
     ) -> None:
         """Put ``keys`` in charge of ``motion``.
 
@@ -46,11 +46,11 @@ class Operator:
             motion: the gait to begin with.
             robot: for the gaits to change to.
             keys: names of ``KEYS`` pressed since the last call; others are ignored.
-            say: told ("operator", text) of what was done or refused.
+            on_event: takes ("operator", text) of what was done or refused.
 
         """
         self.motion = motion
-        self._robot, self._keys, self._say = robot, keys, say
+        self._robot, self._keys, self._on_event = robot, keys, on_event
         self._chosen = 0
         self._halted = False
         self._rate = 1.0
@@ -95,7 +95,7 @@ class Operator:
     def _press(self, key: str) -> None:
         if key in {"up", "down"}:
             self._chosen = (self._chosen + (1 if key == "down" else -1)) % len(self._ranges())
-            self._tell(f"{self.selected} = {getattr(self.motion.gait.params, self.selected)}")
+            self._report(f"{self.selected} = {getattr(self.motion.gait.params, self.selected)}")
         elif key in {"left", "right"}:
             self._nudge(self.selected, 1.0 if key == "right" else -1.0)
         elif key in {"n", "p"}:
@@ -106,10 +106,10 @@ class Operator:
             self._become(self.motion.gait.name)
         elif key == "space":
             self._halted = not self._halted
-            self._tell("halt" if self._halted else "go on")
+            self._report("halt" if self._halted else "go on")
         elif key == "q":
             self.motion.stop()
-            self._tell("stop")
+            self._report("stop")
 
     def _nudge(self, name: str, sign: float) -> None:
         span = self._ranges()[name]
@@ -121,9 +121,9 @@ class Operator:
         try:
             self.motion.change(**values)
         except InputError as error:
-            self._tell(f"refused: {error.faults[0]}")
+            self._report(f"refused: {error.faults[0]}")
         else:
-            self._tell(", ".join(f"{name} = {value}" for name, value in values.items()))
+            self._report(", ".join(f"{name} = {value}" for name, value in values.items()))
 
     def _other(self, step: int) -> None:
         names = list(GAITS)
@@ -131,21 +131,21 @@ class Operator:
         for away in range(1, len(names)):
             if self._become(names[(at + step * away) % len(names)], quietly=True):
                 return
-        self._tell("refused: no other gait suits this robot")
+        self._report("refused: no other gait suits this robot")
 
     def _become(self, name: str, *, quietly: bool = False) -> bool:
         try:
             self.motion.become(make_gait(name))
         except InputError as error:
             if not quietly:
-                self._tell(f"refused: {error.faults[0]}")
+                self._report(f"refused: {error.faults[0]}")
             return False
         self._chosen = 0
-        self._tell(f"gait {name}")
+        self._report(f"gait {name}")
         return True
 
     def _ranges(self) -> dict[str, Range]:
         return ranges(self.motion.gait.model)
 
-    def _tell(self, text: str) -> None:
-        self._say("operator", text)
+    def _report(self, text: str) -> None:
+        self._on_event("operator", text)

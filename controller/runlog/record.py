@@ -31,8 +31,8 @@ class PlanSummary:
 
 
 @dataclass(frozen=True, slots=True)
-class Laid:
-    """How a simulated robot was laid down."""
+class InitialPose:
+    """Pose in which a simulated robot was put on the ground."""
 
     heading_rad: float
     """Of the head link."""
@@ -55,7 +55,7 @@ class Header:
     ground: HeightField | None
     """Thinned; None on a flat floor."""
     torque_constant_n_m_a: float
-    laid: Laid | None
+    initial_pose: InitialPose | None
     """None on metal."""
 
 

@@ -14,7 +14,7 @@ from snakewalk.controller.runlog.record import (
     CycleTable,
     Event,
     Header,
-    Laid,
+    InitialPose,
     PlanSummary,
     PoseTable,
     QposTable,
@@ -77,9 +77,9 @@ def _header(row: Row) -> Header:
             _array(ground["z_m"]), ground["spacing_m"], ground["x0_m"], ground["y0_m"]
         ),
         torque_constant_n_m_a=float(_array(row["torque_constant_n_m_a"])),
-        laid=None
+        initial_pose=None
         if row.get("laid") is None
-        else Laid(row["laid"]["heading_rad"], _array(row["laid"]["joint_rad"])),
+        else InitialPose(row["laid"]["heading_rad"], _array(row["laid"]["joint_rad"])),
     )
 
 

@@ -27,7 +27,7 @@ from snakewalk.controller.runlog.encode import (
     text,
     thinned,
 )
-from snakewalk.controller.runlog.record import Laid, PlanSummary
+from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runlog.schema import FORMAT, TOPICS, schema_json, schema_name
 from snakewalk.drivers.types import JointState
 
@@ -86,7 +86,7 @@ class RunLog:
         plan: PlanSummary,
         ground: HeightField | None = None,
         torque_constant_n_m_a: float = float("nan"),
-        laid: Laid | None = None,
+        initial_pose: InitialPose | None = None,
     ) -> None:
         """Say once, first, what runs; the ground is thinned, so that a report can draw it."""
         row = {
@@ -100,8 +100,11 @@ class RunLog:
             "world": world.model_dump(mode="json"),
             "torque_constant_n_m_a": number(torque_constant_n_m_a),
             "laid": None
-            if laid is None
-            else {"heading_rad": float(laid.heading_rad), "joint_rad": exact(laid.joint_rad)},
+            if initial_pose is None
+            else {
+                "heading_rad": float(initial_pose.heading_rad),
+                "joint_rad": exact(initial_pose.joint_rad),
+            },
             "plan": {
                 "path_m": floats(plan.path_m),
                 "waypoints_m": floats(plan.waypoints_m),
@@ -176,7 +179,7 @@ class RunLog:
         )
         self._add_text("/pose", time_s, row)
 
-    def path_laid(self, time_s: float, points_m: ArrayLike) -> None:
+    def path_replanned(self, time_s: float, points_m: ArrayLike) -> None:
         """Log a path (n, 2) or (n, 3) that replaces the plan's."""
         self._add("/path", time_s, {"time_s": time_s, "points_m": floats(points_m)})
 

@@ -1,19 +1,17 @@
-"""One run: link, pilot, log and alarms joined in the loop; the same for metal and simulation."""
+"""One run: link, motion, log and alarms joined in the loop; the same on metal and in simulation."""
 
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Protocol
-
-import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
+from snakewalk.controller.motion.path_progress import path_progress
+from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.derating import Derating
-from snakewalk.controller.runtime.guide import Guide
 from snakewalk.controller.runtime.loop import Tick, ticks
 from snakewalk.controller.runtime.ramp import Ramp
 from snakewalk.controller.runtime.slip_monitor import AdvanceWatch
@@ -27,12 +25,24 @@ _SETTLE_S = 0.3
 _LATCHED = suppress(SafetyTrippedError)
 
 
-class Watcher(Protocol):
-    """Told of every cycle: a progress bar, a film recorder."""
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """State of a run after the command of a cycle has been sent."""
 
-    def cycle(self, time_s: float, pilot: Guide, speed_m_s: float) -> None:
-        """After the command of a cycle has been sent."""
-        ...
+    time_s: float
+    speed_m_s: float
+    """Forward speed of the body, smoothed."""
+    reached: int
+    """Number of waypoints reached."""
+    along_m: float
+    """Arc length on the path; NaN where there is no path."""
+    done: bool
+    """Whether the motion has come to its end and rests."""
+
+
+OnProgress = Callable[[Progress], None]
+OnEvent = Callable[[str, str], None]
+"""Takes the kind of an event, and a line of text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +63,7 @@ class Outcome:
 
 
 class Drive:
-    """Runs a pilot on a link; construct, then ``run()`` once."""
+    """Runs a motion on a link; construct, then ``run()`` once."""
 
     def __init__(
         self,
@@ -61,21 +71,22 @@ class Drive:
         link: VettedLink,
         clock: Clock,
         pose: PoseSource,
-        pilot: Guide,
+        motion: MotionSource,
         log: RunLog,
         robot: RobotConfig,
         run: RunConfig,
         gain: float,
-        watchers: tuple[Watcher, ...] = (),
         wire_busy_s: Callable[[], float] = lambda: float("nan"),
-        say: Callable[[str], None] = lambda text: None,
+        on_progress: OnProgress = lambda progress: None,
+        on_event: OnEvent = lambda kind, text: None,
     ) -> None:
         self._link, self._clock, self._pose = link, clock, pose
-        self._pilot, self._log, self._robot, self._run = pilot, log, robot, run
+        self._motion, self._path = motion, path_progress(motion)
+        self._log, self._robot, self._run = log, robot, run
         self._gain = gain
         self._watch = AdvanceWatch(robot.length_m, gain, run.safety.advance_fraction)
         self._derating = Derating(run.safety)
-        self._watchers, self._say = watchers, say
+        self._on_progress, self._on_event = on_progress, on_event
         self._wire_busy_s = wire_busy_s
         self._wire_s = wire_busy_s()
         self._alarms = 0
@@ -85,7 +96,7 @@ class Drive:
 
     def run(self) -> Outcome:
         """Enable, ramp to the first shape, follow the path, settle, disable."""
-        clock, log, pilot = self._clock, self._log, self._pilot
+        clock, log, motion, path = self._clock, self._log, self._motion, self._path
         period_s = 1.0 / self._run.cycle_hz
         with self._link:
             found = self._link.enable()
@@ -93,7 +104,7 @@ class Drive:
             view = body_in_world(self._robot, self._pose(found), found.position_rad)
             ramp = Ramp(
                 found.position_rad,
-                pilot.lay(pilot.first_goal_rad(), period_s, view),
+                path.begin(view),
                 self._robot.joint_speed_limit_rad_s,
                 self._robot.joint_acceleration_limit_rad_s2,
             )
@@ -114,39 +125,41 @@ class Drive:
                 else:
                     goal = self._steer(period_s * self._rate(state, period_s), view)
                 self._send(tick, state, pose, view, goal)
-                if self._link.tripped or pilot.at_rest:
+                if self._link.tripped or motion.done:
                     break
             tripped = self._link.tripped
             if tripped:
                 log.event(clock.now_s(), "trip", tripped, "error")
         if not self._run.waypoints_m:
-            end = "the motion came to its end" if pilot.done else "the motion was cut off"
+            end = "the motion came to its end" if motion.done else "the motion was cut off"
+        elif path.reached == len(self._run.waypoints_m):
+            end = "every waypoint reached"
         else:
-            end = "every waypoint reached" if pilot.done else f"{pilot.reached} waypoints reached"
+            end = f"{path.reached} waypoints reached"
         log.event(clock.now_s(), "stop", f"torque off; {end}")
         duration_s = clock.now_s() - start_s
         least = self._derating.least
-        return Outcome(pilot.reached, pilot.missed, duration_s, self._alarms, tripped, least)
+        return Outcome(path.reached, path.missed, duration_s, self._alarms, tripped, least)
 
     def _rate(self, state: JointState, period_s: float) -> float:
         """How fast the motion may run, so that no servo trips."""
         rate = self._derating.update(state, period_s)
         for text in self._derating.news():
             self._log.event(self._clock.now_s(), "derating", text, "warning")
-            self._say(text)
+            self._on_event("derating", text)
         return rate
 
     def _steer(self, period_s: float, view: BodyView) -> Floats:
-        pilot, log, now_s = self._pilot, self._log, self._clock.now_s()
-        reached, missed = pilot.reached, pilot.missed
-        goal = pilot.step(period_s, view)
-        if pilot.reached > reached:
-            log.event(now_s, "waypoint", f"waypoint {pilot.reached} reached")
-        if pilot.missed > missed and pilot.path is not None:
-            log.event(now_s, "missed", f"waypoint {pilot.reached + 1} passed by; back", "warning")
-            log.path_laid(now_s, pilot.path.position(np.linspace(0, pilot.path.length_m, 60)))
-        if pilot.decision is not None:
-            d = pilot.decision
+        path, log, now_s = self._path, self._log, self._clock.now_s()
+        reached, missed = path.reached, path.missed
+        goal = self._motion.step(period_s, view)
+        if path.reached > reached:
+            log.event(now_s, "waypoint", f"waypoint {path.reached} reached")
+        if path.missed > missed:
+            log.event(now_s, "missed", f"waypoint {path.reached + 1} passed by; back", "warning")
+            log.path_replanned(now_s, path.path_m(60))
+        d = path.decision
+        if d is not None:
             log.walk(
                 now_s,
                 state=d.state,
@@ -155,7 +168,7 @@ class Drive:
                 ramp_rad=d.ramp_rad,
                 candidates=d.candidates,
             )
-        if self._watch.update(pilot.pulse_m_s * period_s, self._way_m):
+        if self._watch.update(path.pulse_m_s * period_s, self._way_m):
             self._alarms += 1
             share = self._watch.window.share if self._watch.window else float("nan")
             text = f"the body makes {share:.0%} of its predicted way: is the ground too slippery?"
@@ -185,7 +198,8 @@ class Drive:
             joints=clamped,
         )
         self._measure_speed()
-        pilot = self._pilot
+        path = self._path
+        pulse_m_s, along_m = path.pulse_m_s, path.along_m
         self._log.pose(
             tick.deadline_s,
             pose.head_in_world_m,
@@ -193,14 +207,15 @@ class Drive:
             links_m=view.link_m,
             centre_m=view.centre_m,
             speed_m_s=self._speed_m_s,
-            predicted_speed_m_s=self._gain * pilot.pulse_m_s,
-            pulse_m_s=pilot.pulse_m_s,
-            path_s_m=pilot.along_m,
-            target=pilot.reached,
+            predicted_speed_m_s=self._gain * pulse_m_s,
+            pulse_m_s=pulse_m_s,
+            path_s_m=along_m,
+            target=path.reached,
         )
         self._last = view
-        for watcher in self._watchers:
-            watcher.cycle(tick.deadline_s, pilot, self._speed_m_s)
+        self._on_progress(
+            Progress(tick.deadline_s, self._speed_m_s, path.reached, along_m, self._motion.done)
+        )
 
     def _measure_speed(self) -> None:
         """Forward speed of the links along themselves, mean over the body, smoothed over 0.5 s."""

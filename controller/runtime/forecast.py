@@ -105,7 +105,7 @@ def forecast(
         limit_s: when to give up.
 
     """
-    joints = pilot.first_goal_rad()
+    joints = pilot.goal_rad()
     head_m = np.array(start_m[:2], dtype=float)
     head_rad = heading_rad - mean_heading_rad(robot, joints)
     velocity, moving_m_s = np.zeros(3), np.zeros((robot.joint_count + 1, 2))
@@ -117,7 +117,7 @@ def forecast(
     while True:
         view = body_in_world(robot, pose_at(head_m, head_rad), joints)
         centres.append(view.centre_m[:2])
-        if pilot.at_rest or times[-1] >= limit_s:
+        if pilot.done or times[-1] >= limit_s:
             break
         goal = pilot.step(step_s, view)
         before, after = _in_head_frame(robot, joints), _in_head_frame(robot, goal)

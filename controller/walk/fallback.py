@@ -2,8 +2,9 @@
 
 from dataclasses import replace
 
+from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.walk.serpenoid import Serpentine
-from snakewalk.controller.walk.walker import Decision, Walker
+from snakewalk.controller.walk.walker import Walker
 
 SERPENOID = -1
 """State of a decision that the fallback made."""

@@ -1,4 +1,7 @@
-"""The pilot: measured body in, joint goals out; decides when the track runs out, counts waypoints.
+"""The pilot: the snake walk along a path, as a motion source with path progress.
+
+It takes the measured body and returns joint goals, has the walker decide on the next shape before
+the track runs out, and counts waypoints.
 
 With ``feedback`` off it believes that the body goes where the track goes, without slip: the printed
 method, kept to show what a body with friction makes of it.
@@ -13,19 +16,24 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.rotations import offset_rad
 from snakewalk.controller.mechanics.pitch_fit import Lift
+from snakewalk.controller.motion.path_progress import Decision
+from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.steering import Path, aim_rad
 from snakewalk.controller.walk.time_law import Pulse
-from snakewalk.controller.walk.walker import Decision
 
 _ASTRAY_BODIES = 0.5
 
 # Segments of track left when the next piece is decided: the time law must see beyond the head.
 _FORESIGHT = 6.0
 _LIFT_S = 0.1
+
+# Shorter steps are saved up: no speed could be told from them.
+_SHORTEST_STEP_S = 1e-5
 
 # Body lengths of track before another path may be laid: turning back takes about as much.
 _PATIENCE_BODIES = 2.0
@@ -44,13 +52,19 @@ class TrackSource(Protocol):
 
 
 class Pilot:
-    """Steers a track source along a path through waypoints."""
+    """Steers a track source along a path through waypoints.
+
+    The time law keeps the joints within the robot's limits.
+    """
+
+    needs = Needs(yaw=True, wheels=True)
 
     def __init__(
         self,
         source: TrackSource,
         pulse: Pulse,
         *,
+        pace: Pace,
         plan: Planner,
         lift: Lift | None = None,
         fall_back: Callable[[bool], None] = lambda lost: None,
@@ -64,6 +78,11 @@ class Pilot:
     ) -> None:
         self._source = source
         self._pulse = pulse
+        self._pace = pace
+        self._goal_rad = pulse.goal_rad()
+        self._speed_rad_s = np.zeros(len(self._goal_rad))
+        self._gain_rad_s2 = np.zeros(len(self._goal_rad))
+        self._last_s = self._saved_s = 0.0
         self._plan = plan
         self._lift = lift
         self._fall_back = fall_back
@@ -87,14 +106,14 @@ class Pilot:
         """Made in the last step, if one was."""
 
     @property
-    def done(self) -> bool:
+    def complete(self) -> bool:
         """Whether every waypoint has been reached."""
         return self.reached == len(self._goals_m)
 
     @property
-    def at_rest(self) -> bool:
+    def done(self) -> bool:
         """Whether every waypoint has been reached and the shape has come to rest."""
-        return self.done and self._pulse.speed_segments_s == 0.0
+        return self.complete and self._pulse.speed_segments_s == 0.0
 
     @property
     def head(self) -> float:
@@ -111,12 +130,41 @@ class Pilot:
         """Pulse speed u: how fast the shape travels along the body."""
         return self._pulse.speed_segments_s * self._segment_m
 
-    def first_goal_rad(self) -> Floats:
-        """Joint angles of the initial shape."""
-        return self._pulse.goal_rad()
+    def path_m(self, count: int) -> Floats:
+        """(count, 2) points along the path in force."""
+        return self.path.position(np.linspace(0.0, self.path.length_m, count))
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now; before the first step, of the initial shape."""
+        return self._goal_rad
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) from the last steps: the speed of half a step ago, carried on by its change."""
+        return np.asarray(self._speed_rad_s + 0.5 * self._last_s * self._gain_rad_s2)
+
+    def pace(self) -> Pace:
+        """The robot's limits: what comes next is not known."""
+        return self._pace
+
+    def begin(self, view: BodyView) -> Floats:
+        """Fit the first shape to the ground under the body; returns the first targets (J,)."""
+        self._goal_rad = self._on_ground(self._pulse.goal_rad(), 0.0, view)
+        return self._goal_rad
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Advance by ``dt_s`` and return the joint goals (J,)."""
+        """Go on by ``dt_s`` and return the new targets (J,)."""
+        self._saved_s += dt_s
+        if self._saved_s < _SHORTEST_STEP_S:
+            return self._goal_rad
+        dt_s, self._saved_s = self._saved_s, 0.0
+        goal = self._steer(dt_s, view)
+        speed = (goal - self._goal_rad) / dt_s
+        between_s = 0.5 * (dt_s + self._last_s)
+        self._gain_rad_s2 = (speed - self._speed_rad_s) / between_s
+        self._goal_rad, self._speed_rad_s, self._last_s = goal, speed, dt_s
+        return goal
+
+    def _steer(self, dt_s: float, view: BodyView) -> Floats:
         followers_m = self._followers_m
         followers_m[0], followers_m[1] = view.centre_m[:2], view.link_m[0, :2]
         self.path.follow(followers_m, self._along_m, self._gap_m)
@@ -124,15 +172,15 @@ class Pilot:
         self.decision = None
         if self.head >= self._source.track.end - _FORESIGHT:
             self.decision = self._source.decide(*self._aim(view))
-        if self.done:
+        if self.complete:
             self._pulse.stop()
         self._pulse.advance(dt_s)
-        return self.lay(self._pulse.goal_rad(), dt_s, view)
+        return self._on_ground(self._pulse.goal_rad(), dt_s, view)
 
-    def lay(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:
-        """Add to yaw goals (J,) the pitch that lays the body on the ground under it.
+    def _on_ground(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:
+        """Add to yaw goals (J,) the pitch that fits the body to the ground under it.
 
-        Smoothed over ``_LIFT_S``: the ground is known in facets.
+        The pitch is smoothed over ``_LIFT_S``, because the ground is known in facets.
         """
         if self._lift is None:
             return goal_rad
@@ -144,7 +192,7 @@ class Pilot:
 
     def _count(self, centre_m: Floats, head_m: Floats) -> None:
         """Count a waypoint when the centre is near it; when it was passed by, go back for it."""
-        if self.done:
+        if self.complete:
             return
         x_m, y_m = self._goals_m[self.reached]
         if math.hypot(x_m - centre_m[0], y_m - centre_m[1]) <= self._radius_m:

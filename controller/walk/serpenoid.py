@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.walk.angle_track import AngleTrack
-from snakewalk.controller.walk.walker import Decision
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,6 @@ of the chosen shape. ``decision_fraction = 1`` and ``ramp_limit_rad = 0`` is the
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,24 +13,11 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 from snakewalk.config.run import WalkConfig
 from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.shape.star import star_order
 from snakewalk.controller.walk.angle_track import AngleTrack
 
 Accept = Callable[[Floats], bool]
-
-
-@dataclass(frozen=True, slots=True)
-class Decision:
-    """What was chosen, and from what."""
-
-    state: int
-    heading_error_rad: float
-    """Mean heading of the placed shape minus the aim, before the ramp."""
-    ramp_rad: float
-    candidates: int
-    """Shapes within the heading tolerance; 0 means that the nearest few were taken instead."""
-    visited: int
-    """Distinct states visited so far."""
 
 
 class Walker:

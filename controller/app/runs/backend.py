@@ -12,7 +12,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.controller.runlog.record import Laid
+from snakewalk.controller.runlog.record import InitialPose
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.clock import Clock
@@ -40,7 +40,7 @@ def simulated(
     robot: RobotConfig,
     world: WorldConfig,
     ground: HeightField | None,
-    laid: Laid,
+    initial_pose: InitialPose,
 ) -> Backend:
     """Servos on a simulated line that turn a MuJoCo body with its head at the start.
 
@@ -49,7 +49,7 @@ def simulated(
         robot: the body and its servos.
         world: friction and ground.
         ground: the world's height field, where it has one.
-        laid: heading of the head link, and joint angles to begin with.
+        initial_pose: heading of the head link, and joint angles to begin with.
 
     """
     require_extra("simulated runs need", "mujoco")
@@ -59,7 +59,7 @@ def simulated(
     from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
     plant = MujocoPlant(robot, world, ground, run.physics_step_s)
-    plant.reset(run.start_m, laid.heading_rad, laid.joint_rad)
+    plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
     servo = robot.servo
     line = SimLine(
         ServoBank(robot.servo_ids, servo.model, servo.baud),

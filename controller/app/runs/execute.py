@@ -6,11 +6,13 @@ from pathlib import Path
 
 from snakewalk.controller.app.report.build import write_summary
 from snakewalk.controller.app.runs.backend import metal, simulated
-from snakewalk.controller.app.runs.job import Job
-from snakewalk.controller.app.runs.pose_source import pose_faults, pose_source
+from snakewalk.controller.app.runs.pose_provider import PoseProvider, pose_faults, pose_provider
+from snakewalk.controller.app.runs.prepared_run import PreparedRun
+from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.writer import RunLog
-from snakewalk.controller.runtime.drive import Drive, Outcome, Watcher
+from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outcome
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
@@ -22,42 +24,43 @@ class Finished:
 
     outcome: Outcome
     log: Path
+    record: RunRecord
+    """The log, read back once: for the summary, the report and whoever asks more of it."""
     summary: dict[str, object]
-    pose: dict[str, object]
-    """Where a camera or the joints measured the pose: what they did, and how far off they were."""
+    pose: PoseProvider
+    """What measured the pose, and how well where this is known."""
+    source: MotionSource
+    """The motion that ran, at its end."""
 
 
 def execute(
-    prepared: Job,
+    prepared: PreparedRun,
     folder: Path,
     port: str | None = None,
-    watchers: tuple[Watcher, ...] = (),
+    *,
     confirm: Callable[[str], bool] | None = None,
-    say: Callable[[str], None] = lambda text: None,
+    on_progress: OnProgress = lambda progress: None,
+    on_event: OnEvent = lambda kind, text: None,
 ) -> Finished:
     """Run on ``port``, or on the simulator where it is None; nothing else differs.
 
     ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``);
-    ``say`` is told what the motion decides by itself: a slower rate, an operator's change.
+    ``on_progress`` is called after each cycle, ``on_event`` with what the motion decides by itself:
+    a slower rate, an operator's change.
 
     Raises:
         InputError: the plan breaks a limit, the port is not there, the servos are not the robot's.
 
     """
     pose_faults(prepared.run, prepared.robot, prepared.world, metal=port is not None)
-    plan = prepared.judged()
-    if port is None:
-        laid = prepared.laid()
+    plan = prepared.check_plan()
+    initial_pose = prepared.initial_pose() if port is None else None
+    if initial_pose is not None:
         backend = simulated(
-            prepared.run,
-            prepared.robot,
-            prepared.world,
-            prepared.ground,
-            laid,
+            prepared.run, prepared.robot, prepared.world, prepared.ground, initial_pose
         )
     else:
-        laid = None
-        backend = metal(prepared.run, prepared.robot, port)
+        backend = metal(prepared.run, prepared.robot, port or "")
     log_path = folder / "log.mcap"
     with RunLog(log_path) as log:
         log.config(
@@ -67,7 +70,7 @@ def execute(
             backend=backend.name,
             plan=plan,
             ground=prepared.ground,
-            laid=laid,
+            initial_pose=initial_pose,
             torque_constant_n_m_a=_torque_constant_n_m_a(prepared.robot.servo.model),
         )
         safety, clock = prepared.run.safety, backend.clock
@@ -80,32 +83,33 @@ def execute(
             on_event=lambda text: log.event(clock.now_s(), "recovery", text, "warning"),
         )
 
-        def note(kind: str, text: str) -> None:
+        def log_event(kind: str, text: str) -> None:
             log.event(clock.now_s(), kind, text)
-            say(text)
+            on_event(kind, text)
 
         limits = SafetyLimits.from_config(prepared.robot, safety)
-        with pose_source(prepared, backend, note) as source:
+        with pose_provider(prepared, backend, log_event) as pose:
+            source = prepared.make_source(log_event)
             drive = Drive(
                 link=SafeLink(backend.chain, limits, clock, recovery),
                 clock=clock,
-                pose=source.ask,
-                pilot=prepared.guide(note),
+                pose=pose.measure,
+                motion=source,
                 log=log,
                 robot=prepared.robot,
                 run=prepared.run,
                 gain=prepared.gain,
-                watchers=watchers,
                 wire_busy_s=backend.wire_busy_s,
-                say=say,
+                on_progress=on_progress,
+                on_event=on_event,
             )
             outcome = drive.run()
-    numbers = dict(write_summary(read_log(log_path), folder))
-    return Finished(outcome, log_path, numbers, source.found)
+    record = read_log(log_path)
+    return Finished(outcome, log_path, record, dict(write_summary(record, folder)), pose, source)
 
 
 def _torque_constant_n_m_a(model: str) -> float:
-    """Of the servo's specification table; NaN where the simulator does not know the model."""
+    """Constant from the servo's specification; NaN where the simulator does not know the model."""
     from snakewalk.sim.servo.motor import MOTORS  # noqa: PLC0415  only for this figure
 
     return MOTORS[model].torque_constant_n_m_a if model in MOTORS else float("nan")

@@ -12,9 +12,9 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.runs.backend import simulated
-from snakewalk.controller.kinematics.links import BodyView, body_in_world, mean_heading_rad
+from snakewalk.controller.app.runs.prepared_run import pose_with
+from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.motion.source import MotionSource
-from snakewalk.controller.runlog.record import Laid
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.types import JointCommand
@@ -25,7 +25,10 @@ STEPS = 8
 
 
 class PhysicsBody:
-    """Laid down in the shape ``joint_rad`` (J,) with its head at ``start_m``; a context manager."""
+    """Simulated robot that starts in the shape ``joint_rad`` (J,) with its head at ``start_m``.
+
+    It is a context manager.
+    """
 
     def __init__(
         self,
@@ -49,8 +52,8 @@ class PhysicsBody:
             "repertoire",
         )
         self.robot = robot
-        laid = Laid(heading_rad - mean_heading_rad(robot, joint_rad), joint_rad)
-        self._backend = simulated(run, robot, world, build_ground(world), laid)
+        initial_pose = pose_with(robot, heading_rad, joint_rad)
+        self._backend = simulated(run, robot, world, build_ground(world), initial_pose)
         limits = SafetyLimits.from_config(robot, run.safety)
         self._link = SafeLink(self._backend.chain, limits, self._backend.clock)
         self._open = ExitStack()

@@ -10,7 +10,11 @@ from snakewalk.config.loader import checked, load_robot, load_run, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.controller.app.runs.repertoire_job import RepertoireJob, laid, laid_frame
+from snakewalk.controller.app.runs.repertoire_run import (
+    RepertoireRun,
+    initial_frame,
+    pose_of_action,
+)
 from snakewalk.controller.repertoire.moves import Moves, start_pose
 from snakewalk.controller.repertoire.repertoire import load_repertoire
 from snakewalk.controller.repertoire.search import AIM_SHARE, Route, search
@@ -30,7 +34,7 @@ def plan_route(
     robot: str | None = None,
     world: str | None = None,
     beam: int = 400,
-) -> RepertoireJob:
+) -> RepertoireRun:
     """Search the quickest sequence of actions through a run's waypoints.
 
     ``repertoire_file`` is by default that of the run's robot and world in the working folder.
@@ -58,7 +62,7 @@ def plan_route(
         )
     moves = Moves(repertoire, body.length_m / repertoire.length_m)
     first = int(np.argmax([segment.speed_m_s for segment in repertoire.segments]))
-    start = start_pose(laid_frame(run, body, laid(run, body, repertoire, first)))
+    start = start_pose(initial_frame(run, body, pose_of_action(run, body, repertoire, first)))
     route = search(moves, start, run.waypoints_m, AIM_SHARE * run.waypoint_radius_m, beam=beam)
     if route.reached < len(run.waypoints_m):
         route = search(moves, start, run.waypoints_m, run.waypoint_radius_m, beam=beam)
@@ -67,7 +71,7 @@ def plan_route(
             f"run {run.name}: no sequence of these actions passes waypoint {route.reached + 1} "
             f"within {run.waypoint_radius_m:g} m; a larger --beam or waypoint_radius_m may help"
         )
-    return RepertoireJob(run, body, ground, repertoire, file, route)
+    return RepertoireRun(run, body, ground, repertoire, file, route)
 
 
 def flat(world: WorldConfig) -> None:
@@ -84,7 +88,7 @@ def flat(world: WorldConfig) -> None:
         )
 
 
-def plan_facts(job: RepertoireJob) -> dict[str, object]:
+def plan_facts(job: RepertoireRun) -> dict[str, object]:
     """Numbers for a command's answer."""
     return {
         "run": job.run.name,
@@ -99,7 +103,7 @@ def plan_facts(job: RepertoireJob) -> dict[str, object]:
     }
 
 
-def save_plan(job: RepertoireJob, path: Path) -> None:
+def save_plan(job: RepertoireRun, path: Path) -> None:
     """Write the plan as JSON; the repertoire stays in its own file."""
     about = {
         "format": FORMAT,
@@ -116,7 +120,7 @@ def save_plan(job: RepertoireJob, path: Path) -> None:
     path.write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
 
 
-def load_plan(path: Path, *, replan: bool = True) -> RepertoireJob:
+def load_plan(path: Path, *, replan: bool = True) -> RepertoireRun:
     """Read what ``save_plan`` wrote.
 
     Raises:
@@ -150,4 +154,4 @@ def load_plan(path: Path, *, replan: bool = True) -> RepertoireJob:
         checked(WorldConfig, parts[2], str(path)),
     )
     repertoire.check(robot)
-    return RepertoireJob(run, robot, world, repertoire, file, route, replan)
+    return RepertoireRun(run, robot, world, repertoire, file, route, replan)

@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 
 from snakewalk.controller.app.runs.execute import Finished, execute
-from snakewalk.controller.app.runs.repertoire_job import RepertoireJob, WatchedJob
+from snakewalk.controller.app.runs.repertoire_run import RepertoireRun, RouteMotion
 from snakewalk.controller.repertoire.route import Follower
-from snakewalk.controller.runtime.drive import Watcher
+from snakewalk.controller.runtime.drive import OnProgress
 
 
 @dataclass(frozen=True, slots=True)
 class RouteRun:
     """A run of a plan, and what its follower saw."""
 
-    job: RepertoireJob
+    job: RepertoireRun
     finished: Finished
     follower: Follower
 
@@ -52,14 +52,17 @@ class RouteRun:
         return found
 
 
-def default_folder(job: RepertoireJob) -> Path:
+def default_folder(job: RepertoireRun) -> Path:
     """Where a run goes that is told nothing."""
     how = "repertoire" if job.replan else "repertoire-open"
     return Path("runs") / f"{job.run.name}-{job.robot.name}-{how}"
 
 
 def run_route(
-    job: RepertoireJob, folder: Path, port: str | None, watchers: tuple[Watcher, ...] = ()
+    job: RepertoireRun,
+    folder: Path,
+    port: str | None,
+    on_progress: OnProgress = lambda progress: None,
 ) -> RouteRun:
     """Execute a plan on ``port``, or on the simulator where it is None.
 
@@ -67,6 +70,6 @@ def run_route(
         InputError: as ``execute``.
 
     """
-    watched = WatchedJob.of(job)
-    finished = execute(watched, folder, port, watchers)
-    return RouteRun(job, finished, watched.kept)
+    finished = execute(job, folder, port, on_progress=on_progress)
+    assert isinstance(finished.source, RouteMotion), "a repertoire run has no other motion"
+    return RouteRun(job, finished, finished.source.follower)

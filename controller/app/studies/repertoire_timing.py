@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from snakewalk.controller.app.runs.repertoire_job import RepertoireJob, laid
+from snakewalk.controller.app.runs.repertoire_run import RepertoireRun, pose_of_action
 from snakewalk.controller.app.studies.repertoire_physics import FRAME_S, PhysicsBody
 from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.route import Follower
@@ -49,7 +49,7 @@ class SearchCost:
 
 
 def search_cost(
-    job: RepertoireJob,
+    job: RepertoireRun,
     candidates: int,
     *,
     beam: int = 400,
@@ -77,7 +77,7 @@ def search_cost(
     return SearchCost(best / found.candidates, spent / ran, ran, found.candidates)
 
 
-def physics_route(job: RepertoireJob, actions: tuple[int, ...]) -> tuple[float, Follower]:
+def physics_route(job: RepertoireRun, actions: tuple[int, ...]) -> tuple[float, Follower]:
     """Run a sequence on the simulated robot without looking: CPU time, and where it went."""
     pose = [job.route.pose[0]]
     for action in actions:
@@ -86,10 +86,8 @@ def physics_route(job: RepertoireJob, actions: tuple[int, ...]) -> tuple[float, 
     run = job.run
     follower = Follower(job.moves, route, run.waypoints_m, run.waypoint_radius_m, replan=False)
     motion = RepertoireMotion(job.repertoire, job.robot, actions[0], follower.choose)
-    lies = laid(run, job.robot, job.repertoire, actions[0])
-    with PhysicsBody(
-        job.robot, job.world, lies.joint_rad, run.start_m, job.start_heading_rad
-    ) as body:
+    pose_rad = pose_of_action(run, job.robot, job.repertoire, actions[0]).joint_rad
+    with PhysicsBody(job.robot, job.world, pose_rad, run.start_m, job.start_heading_rad) as body:
         begun = time.process_time()
         while not motion.stopping:
             view = body.view()

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.controller.app.runs.backend import Backend, simulated
-from snakewalk.controller.app.runs.job import job_of
+from snakewalk.controller.app.runs.factory import prepare_run
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.metrics.comparison import Comparison, compare
-from snakewalk.controller.runlog.record import Laid, RunRecord
+from snakewalk.controller.runlog.record import InitialPose, RunRecord
 from snakewalk.controller.runlog.writer import RunLog, VerdictKind
 from snakewalk.drivers.types import BodyPose, JointCommand
 
@@ -58,7 +58,7 @@ def replay(
             plan=header.plan,
             ground=header.ground,
             torque_constant_n_m_a=header.torque_constant_n_m_a,
-            laid=header.laid,
+            initial_pose=header.initial_pose,
         )
         chain.enable()
         wire_s, start_s = backend.wire_busy_s(), clock.now_s()
@@ -132,10 +132,12 @@ def _known(record: RunRecord, valid: NDArray[np.bool_]) -> RunRecord:
 
 def _backend(record: RunRecord) -> Backend:
     header = record.header
-    laid = header.laid
-    if laid is None:
-        prepared = job_of(header.run, header.robot, header.world)
+    initial_pose = header.initial_pose
+    if initial_pose is None:
+        prepared = prepare_run(header.run, header.robot, header.world)
         first = record.cycle.measured_rad[0]
         known = first if np.isfinite(first).all() else np.zeros(header.robot.joint_count)
-        laid = Laid(prepared.start_heading_rad, known)
-    return simulated(header.run, header.robot, header.world, build_ground(header.world), laid)
+        initial_pose = InitialPose(prepared.start_heading_rad, known)
+    return simulated(
+        header.run, header.robot, header.world, build_ground(header.world), initial_pose
+    )

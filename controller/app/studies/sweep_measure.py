@@ -9,12 +9,11 @@ import numpy as np
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.prepare_gait import prepare_gait
-from snakewalk.controller.app.runs.prepared_gait import PreparedGait
+from snakewalk.controller.app.runs.factory import prepare_gait
+from snakewalk.controller.app.runs.gait_run import GaitRun
 from snakewalk.controller.app.studies.sweep_points import Point
 from snakewalk.controller.metrics.displacement import SKIPPED_S, gait_way
 from snakewalk.controller.metrics.effort import Winding, effort
-from snakewalk.controller.runlog.reader import read_log
 from snakewalk.sim.servo.motor import MOTORS
 
 Row = dict[str, object]
@@ -46,9 +45,9 @@ def measure(point: Point, vary: int | None = None) -> Row:
             prepared = _varied(prepared, np.random.default_rng(vary))
         with TemporaryDirectory() as folder:
             finished = execute(prepared, Path(folder))
-            record = read_log(finished.log)
     except InputError as error:
         return {"ended": f"refused: {error.faults[0]}"}
+    record = finished.record
     start_s = next((e.time_s for e in record.events if e.kind == "start"), 0.0)
     ramp_s = max(0.0, record.end_s - start_s - point.seconds - 1.0)
     motor = MOTORS.get(record.header.robot.servo.model)
@@ -76,7 +75,7 @@ def measure(point: Point, vary: int | None = None) -> Row:
     return {key: _digits(value) for key, value in found.items()}
 
 
-def _varied(prepared: PreparedGait, rng: np.random.Generator) -> PreparedGait:
+def _varied(prepared: GaitRun, rng: np.random.Generator) -> GaitRun:
     world, robot = prepared.world, prepared.robot
     slick, volts = rng.uniform(-1.0, 1.0, 2)
     factor = 1.0 + FRICTION_SPREAD * slick

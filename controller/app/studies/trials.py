@@ -12,10 +12,10 @@ import numpy as np
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.prepare import Prepared, prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
+from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.app.studies.pool import each
 from snakewalk.controller.metrics.ground_contact import footing
-from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.terrain.summary import path_relief
 
 
@@ -58,10 +58,10 @@ class Trial:
     """Why the plan was refused, where it was."""
 
 
-def prepare_case(run: str, case: Case, seed: int, changes: Mapping[str, object]) -> Prepared:
+def prepare_case(run: str, case: Case, seed: int, changes: Mapping[str, object]) -> WalkRun:
     """Prepare one trial's run."""
     robot = {"robot": case.robot} if case.robot is not None else {}
-    found = prepare(run, motion=case.motion, seed=seed, **(dict(changes) | robot))
+    found = prepare_walk(run, motion=case.motion, seed=seed, **(dict(changes) | robot))
     if case.relief == 1.0:
         return found
     return replace(found, world=found.world.with_relief(case.relief))
@@ -78,7 +78,7 @@ def run_trial(run: str, case: Case, seed: int, changes: Mapping[str, object]) ->
             finished = execute(prepared, Path(folder))
         except InputError as error:
             return Trial(case, seed, waypoints, slope_median_deg=slope_deg, refused=error.faults[0])
-        stood = footing(read_log(finished.log), prepared.ground)
+        stood = footing(finished.record, prepared.ground)
     numbers, outcome = finished.summary, finished.outcome
     return Trial(
         case=case,

@@ -9,7 +9,7 @@ from PIL import Image
 
 from snakewalk.controller.app.report.artifacts import leave_report
 from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.prepare_gait import prepare_gait
+from snakewalk.controller.app.runs.factory import prepare_gait
 from snakewalk.controller.gaits.registry import GAITS
 
 WIDTH, HEIGHT = 400, 225

@@ -15,10 +15,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.app.cli.main import app, main
 from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.job import job_of
-from snakewalk.controller.app.runs.prepare import prepare
-from snakewalk.controller.app.runs.prepare_gait import prepare_gait
-from snakewalk.controller.app.runs.prepared_gait import PreparedGait
+from snakewalk.controller.app.runs.factory import prepare_gait, prepare_run, prepare_walk
+from snakewalk.controller.app.runs.gait_run import GaitRun
 from snakewalk.controller.app.studies.replay import differences, replay
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.metrics.displacement import gait_way
@@ -126,8 +124,8 @@ def test_a_log_of_a_gait_replays_exactly_and_becomes_a_job_again(sidewound, tmp_
     record = read_log(sidewound.log)
     again = read_log(replay(record, tmp_path / "again.mcap"))
     assert differences(record, again, 1e-9, 1e-9).same
-    job = job_of(record.header.run, record.header.robot, record.header.world)
-    assert isinstance(job, PreparedGait)
+    job = prepare_run(record.header.run, record.header.robot, record.header.world)
+    assert isinstance(job, GaitRun)
 
 
 def test_a_warm_robot_slows_down_says_so_and_does_not_trip(tmp_path: Path) -> None:
@@ -135,8 +133,8 @@ def test_a_warm_robot_slows_down_says_so_and_does_not_trip(tmp_path: Path) -> No
     tight = SafetyConfig(current_limit_a=0.5, current_time_s=5.0)
     run = prepared.run.model_copy(update={"safety": tight})
     said: list[str] = []
-    job = PreparedGait(run, prepared.robot, prepared.world)
-    finished = execute(job, tmp_path, say=said.append)
+    job = GaitRun(run, prepared.robot, prepared.world)
+    finished = execute(job, tmp_path, on_event=lambda kind, text: said.append(text))
     assert finished.outcome.tripped is None
     assert finished.outcome.least_rate < 0.9
     assert any(text.startswith("slowing down: joint") for text in said)
@@ -162,8 +160,12 @@ def test_an_operators_keys_change_a_run_over_the_bus(tmp_path: Path) -> None:
         return [next(presses, "?")] if next(beat) % 60 == 59 else []
 
     said: list[str] = []
-    job = prepare_gait("sidewinding", seconds=6.0, live=lambda m, r, say: Operator(m, r, keys, say))
-    finished = execute(job, tmp_path, say=said.append)
+    job = prepare_gait(
+        "sidewinding",
+        seconds=6.0,
+        make_operator=lambda m, r, on_event: Operator(m, r, keys, on_event),
+    )
+    finished = execute(job, tmp_path, on_event=lambda kind, text: said.append(text))
     assert finished.summary["clamps"] == 0
     assert {"frequency_hz = 0.55", "mirror = True", "gait rolling"} <= set(said)
     kinds = [e.text for e in read_log(finished.log).events if e.kind == "operator"]
@@ -193,4 +195,4 @@ def test_live_from_a_terminal(tmp_path: Path) -> None:
 
 def test_the_main_job_sends_gaits_to_their_own_command() -> None:
     with pytest.raises(InputError, match="snakewalk gait run"):
-        prepare("flat-square", motion="gait", gait={"name": "rolling"})
+        prepare_walk("flat-square", motion="gait", gait={"name": "rolling"})

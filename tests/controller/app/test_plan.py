@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.runs.prepare import prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
 
 
 def snakewalk(*words: str) -> subprocess.CompletedProcess[str]:
@@ -22,21 +22,21 @@ def snakewalk(*words: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize("run", ["flat-square", "flat-slalom"])
 @pytest.mark.parametrize("motion", ["walk", "serpenoid"])
 def test_the_walk_and_the_baseline_reach_every_waypoint_on_paper(run: str, motion: str) -> None:
-    prepared = prepare(run, motion=motion, seed=3)
+    prepared = prepare_walk(run, motion=motion, seed=3)
     ahead = prepared.forecast()
     assert ahead.reached == len(prepared.run.waypoints_m)
     assert ahead.joint_speed_rad_s.max() <= 1.1 * prepared.robot.joint_speed_limit_rad_s
 
 
 def test_without_feedback_slip_carries_the_body_off_its_path() -> None:
-    prepared = prepare("flat-slalom", motion="walk-blind", time_limit_s=80.0)
+    prepared = prepare_walk("flat-slalom", motion="walk-blind", time_limit_s=80.0)
     assert prepared.forecast().reached < 5
 
 
 def test_the_same_seed_gives_the_same_joints_bit_for_bit() -> None:
-    one, two = (prepare("flat-slalom", seed=5, time_limit_s=15.0).forecast() for _ in range(2))
+    one, two = (prepare_walk("flat-slalom", seed=5, time_limit_s=15.0).forecast() for _ in range(2))
     assert one.joint_rad.tobytes() == two.joint_rad.tobytes()
-    other = prepare("flat-slalom", seed=6, time_limit_s=15.0).forecast()
+    other = prepare_walk("flat-slalom", seed=6, time_limit_s=15.0).forecast()
     assert not np.array_equal(one.joint_rad, other.joint_rad)
 
 
@@ -71,4 +71,4 @@ def test_a_robot_that_cannot_bend_enough_is_refused_before_torque(tmp_path: Path
     run = tmp_path / "run.toml"
     run.write_text('name = "r"\nrobot = "stiff.toml"\nwaypoints_m = [[2, 0]]\n')
     with pytest.raises(InputError, match="joint limits"):
-        prepare(str(run)).forecast()
+        prepare_walk(str(run)).forecast()

@@ -11,8 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.app.cli.main import app
 from snakewalk.controller.app.recordings.recorded_joints import recorded_joints
-from snakewalk.controller.app.runs.job import job_of
-from snakewalk.controller.app.runs.prepare_playback import prepare_playback
+from snakewalk.controller.app.runs.factory import prepare_playback, prepare_run
 from snakewalk.controller.runlog.reader import read_log
 
 
@@ -52,8 +51,8 @@ def test_joints_of_a_synthesis_are_played_as_they_are(tmp_path: Path) -> None:
     record = read_log(Path(told["log"]))
     np.testing.assert_allclose(record.cycle.asked_rad[-1], wave[-1], atol=1e-3)
     header = record.header
-    again = job_of(header.run, header.robot, header.world)
-    np.testing.assert_allclose(again.guide(lambda kind, text: None).first_goal_rad(), wave[0])
+    again = prepare_run(header.run, header.robot, header.world)
+    np.testing.assert_allclose(again.make_source(lambda kind, text: None).goal_rad(), wave[0])
 
 
 @pytest.mark.parametrize("arguments", [["nowhere.npz"], ["worm-like", "--speed", "quick"]])

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.main import app
 from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.prepare import prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.app.studies.replay import differences, replay
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
@@ -21,7 +21,9 @@ TABLES = ("asked_rad", "sent_rad", "measured_rad", "velocity_rad_s", "current_a"
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    prepared = prepare("flat-square", motion="serpenoid", waypoints_m=((3.0, 0.0),), time_limit_s=4)
+    prepared = prepare_walk(
+        "flat-square", motion="serpenoid", waypoints_m=((3.0, 0.0),), time_limit_s=4
+    )
     return execute(prepared, tmp_path_factory.mktemp("run")).log
 
 
@@ -82,7 +84,9 @@ def test_metal_begins_where_its_joints_were(record: RunRecord, tmp_path: Path) -
     rows = {name: getattr(record.cycle, name)[:50] for name in record.cycle.__dataclass_fields__}
     cycle = replace(record.cycle, **rows | {"sent_rad": still, "measured_rad": still})
     metal = replace(
-        record, cycle=cycle, header=replace(record.header, backend="/dev/ttyUSB0", laid=None)
+        record,
+        cycle=cycle,
+        header=replace(record.header, backend="/dev/ttyUSB0", initial_pose=None),
     )
     again = read_log(replay(metal, tmp_path / "log.mcap"))
     np.testing.assert_allclose(again.cycle.measured_rad, still, atol=0.01)

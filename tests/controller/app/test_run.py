@@ -12,12 +12,13 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.app.cli.options import DEFAULT_RUN
 from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.prepare import Prepared, prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
+from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.runlog.reader import read_log
 
 
-def short(**changes: object) -> Prepared:
-    return prepare("flat-slalom", waypoints_m=((1.2, 0.3),), time_limit_s=30.0, **changes)
+def short(**changes: object) -> WalkRun:
+    return prepare_walk("flat-slalom", waypoints_m=((1.2, 0.3),), time_limit_s=30.0, **changes)
 
 
 @pytest.fixture(scope="module")
@@ -45,10 +46,10 @@ ON_A_CORE = """
 import os, sys
 from pathlib import Path
 from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.prepare import prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
 if hasattr(os, "sched_setaffinity"):
     os.sched_setaffinity(0, {int(sys.argv[1])})
-run = prepare("flat-slalom", waypoints_m=((1.2, 0.3),), time_limit_s=30.0, seed=4)
+run = prepare_walk("flat-slalom", waypoints_m=((1.2, 0.3),), time_limit_s=30.0, seed=4)
 execute(run, Path(sys.argv[2]))
 """
 
@@ -77,10 +78,10 @@ def test_isotropic_ground_sounds_the_alarm_for_missing_advance(tmp_path: Path) -
     prepared = short(motion="serpenoid")
     same = FrictionConfig(along=0.4, across=0.4)
 
-    class Slippery(Prepared):
+    class Slippery(WalkRun):
         """Believes in the configured friction; the ground has another."""
 
-        def __init__(self, like: Prepared) -> None:
+        def __init__(self, like: WalkRun) -> None:
             super().__init__(like.run, like.robot, like.world.model_copy(update={"friction": same}))
             self.__dict__["gain"] = like.gain
 
@@ -98,7 +99,7 @@ def test_a_port_that_is_not_there_is_refused_before_anything_is_written(tmp_path
 
 
 def test_the_default_job_starts_over_the_hills(tmp_path: Path) -> None:
-    prepared = prepare(DEFAULT_RUN, time_limit_s=4.0)
+    prepared = prepare_walk(DEFAULT_RUN, time_limit_s=4.0)
     assert prepared.ground is not None
     finished = execute(prepared, tmp_path)
     assert finished.outcome.tripped is None

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from snakewalk.controller.app.recordings.recording import Examined, examine
-from snakewalk.controller.app.runs.prepare import prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
 
 LAMPREY = "lamprey/lampreydata.csv"
 FISH = "prickleback/XMUC02_Trial1_sleap-1.csv"
@@ -74,5 +74,5 @@ def test_the_worms_reversals_are_seen(seen: dict[str, Examined]) -> None:
 def test_walks_of_gentle_and_of_coiling_animals_reach_the_square_on_paper(
     shared_data: Path, name: str
 ) -> None:
-    ahead = prepare("flat-square", track=str(shared_data / name), seed=2).forecast()
+    ahead = prepare_walk("flat-square", track=str(shared_data / name), seed=2).forecast()
     assert ahead.reached == 4

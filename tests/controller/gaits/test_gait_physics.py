@@ -11,7 +11,7 @@ from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.kinematics.virtual_chassis import virtual_chassis
 from snakewalk.controller.motion.gait_motion import GaitMotion
-from snakewalk.controller.motion.head_steering import HeadSteering, Look
+from snakewalk.controller.motion.head_steering import HeadSteering, HeadTarget
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
@@ -119,7 +119,7 @@ def test_the_head_keeps_its_heading_while_the_body_undulates() -> None:
     robot = load_robot("yaw16")
     free = way("lateral-undulation", "yaw16", "flat", cycles=3)
     gait = GaitMotion(make_gait("lateral-undulation"), robot)
-    steered = go(HeadSteering(gait, robot, Look(heading_rad=0.3)), gait, "yaw16", "flat", 3)
+    steered = go(HeadSteering(gait, robot, HeadTarget(heading_rad=0.3)), gait, "yaw16", "flat", 3)
     settled = slice(int(1.5 / DT_S), None)
     swing, kept = free.head_rad[settled], steered.head_rad[settled] - 0.3
     assert np.abs(swing).max() > 0.5
@@ -131,5 +131,5 @@ def test_the_head_looks_at_a_point_that_it_passes() -> None:
     robot = load_robot("yaw16")
     point = (0.6, 0.5)
     gait = GaitMotion(make_gait("lateral-undulation"), robot)
-    steered = go(HeadSteering(gait, robot, Look(point_m=point)), gait, "yaw16", "flat", 1)
+    steered = go(HeadSteering(gait, robot, HeadTarget(point_m=point)), gait, "yaw16", "flat", 1)
     assert steered.head_rad[-1] > 0.4

@@ -4,7 +4,7 @@ import numpy as np
 
 from snakewalk.config.loader import load_robot
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.app.runs.prepare import prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.localization.dead_reckoning import DeadReckoning
 from snakewalk.drivers.types import JointState
 
@@ -18,7 +18,7 @@ def state(time_s: float, joints: np.ndarray) -> JointState:
 
 
 def test_it_follows_the_forecast_from_the_joints_alone() -> None:
-    prepared = prepare("flat-slalom", motion="serpenoid", time_limit_s=12.0)
+    prepared = prepare_walk("flat-slalom", motion="serpenoid", time_limit_s=12.0)
     ahead = prepared.forecast()
     reckon = DeadReckoning(ROBOT, FrictionConfig(), (0.0, 0.0), prepared.start_heading_rad)
     for time_s, joints in zip(ahead.time_s, ahead.joint_rad, strict=True):

@@ -13,7 +13,8 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.runs.device_camera import DeviceCamera
 from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.prepare import Prepared, prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
+from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.kinematics.links import pose_at
 from snakewalk.controller.localization.overhead_camera import CameraModel
@@ -24,9 +25,9 @@ from snakewalk.sim.rendering.top_view import TopView
 from tests.oracles.overhead_scene import DrawnView
 
 
-def short(**changes: object) -> Prepared:
+def short(**changes: object) -> WalkRun:
     near = {"waypoints_m": ((0.3, 0.05),), "time_limit_s": 15.0}
-    return prepare("flat-square", **near | changes)
+    return prepare_walk("flat-square", **near | changes)
 
 
 SMALL = {"width_px": 320, "height_px": 240, "field_width_m": 3.0, "height_m": 3.0}
@@ -55,7 +56,7 @@ def test_a_waypoint_is_reached_by_what_the_camera_sees(tmp_path: Path) -> None:
     )
     finished = execute(run, tmp_path)
     assert finished.outcome.complete(1)
-    found = finished.pose
+    found = finished.pose.facts()
     assert found["waypoints_truly_reached"] == 1
     assert found["frames_used"] == found["frames"] > 50
     assert 0.0 < float(str(found["head_error_rms_m"])) < 0.0094, "under a pixel"
@@ -71,7 +72,7 @@ def test_a_body_that_leaves_the_image_is_reckoned_on_and_the_log_says_so(tmp_pat
     finished = execute(short(pose="camera", camera=small, time_limit_s=3.0), tmp_path)
     events = [event.text for event in read_log(finished.log).events if event.kind == "camera"]
     assert "lost the body: cut by the edge of the image" in events[0]
-    assert finished.pose["frames_used"] < finished.pose["frames"]
+    assert finished.pose.facts()["frames_used"] < finished.pose.facts()["frames"]
 
 
 @pytest.mark.usefixtures("drawn")
@@ -100,7 +101,7 @@ def test_the_rendered_view_agrees_with_the_camera_model() -> None:
 
 def test_joints_alone_are_told_to_be_off(tmp_path: Path) -> None:
     finished = execute(short(pose="joints", time_limit_s=3.0), tmp_path)
-    assert float(str(finished.pose["head_error_rms_m"])) > 0.0
+    assert float(str(finished.pose.facts()["head_error_rms_m"])) > 0.0
 
 
 @pytest.mark.parametrize(
@@ -159,7 +160,7 @@ def test_the_command_line_says_what_is_wrong_in_one_line(
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> Prepared:
+def bench(tmp_path: Path) -> WalkRun:
     """A device that is a film: a robot that lies still, and its empty floor."""
     prepared = short()
     camera = CameraConfig(centre_m=(0.0, 0.0))
@@ -178,10 +179,10 @@ def bench(tmp_path: Path) -> Prepared:
         }
     )
     run = prepared.run.model_copy(update={"camera": device, "pose": "camera"})
-    return Prepared(run, prepared.robot, prepared.world)
+    return WalkRun(run, prepared.robot, prepared.world)
 
 
-def test_a_device_hands_over_what_it_sees_and_says_when_it_is_gone(bench: Prepared) -> None:
+def test_a_device_hands_over_what_it_sees_and_says_when_it_is_gone(bench: WalkRun) -> None:
     camera = DeviceCamera(bench.run, bench.robot, WallClock())
     try:
         found = camera.start
@@ -211,7 +212,7 @@ def _gone(camera: DeviceCamera) -> str:
     ],
 )
 def test_a_device_that_cannot_be_used_is_refused_in_one_line(
-    bench: Prepared, change: dict[str, object], line: str
+    bench: WalkRun, change: dict[str, object], line: str
 ) -> None:
     camera = bench.run.camera.model_copy(update=change)
     with pytest.raises(InputError, match=line) as refused:

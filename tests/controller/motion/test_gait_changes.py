@@ -5,8 +5,7 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.app.runs.job import job_of
-from snakewalk.controller.app.runs.prepare_gait import prepare_gait
+from snakewalk.controller.app.runs.factory import prepare_gait, prepare_run
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.motion.cpg_motion import CpgMotion
 
@@ -17,14 +16,14 @@ THEN = [(3.0, "turn-in-place", {}), (8.0, "rolling", {"frequency_hz": 0.3})]
 @pytest.mark.parametrize("by", ["blend", "cpg"])
 def test_a_job_made_again_moves_alike_within_the_limits(by: str) -> None:
     first = prepare_gait("lateral-undulation", then=THEN, by=by, seconds=12.0)  # type: ignore[arg-type]
-    again = job_of(first.run, first.robot, first.world)
+    again = prepare_run(first.run, first.robot, first.world)
     runs = []
     for job in (first, again):
-        guide = job.guide(lambda kind, text: None)
-        goals = [guide.first_goal_rad()]
-        while not guide.done and len(goals) < 2500:
-            goals.append(guide.step(0.02, None))  # type: ignore[arg-type]
-        assert guide.done
+        source = job.make_source(lambda kind, text: None)
+        goals = [source.goal_rad()]
+        while not source.done and len(goals) < 2500:
+            goals.append(source.step(0.02, None))  # type: ignore[arg-type]
+        assert source.done
         runs.append(np.array(goals))
     np.testing.assert_array_equal(runs[0], runs[1])
     speed = np.diff(runs[0], axis=0) / 0.02

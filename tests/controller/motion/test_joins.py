@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.app.runs.prepare import Prepared, prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
+from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.capture.fish.joining import piece_graph
 from snakewalk.controller.capture.fish.segments import cut
 from snakewalk.controller.capture.fish.swimmer import swim
@@ -26,7 +27,7 @@ from snakewalk.controller.motion.cpg_motion import CpgMotion
 from snakewalk.controller.motion.gait_cycle import Cycle
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.gait_sequence import GaitSequence
-from snakewalk.controller.motion.head_steering import HeadSteering, Look
+from snakewalk.controller.motion.head_steering import HeadSteering, HeadTarget
 from snakewalk.controller.motion.operator import KEYS, Operator
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import Hold, MotionSource, Pace
@@ -34,7 +35,6 @@ from snakewalk.controller.motion.source_switch import Relay
 from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.segment import Segment
-from snakewalk.controller.walk.pilot_motion import PilotMotion
 from snakewalk.drivers.types import BodyPose
 
 DT_S = 0.02
@@ -44,8 +44,8 @@ STEP_TOLERANCE = 1.06
 
 
 @cache
-def prepared(robot: str, motion: str) -> Prepared:
-    made = prepare("flat-slalom", robot=robot, motion=motion)
+def prepared(robot: str, motion: str) -> WalkRun:
+    made = prepare_walk("flat-slalom", robot=robot, motion=motion)
     made.pilot()
     return made
 
@@ -128,7 +128,9 @@ def make(kind: str, robot: RobotConfig) -> MotionSource:
             lambda kind, text: None,
         )
     if kind == "head":
-        return HeadSteering(GaitMotion(make_gait("lateral-undulation"), robot), robot, Look(0.4))
+        return HeadSteering(
+            GaitMotion(make_gait("lateral-undulation"), robot), robot, HeadTarget(0.4)
+        )
     if kind == "fish":
         return Recorded(robot, *fish_motion(robot.name))
     if kind == "actions":
@@ -140,7 +142,7 @@ def make(kind: str, robot: RobotConfig) -> MotionSource:
         later = [(0.3, make_gait("concertina")), (0.8, make_gait("lateral-undulation"))]
         return GaitSequence(GaitMotion(make_gait("lateral-undulation"), robot), later)
     walked = {"walk": "walk", "pilot": "serpenoid"}[kind]
-    return PilotMotion(prepared(robot.name, walked).pilot(), robot)
+    return prepared(robot.name, walked).pilot()
 
 
 def suits(kind: str, robot: RobotConfig) -> bool:

@@ -10,8 +10,8 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.job import job_of
-from snakewalk.controller.app.runs.repertoire_job import WatchedJob
+from snakewalk.controller.app.runs.factory import prepare_run
+from snakewalk.controller.app.runs.repertoire_run import RouteMotion
 from snakewalk.controller.app.studies.repertoire_physics import FRAME_S
 from snakewalk.controller.app.studies.repertoire_planning import load_plan, plan_route, save_plan
 from snakewalk.controller.app.studies.repertoire_timing import physics_route, search_cost
@@ -97,17 +97,19 @@ def test_a_plan_reaches_its_waypoints_on_the_bus_though_each_action_misses_a_lit
     assert job.route.reached == 5
     assert job.route.candidates > 4000
     save_plan(job, tmp_path / "plan.json")
-    watched = WatchedJob.of(load_plan(tmp_path / "plan.json"))
-    assert watched.route.actions == job.route.actions
-    outcome = execute(watched, tmp_path).outcome
+    loaded = load_plan(tmp_path / "plan.json")
+    assert loaded.route.actions == job.route.actions
+    finished = execute(loaded, tmp_path)
+    outcome = finished.outcome
     assert outcome.complete(5)
-    errors = watched.kept.errors()
+    assert isinstance(finished.source, RouteMotion)
+    errors = finished.source.follower.errors()
     assert 0.0 < np.median(errors[:, 0]) < 0.15
     assert outcome.duration_s < 1.6 * job.route.duration_s
     _, blind = physics_route(job, job.route.actions)
     assert blind.route_errors()[-1, 0] > 2.0 * np.median(errors[:, 0])
     with pytest.raises(InputError, match="repertoire run"):
-        job_of(job.run, job.robot, job.world)
+        prepare_run(job.run, job.robot, job.world)
 
 
 def test_the_physics_is_timed_on_the_candidates_asked_for(file: Path) -> None:

@@ -69,7 +69,7 @@ def write_log(path: Path, cycles: int) -> Path:
                     candidates=3,
                 )
                 log.qpos(t, np.arange(23) + 0.5)
-        log.path_laid(1.0, [[0.0, 1.0], [2.0, 2.0]])
+        log.path_replanned(1.0, [[0.0, 1.0], [2.0, 2.0]])
     return path
 
 

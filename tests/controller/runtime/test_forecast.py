@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from snakewalk.config.heightfield import HeightField
-from snakewalk.controller.app.runs.prepare import prepare
+from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.runtime.forecast import Forecast, forecast
 
 
 def ahead(rise: float | None, limit_s: float = 30.0) -> Forecast:
     """Two metres along x on a plane that rises by ``rise`` per metre."""
-    run = prepare("flat-slalom", motion="serpenoid", waypoints_m=[(2.0, 0.0)])
+    run = prepare_walk("flat-slalom", motion="serpenoid", waypoints_m=[(2.0, 0.0)])
     x = np.arange(-4.0, 4.5, 0.5)
     ground = None if rise is None else HeightField(np.tile(rise * x, (len(x), 1)), 0.5, -4.0, -4.0)
     return forecast(

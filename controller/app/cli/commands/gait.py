@@ -60,7 +60,7 @@ def show_gait(
 ) -> None:
     """Show a gait's parameters with ranges and units, its source, and how fast joints must be."""
     from snakewalk.controller.app.report.plots.gait import draw_gait  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.app.runs.prepare_gait import prepare_gait  # noqa: PLC0415
+    from snakewalk.controller.app.runs.factory import prepare_gait  # noqa: PLC0415
     from snakewalk.controller.gaits.gait import ranges  # noqa: PLC0415
     from snakewalk.controller.motion.gait_cycle import Cycle  # noqa: PLC0415
 

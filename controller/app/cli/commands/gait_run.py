@@ -2,6 +2,7 @@
 
 import math
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -22,7 +23,8 @@ from snakewalk.controller.app.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from snakewalk.controller.app.runs.prepared_gait import Live
+    from snakewalk.controller.app.runs.gait_run import MakeOperator
+    from snakewalk.controller.runtime.drive import Progress
 
 
 def run_gait(
@@ -53,12 +55,10 @@ def run_gait(
     as_json: Json = False,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.app.cli.progress import GaitProgress  # noqa: PLC0415
+    from snakewalk.controller.app.cli.progress import TimeBar  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.app.runs.prepare_gait import prepare_gait  # noqa: PLC0415
-    from snakewalk.controller.app.runs.real_time import RealTime  # noqa: PLC0415
+    from snakewalk.controller.app.runs.factory import prepare_gait  # noqa: PLC0415
     from snakewalk.controller.metrics.displacement import gait_way  # noqa: PLC0415
-    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
 
     if by not in {"blend", "cpg"}:
         raise InputError(f"--by {by}: expected blend or cpg")
@@ -72,15 +72,16 @@ def run_gait(
             seed=seed,
             look_heading_rad=look_heading_rad,
             look_at_m=_point(look_at),
-            live=_live(stack, live, gamepad),
+            make_operator=_operator(stack, live, gamepad),
             then=[_change(text) for text in then or []],
             by="cpg" if by == "cpg" else "blend",
         )
         run = prepared.run
         folder = out if out is not None else Path("runs") / f"gait-{run.name}-{prepared.robot.name}"
-        progress = stack.enter_context(GaitProgress(run.name, seconds))
-        paced = (RealTime(),) if prepared.live is not None and port is None else ()
-        finished = execute(prepared, folder, port, (progress, *paced), say=progress.note)
+        bar = stack.enter_context(TimeBar(run.name, seconds))
+        paced = prepared.make_operator is not None and port is None
+        on_progress = _in_real_time(bar.on_progress) if paced else bar.on_progress
+        finished = execute(prepared, folder, port, on_progress=on_progress, on_event=bar.on_event)
     left = leave(finished.log, folder, film=film)
     found: dict[str, object] = {
         "gait": prepared.config.name,
@@ -92,8 +93,8 @@ def run_gait(
     }
     if prepared.config.then:
         found["then"] = [f"{change.name}@{change.at_s:g}" for change in prepared.config.then]
-    if prepared.live is None and not prepared.config.then and by == "blend":
-        way = gait_way(read_log(finished.log))
+    if prepared.make_operator is None and not prepared.config.then and by == "blend":
+        way = gait_way(finished.record)
         found |= {
             "frequency_hz": round(way.frequency_hz, 3),
             "cycles": way.cycles,
@@ -115,8 +116,25 @@ def run_gait(
         raise SystemExit(1)
 
 
-def _live(stack: ExitStack, live: bool, gamepad: Path | None) -> "Live | None":
-    """Open what an operator holds; None without one."""
+def _in_real_time(on_progress: "Callable[[Progress], None]") -> "Callable[[Progress], None]":
+    """Hold a simulated run to the pace of an operator's clock."""
+    from snakewalk.drivers.clock import WallClock  # noqa: PLC0415
+
+    clock = WallClock()
+    ahead_s: float | None = None
+
+    def wait(progress: "Progress") -> None:
+        nonlocal ahead_s
+        on_progress(progress)
+        if ahead_s is None:
+            ahead_s = clock.now_s() - progress.time_s
+        clock.sleep_until_s(progress.time_s + ahead_s)
+
+    return wait
+
+
+def _operator(stack: ExitStack, live: bool, gamepad: Path | None) -> "MakeOperator | None":
+    """Open the keyboard or gamepad of an operator; None without one."""
     if not live and gamepad is None:
         return None
     from snakewalk.controller.app.cli.gamepad import Gamepad  # noqa: PLC0415
@@ -129,8 +147,8 @@ def _live(stack: ExitStack, live: bool, gamepad: Path | None) -> "Live | None":
     if gamepad is not None:
         hands.append(stack.enter_context(Gamepad(gamepad)))
     print("  ".join(f"{key}: {what}" for key, what in KEYS.items()), file=sys.stderr)
-    return lambda motion, robot, say: Operator(
-        motion, robot, lambda: [key for hand in hands for key in hand.pressed()], say
+    return lambda motion, robot, on_event: Operator(
+        motion, robot, lambda: [key for hand in hands for key in hand.pressed()], on_event
     )
 
 

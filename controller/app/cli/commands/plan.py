@@ -60,10 +60,10 @@ def plan(
         return
     if repertoire is not None or out is not None or carry or physics:
         raise InputError("--repertoire, --out, --run and --physics belong to --with repertoire")
-    from snakewalk.controller.app.runs.prepare import prepare  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.app.runs.factory import prepare_walk  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.terrain.summary import path_relief  # noqa: PLC0415
 
-    prepared = prepare(run, seed=seed, motion=motion, robot=robot, world=world, track=track)
+    prepared = prepare_walk(run, seed=seed, motion=motion, robot=robot, world=world, track=track)
     ahead = prepared.forecast()
     found: dict[str, object] = {
         "run": prepared.run.name,

@@ -31,14 +31,16 @@ def play(
     as_json: Json = False,
 ) -> None:
     """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.app.cli.progress import GaitProgress  # noqa: PLC0415
+    from snakewalk.controller.app.cli.progress import TimeBar  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.app.runs.prepare_playback import prepare_playback  # noqa: PLC0415
+    from snakewalk.controller.app.runs.factory import prepare_playback  # noqa: PLC0415
 
     prepared = prepare_playback(track, robot=robot, world=world, speed=_speed(speed))
     folder = out if out is not None else Path("runs") / f"play-{prepared.run.name}"
-    with GaitProgress(prepared.run.name, prepared.duration_s) as progress:
-        finished = execute(prepared, folder, port, (progress,), say=progress.note)
+    with TimeBar(prepared.run.name, prepared.duration_s) as bar:
+        finished = execute(
+            prepared, folder, port, on_progress=bar.on_progress, on_event=bar.on_event
+        )
     left = leave(finished.log, folder, film=film)
     found: dict[str, object] = {
         "recording": track,

@@ -24,7 +24,7 @@ from snakewalk.controller.app.cli.options import (
 from snakewalk.controller.app.cli.picture_file import check_picture
 
 if TYPE_CHECKING:
-    from snakewalk.controller.app.runs.repertoire_job import RepertoireJob
+    from snakewalk.controller.app.runs.repertoire_run import RepertoireRun
     from snakewalk.controller.repertoire.repertoire import Repertoire
 
 Picture = Annotated[Path | None, typer.Option(help="draw the actions' ways here")]
@@ -111,22 +111,21 @@ def run_plan(
 
 
 def carry_out(
-    job: "RepertoireJob", port: str | None, out: Path | None, film: bool, picture: Path | None
+    job: "RepertoireRun", port: str | None, out: Path | None, film: bool, picture: Path | None
 ) -> tuple[dict[str, object], bool]:
     """Execute a job with a bar; what it did, and whether it reached every waypoint."""
-    from snakewalk.controller.app.cli.progress import GaitProgress  # noqa: PLC0415
+    from snakewalk.controller.app.cli.progress import TimeBar  # noqa: PLC0415
     from snakewalk.controller.app.report.plots.repertoire import draw_way  # noqa: PLC0415
     from snakewalk.controller.app.studies.repertoire_run import default_folder, run_route  # noqa: PLC0415
-    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
 
     check_picture(picture)
     folder = default_folder(job) if out is None else out
-    with GaitProgress(job.run.name, job.route.duration_s) as progress:
-        ran = run_route(job, folder, port, (progress,))
+    with TimeBar(job.run.name, job.route.duration_s) as progress:
+        ran = run_route(job, folder, port, progress.on_progress)
     log = ran.finished.log
     left = leave(log, folder, film=film)
     if picture is not None:
-        draw_way(job, read_log(log), picture)
+        draw_way(job, ran.finished.record, picture)
     return ran.facts() | {"log": str(log)} | left.facts(), ran.complete
 
 

@@ -39,11 +39,11 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.app.cli.progress import PathProgress  # noqa: PLC0415
+    from snakewalk.controller.app.cli.progress import PathBar  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.app.runs.prepare import prepare  # noqa: PLC0415
+    from snakewalk.controller.app.runs.factory import prepare_walk  # noqa: PLC0415
 
-    prepared = prepare(
+    prepared = prepare_walk(
         run, seed=seed, motion=motion, robot=robot, world=world, track=track, pose=pose
     )
     changed = [Path(each).stem for each in (robot, world, track) if each is not None]
@@ -52,9 +52,15 @@ def run(
         parts.append(f"pose-{prepared.run.pose}")
     name = "-".join(parts)
     folder = out if out is not None else Path("runs") / name
-    with PathProgress(prepared.path.length_m, len(prepared.run.waypoints_m)) as progress:
-        asks = _confirm if sys.stdin.isatty() else None
-        finished = execute(prepared, folder, port, (progress,), asks, progress.note)
+    with PathBar(prepared.path.length_m, len(prepared.run.waypoints_m)) as bar:
+        finished = execute(
+            prepared,
+            folder,
+            port,
+            confirm=_confirm if sys.stdin.isatty() else None,
+            on_progress=bar.on_progress,
+            on_event=bar.on_event,
+        )
     outcome = finished.outcome
     left = leave(finished.log, folder, film=film)
     show(
@@ -65,7 +71,7 @@ def run(
             "duration_s": round(outcome.duration_s, 2),
             "tripped": outcome.tripped,
             "advance_alarms": outcome.alarms,
-            **finished.pose,
+            **finished.pose.facts(),
             "log": str(finished.log),
             "summary": str(folder / "summary.json"),
             **left.facts(),

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from snakewalk.controller.app.runs.repertoire_job import RepertoireJob
+from snakewalk.controller.app.runs.repertoire_run import RepertoireRun
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.replay import replay
@@ -43,7 +43,7 @@ def draw_actions(repertoire: Repertoire, path: Path) -> None:
     figure.savefig(path, dpi=90)
 
 
-def draw_way(job: RepertoireJob, record: RunRecord, path: Path) -> None:
+def draw_way(job: RepertoireRun, record: RunRecord, path: Path) -> None:
     """Draw the route as planned, and where the centre of the body went."""
     from matplotlib.figure import Figure  # noqa: PLC0415  an extra
 

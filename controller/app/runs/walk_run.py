@@ -1,9 +1,7 @@
-"""From a run's configuration to a pilot: recording, library, path, forecast, margins."""
+"""A run of the snake walk: recording, library of shapes, path, pilot, forecast and margins."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
@@ -11,18 +9,18 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
-from snakewalk.config.loader import checked, load_robot, load_run, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig, WalkConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.controller.capture.readers.load import load_track, track_beside
-from snakewalk.controller.kinematics.links import mean_heading_rad
+from snakewalk.controller.app.runs.prepared_run import pose_with
+from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.mechanics.pitch_fit import Lift
 from snakewalk.controller.mechanics.traction import quasi_static_gain
-from snakewalk.controller.runlog.record import Laid, PlanSummary
+from snakewalk.controller.motion.source import MotionSource, Pace
+from snakewalk.controller.runlog.record import InitialPose, PlanSummary
+from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.runtime.forecast import Forecast, forecast
-from snakewalk.controller.runtime.guide import Guide
 from snakewalk.controller.runtime.margins import margin_faults
 from snakewalk.controller.shape.library import Refuse, StateLibrary, build_library
 from snakewalk.controller.terrain.path import SplinePath
@@ -34,14 +32,13 @@ from snakewalk.controller.walk.serpenoid import Serpentine
 from snakewalk.controller.walk.shape_filters import refusals
 from snakewalk.controller.walk.time_law import Pulse
 from snakewalk.controller.walk.walker import Walker
-from snakewalk.drivers.bus.budget import wire_budget
 
 POINTS = 100
 
 
 @dataclass(frozen=True)
-class Prepared:
-    """Everything that is known before a servo moves."""
+class WalkRun:
+    """A ``PreparedRun`` of the snake walk, or of the serpenoid, along a path."""
 
     run: RunConfig
     robot: RobotConfig
@@ -105,16 +102,15 @@ class Prepared:
         given = self.run.start_heading_rad
         return self.path.heading_rad(0.05) if given is None else given
 
-    def laid(self) -> Laid:
-        """How a simulated robot is laid down.
+    def initial_pose(self) -> InitialPose:
+        """Return the pose in which a simulated robot is put on the ground.
 
-        Straight on a flat floor. On a slope a straight body, round below, rolls like a log, so
-        there it is laid in its first shape.
+        It is straight on a flat floor. On a slope a straight body, round below, rolls like a log,
+        so there it has its first shape.
         """
         if self.ground is None:
-            return Laid(self.start_heading_rad, np.zeros(self.robot.joint_count))
-        joints = self.pilot(level=True).first_goal_rad()
-        return Laid(self.start_heading_rad - mean_heading_rad(self.robot, joints), joints)
+            return InitialPose(self.start_heading_rad, np.zeros(self.robot.joint_count))
+        return pose_with(self.robot, self.start_heading_rad, self.pilot(level=True).goal_rad())
 
     def pilot(self, *, level: bool = False) -> Pilot:
         """Make a fresh pilot; the same configuration and seed give the same one.
@@ -132,6 +128,7 @@ class Prepared:
                 speed_limit_rad_s=robot.joint_speed_limit_rad_s,
                 acceleration_limit_rad_s2=robot.joint_acceleration_limit_rad_s2,
             ),
+            pace=Pace.limit(robot),
             plan=self.planner,
             lift=None if level or self.ground is None else self.lift,
             fall_back=source.fall_back if isinstance(source, Fallback) else lambda lost: None,
@@ -165,11 +162,11 @@ class Prepared:
             raise InputError(faults)
         return plan
 
-    def judged(self) -> PlanSummary:
-        """Forecast the run; what the log says of the plan.
+    def check_plan(self) -> PlanSummary:
+        """Forecast the run and summarise it for the log.
 
         Raises:
-            InputError: as ``forecast``.
+            InputError: the plan drives a joint beyond its limits, one line per joint and limit.
 
         """
         ahead = self.forecast()
@@ -181,8 +178,8 @@ class Prepared:
             states=None if self.run.motion == "serpenoid" else self.library.counts,
         )
 
-    def guide(self, say: Callable[[str, str], None]) -> Guide:
-        """Return a fresh pilot; it says nothing beside what the drive logs."""
+    def make_source(self, on_event: OnEvent) -> MotionSource:
+        """Return a fresh pilot; it has no events beside those that the drive logs."""
         return self.pilot()
 
     def _source(self) -> TrackSource:
@@ -203,26 +200,3 @@ class Prepared:
     def _usable(self, body_rad: Floats) -> bool:
         """Whether a body between two shapes can be made, does not touch itself, and pushes."""
         return not any(refuse(body_rad[None])[0] for refuse in self.refusals.values())
-
-
-def prepare(run: str, **changes: object) -> Prepared:
-    """Load a run with its robot and world; ``changes`` replace fields of the run where not None.
-
-    Raises:
-        ConfigError: every fault of a file at once.
-        InputError: what the configuration asks cannot be made, or does not fit the wire.
-
-    """
-    loaded = load_run(run)
-    beside = Path(run).parent if run.endswith(".toml") else None
-    wanted = {key: value for key, value in changes.items() if value is not None}
-    wanted.setdefault("track", track_beside(loaded.track, beside))
-    loaded = checked(RunConfig, loaded.model_dump() | wanted, "command line")
-    if loaded.motion == "gait":
-        raise InputError(f"run {loaded.name}: a gait is run by: snakewalk gait run NAME")
-    if loaded.motion == "repertoire":
-        raise InputError(f"run {loaded.name}: planned by: snakewalk plan --with repertoire")
-    robot = load_robot(loaded.robot, beside)
-    budget = wire_budget(robot.joint_count, robot.servo.baud, fast=True, slow_read_bytes=7)
-    budget.check(loaded.cycle_hz)
-    return Prepared(loaded, robot, load_world(loaded.world, beside))

@@ -15,15 +15,16 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import FlatGround, WorldConfig
 from snakewalk.controller.app.runs.backend import Backend
-from snakewalk.controller.app.runs.job import Job
+from snakewalk.controller.app.runs.prepared_run import PreparedRun
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.localization.dead_reckoning import DeadReckoning
-from snakewalk.controller.runtime.drive import PoseSource
+from snakewalk.controller.runtime.drive import OnEvent, PoseSource
 from snakewalk.drivers.types import BodyPose, JointState
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.runs.device_camera import DeviceCamera
     from snakewalk.controller.app.runs.rendered_camera import RenderedCamera
+    from snakewalk.controller.localization.camera_pose import CameraPose
 
 
 def pose_faults(run: RunConfig, robot: RobotConfig, world: WorldConfig, *, metal: bool) -> None:
@@ -68,19 +69,18 @@ def _missing(camera: CameraConfig) -> list[str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
-    """A believed pose held against the simulator's."""
+class PoseError:
+    """How far an estimated pose was off from the simulator's."""
 
     head_m: Floats
-    """(T,) distance of the head link's centres."""
+    """(T,) distance between the centres of the head link."""
     heading_rad: Floats
-    """(T,) difference of its headings, absolute."""
+    """(T,) absolute difference between its headings."""
     waypoints_reached: int
-    """By the body's true centre, in order."""
+    """Waypoints reached by the body's true centre, in order."""
 
-    @property
-    def numbers(self) -> dict[str, object]:
-        """For the log and the result."""
+    def facts(self) -> dict[str, float | int]:
+        """Numbers for the log and for a command's answer."""
         if not self.head_m.size:
             return {}
         return {
@@ -92,29 +92,37 @@ class Truth:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
-    """What a run asks for its pose."""
+@dataclass
+class PoseProvider:
+    """Measures the pose of the head for a run; knows afterwards how well."""
 
-    ask: PoseSource
-    found: dict[str, object]
-    """For the result, filled when the source is left: frames, and errors where truth is known."""
+    measure: PoseSource
+    camera: "CameraPose | None" = None
+    error: PoseError | None = None
+    """Set at the end of a run whose pose was estimated while the simulator knew the true one."""
+
+    def facts(self) -> dict[str, float | int]:
+        """Frames of a camera, and errors where the true pose is known."""
+        facts: dict[str, float | int] = {} if self.error is None else self.error.facts()
+        if self.camera is not None:
+            facts |= {"frames": self.camera.frames, "frames_used": self.camera.used}
+        return facts
 
 
 @dataclass
-class Watched:
-    """A pose source, and beside it what the simulator knows: for the record, never for the run."""
+class PoseComparison:
+    """An estimated pose beside the simulator's, which is recorded but never used by the run."""
 
-    prepared: Job
-    believed: PoseSource
+    prepared: PreparedRun
+    estimate: PoseSource
     true: Callable[[], BodyPose]
     _head_m: list[float] = field(default_factory=list)
     _heading_rad: list[float] = field(default_factory=list)
     _reached: int = 0
 
     def __call__(self, state: JointState) -> BodyPose:
-        """Return the pose believed."""
-        pose, true = self.believed(state), self.true()
+        """Return the estimated pose."""
+        pose, true = self.estimate(state), self.true()
         self._head_m.append(float(np.hypot(*(pose.head_in_world_m - true.head_in_world_m)[:2])))
         turn = pose.heading_rad - true.heading_rad
         self._heading_rad.append(float(abs(np.arctan2(np.sin(turn), np.cos(turn)))))
@@ -125,17 +133,16 @@ class Watched:
             self._reached += int(away <= run.waypoint_radius_m)
         return pose
 
-    @property
-    def truth(self) -> Truth:
-        """How good the poses were."""
-        return Truth(np.array(self._head_m), np.array(self._heading_rad), self._reached)
+    def error(self) -> PoseError:
+        """Return the errors so far."""
+        return PoseError(np.array(self._head_m), np.array(self._heading_rad), self._reached)
 
 
 @contextmanager
-def pose_source(
-    prepared: Job, backend: Backend, note: Callable[[str, str], None]
-) -> Iterator[Source]:
-    """Make the source that the run asks for; ``note`` is told (kind, text) at its end.
+def pose_provider(
+    prepared: PreparedRun, backend: Backend, on_event: OnEvent
+) -> Iterator[PoseProvider]:
+    """Make the provider that the run asks for; at its end ``on_event`` takes how good it was.
 
     Raises:
         InputError: the camera is not there, does not show the robot, or cannot work here.
@@ -145,31 +152,30 @@ def pose_source(
     true = backend.pose
     if true is not None and run.pose in (None, "simulator"):
         measured = true
-        yield Source(lambda state: measured(), {})
+        yield PoseProvider(lambda state: measured())
         return
     reckoning = DeadReckoning(
         robot, prepared.world.friction, run.start_m, prepared.start_heading_rad
     )
-    found: dict[str, object] = {}
+    provider = PoseProvider(reckoning)
     with ExitStack() as stack:
-        believed: PoseSource = reckoning
         if run.pose == "camera":
             from snakewalk.controller.localization.camera_pose import CameraPose  # noqa: PLC0415  OpenCV is an extra
 
-            camera = stack.enter_context(closing(_camera(prepared, backend)))
-            believed = seen = CameraPose(
-                robot, camera, reckoning, lambda text: note("camera", text)
+            device = stack.enter_context(closing(_camera(prepared, backend)))
+            provider.measure = provider.camera = CameraPose(
+                robot, device, reckoning, lambda text: on_event("camera", text)
             )
-            stack.callback(lambda: found.update(frames=seen.frames, frames_used=seen.used))
         if true is not None:
-            believed = watched = Watched(prepared, believed, true)
-            stack.callback(lambda: found.update(watched.truth.numbers))
-        yield Source(believed, found)
-    if found:
-        note("pose", ", ".join(f"{key} {value}" for key, value in found.items()))
+            provider.measure = comparison = PoseComparison(prepared, provider.measure, true)
+            stack.callback(lambda: setattr(provider, "error", comparison.error()))
+        yield provider
+    facts = provider.facts()
+    if facts:
+        on_event("pose", ", ".join(f"{key} {value}" for key, value in facts.items()))
 
 
-def _camera(prepared: Job, backend: Backend) -> "RenderedCamera | DeviceCamera":
+def _camera(prepared: PreparedRun, backend: Backend) -> "RenderedCamera | DeviceCamera":
     run, robot, clock = prepared.run, prepared.robot, backend.clock
     if backend.qpos is None:
         from snakewalk.controller.app.runs.device_camera import DeviceCamera  # noqa: PLC0415  OpenCV is an extra

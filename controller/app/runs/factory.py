@@ -1,0 +1,199 @@
+"""The one factory of runs: from a configuration, or a command's options, to a ``PreparedRun``."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.gait import GaitSetConfig
+from snakewalk.config.loader import (
+    checked,
+    load_gait,
+    load_robot,
+    load_run,
+    load_world,
+    shipped,
+)
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.app.runs.gait_run import GaitRun, MakeOperator
+from snakewalk.controller.app.runs.playback_run import PlaybackRun
+from snakewalk.controller.app.runs.prepared_run import PreparedRun
+from snakewalk.controller.app.runs.walk_run import WalkRun
+from snakewalk.controller.capture.readers.load import track_beside
+from snakewalk.controller.gaits.gait import Gait
+from snakewalk.controller.gaits.registry import GAITS, make_gait
+from snakewalk.controller.motion.recorded import Recorded
+from snakewalk.drivers.bus.budget import wire_budget
+
+GAIT_PITCH_CURRENT_A = 1.5
+"""Goal current of the pitch joints in a gait that lifts: soft ones would not carry the links."""
+
+
+def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
+    """Prepare a run from its configuration, for example from that in a log.
+
+    Raises:
+        InputError: the configuration alone does not hold the run, or has no waypoints to walk to.
+
+    """
+    if run.motion == "gait":
+        return GaitRun(run, robot, world)
+    if run.motion == "playback":
+        return PlaybackRun(run, robot, world)
+    if run.motion == "repertoire":
+        raise InputError(f"run {run.name}: made again by: snakewalk repertoire run PLAN")
+    if not run.waypoints_m:
+        raise InputError(f"run {run.name}: a {run.motion} needs waypoints")
+    return WalkRun(run, robot, world)
+
+
+def prepare_walk(name: str, **changes: object) -> WalkRun:
+    """Load a run with its robot and world; ``changes`` replace fields of the run where not None.
+
+    Raises:
+        ConfigError: every fault of a file at once.
+        InputError: what the configuration asks cannot be made, or does not fit the wire.
+
+    """
+    run = load_run(name)
+    beside = Path(name).parent if name.endswith(".toml") else None
+    options = {key: value for key, value in changes.items() if value is not None}
+    options.setdefault("track", track_beside(run.track, beside))
+    run = checked(RunConfig, run.model_dump() | options, "command line")
+    if run.motion == "gait":
+        raise InputError(f"run {run.name}: a gait is run by: snakewalk gait run NAME")
+    if run.motion == "repertoire":
+        raise InputError(f"run {run.name}: planned by: snakewalk plan --with repertoire")
+    robot = load_robot(run.robot, beside)
+    _check_wire(run, robot)
+    return WalkRun(run, robot, load_world(run.world, beside))
+
+
+def prepare_gait(
+    name: str,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    parameters: dict[str, Any] | None = None,
+    seconds: float = 20.0,
+    seed: int = 0,
+    look_heading_rad: float | None = None,
+    look_at_m: tuple[float, float] | None = None,
+    make_operator: MakeOperator | None = None,
+    then: Sequence[tuple[float, str, dict[str, Any]]] = (),
+    by: Literal["blend", "cpg"] = "blend",
+) -> GaitRun:
+    """Prepare a gait, or a shipped or own set of parameters (``config/gaits``), by name.
+
+    ``then`` holds (time, name, parameters) of the gaits that follow, ``by`` how the gait changes.
+
+    Raises:
+        InputError: no such gait, parameters out of range, a robot that lacks joints, changes out of
+            order or together with an operator.
+
+    """
+    if make_operator is not None and (then or by == "cpg"):
+        raise InputError("--live changes gaits by keys and joins: leave out --then and --by cpg")
+    gait, known = _gait_by_name(name, parameters)
+    if known is not None:
+        robot, world = robot or known.robot, world or known.world
+    changes = [(at_s, _gait_by_name(other, values)[0]) for at_s, other, values in then]
+    gaits = [gait, *(other for _, other in changes)]
+    pitch = any(each.needs.pitch for each in gaits)
+    body = load_robot(robot or ("alternating16" if pitch else "yaw16"))
+    for each in gaits:
+        each.check(body)
+    run = checked(
+        RunConfig,
+        {
+            "name": name.removesuffix(".toml").rpartition("/")[2],
+            "robot": body.name,
+            "world": world or gait.world,
+            "motion": "gait",
+            "seed": seed,
+            "time_limit_s": seconds + (60.0 if by == "cpg" else 30.0),
+            "gait": {
+                "name": gait.name,
+                "parameters": gait.params.model_dump(),
+                "duration_s": seconds,
+                "look_heading_rad": look_heading_rad,
+                "look_at_m": look_at_m,
+                "then": [
+                    {"at_s": at_s, "name": g.name, "parameters": g.params.model_dump()}
+                    for at_s, g in changes
+                ],
+                "by": by,
+            },
+        },
+        "command line",
+    )
+    _check_wire(run, body)
+    return GaitRun(run, _with_gait_gains(body, gaits), load_world(run.world), make_operator)
+
+
+def prepare_playback(
+    track: str, *, robot: str | None = None, world: str | None = None, speed: float | None = None
+) -> PlaybackRun:
+    """Prepare to play a recording.
+
+    Raises:
+        InputError: no such recording, joints that do not bend so far, too fast for them.
+
+    """
+    body = load_robot(robot or "yaw16")
+    fields = {
+        "name": Path(track).stem,
+        "robot": body.name,
+        "world": world or "flat",
+        "track": track,
+        "motion": "playback",
+        "playback": {"speed": speed},
+    }
+    run = checked(RunConfig, fields, "command line")
+    _check_wire(run, body)
+    prepared = PlaybackRun(run, body, load_world(run.world))
+    Recorded(body, *prepared.joint_track).needs.check(body, "this recording")
+    limit = {"time_limit_s": prepared.duration_s + 30.0}
+    return replace(prepared, run=run.model_copy(update=limit))
+
+
+def _check_wire(run: RunConfig, robot: RobotConfig) -> None:
+    """Refuse a cycle that takes longer on the wire than its period.
+
+    Raises:
+        InputError: with the highest rate that fits.
+
+    """
+    budget = wire_budget(robot.joint_count, robot.servo.baud, fast=True, slow_read_bytes=7)
+    budget.check(run.cycle_hz)
+
+
+def _gait_by_name(
+    name: str, parameters: dict[str, Any] | None
+) -> tuple[Gait, GaitSetConfig | None]:
+    """Make a gait by its name or by that of a set of parameters, and return the set."""
+    if name in GAITS:
+        return make_gait(name, parameters), None
+    if name not in shipped("gaits") and not name.endswith(".toml"):
+        raise InputError(
+            f"{name}: no such gait; there are {', '.join(GAITS)}; "
+            f"sets of parameters: {', '.join(shipped('gaits'))}; your own ends in .toml"
+        )
+    known = load_gait(name)
+    return make_gait(known.gait, dict(known.parameters) | (parameters or {})), known
+
+
+def _with_gait_gains(robot: RobotConfig, gaits: Sequence[Gait]) -> RobotConfig:
+    """Set the servos up for gaits: pitch joints that carry links, all softer where a gait asks."""
+    servo = robot.servo
+    changes: dict[str, float] = {}
+    if any(gait.needs.pitch for gait in gaits):
+        changes["pitch_p_gain"] = max(servo.pitch_p_gain, servo.position_p_gain)
+        changes["pitch_current_limit_a"] = max(servo.pitch_current_limit_a, GAIT_PITCH_CURRENT_A)
+    soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
+    if soft:
+        changes["position_p_gain"] = changes["pitch_p_gain"] = min(soft)
+    return robot.model_copy(update={"servo": servo.model_copy(update=changes)})

@@ -1,0 +1,77 @@
+"""What is known of a run before a servo moves: the interface of every kind of motion."""
+
+from typing import Protocol
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.kinematics.links import mean_heading_rad
+from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.runlog.record import InitialPose, PlanSummary
+from snakewalk.controller.runtime.drive import OnEvent
+
+
+class PreparedRun(Protocol):
+    """A run that ``execute`` can carry out."""
+
+    @property
+    def run(self) -> RunConfig:
+        """Configuration of the run."""
+        ...
+
+    @property
+    def robot(self) -> RobotConfig:
+        """Robot, with its servos set up as this run needs them."""
+        ...
+
+    @property
+    def world(self) -> WorldConfig:
+        """Ground and friction."""
+        ...
+
+    @property
+    def ground(self) -> HeightField | None:
+        """The world's height field; None on a flat floor."""
+        ...
+
+    @property
+    def gain(self) -> float:
+        """Predicted speed over pulse speed; NaN where there is no prediction."""
+        ...
+
+    @property
+    def start_heading_rad(self) -> float:
+        """Mean heading of the body at the start."""
+        ...
+
+    def initial_pose(self) -> InitialPose:
+        """Return the pose in which a simulated robot is put on the ground."""
+        ...
+
+    def check_plan(self) -> PlanSummary:
+        """Check the plan on paper and summarise it for the log.
+
+        Raises:
+            InputError: the plan breaks a limit of the robot.
+
+        """
+        ...
+
+    def make_source(self, on_event: OnEvent) -> MotionSource:
+        """Return a fresh motion; it tells ``on_event`` what it decides by itself."""
+        ...
+
+
+def pose_with(robot: RobotConfig, heading_rad: float, joint_rad: Floats) -> InitialPose:
+    """Return the pose with joints at angles (J,) whose mean heading is ``heading_rad``."""
+    return InitialPose(heading_rad - mean_heading_rad(robot, joint_rad), joint_rad)
+
+
+def plan_without_path(run: RunConfig) -> PlanSummary:
+    """Summarise a plan that stays where it starts."""
+    start = np.array([run.start_m, run.start_m], dtype=float)
+    return PlanSummary(start, np.zeros((0, 2)), run.waypoint_radius_m)
