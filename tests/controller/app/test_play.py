@@ -19,7 +19,7 @@ def test_auto_is_as_fast_as_the_joints_can_and_faster_is_refused() -> None:
     """The default just keeps the limits; twice that is one line."""
     prepared = prepare_playback("worm-like")
     assert 0.0 < prepared.speed <= 1.0
-    prepared.judged()
+    prepared.check_plan()
     with pytest.raises(InputError, match="--speed"):
         prepare_playback("worm-like", speed=min(2.0 * prepared.speed, 10.0) + 1.0)
 
