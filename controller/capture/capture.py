@@ -15,7 +15,7 @@ from snakewalk.controller.capture.image.medial_axis import Skeleton
 from snakewalk.controller.capture.outlier_frames import mark_outliers
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
 from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Crop, crop_body
-from snakewalk.controller.capture.small_body.fit import fit_film
+from snakewalk.controller.capture.small_body.film_fit import fit_film
 from snakewalk.controller.capture.track import track_from_points
 from snakewalk.controller.capture.wave import measure_wave
 

@@ -51,7 +51,7 @@ def match_footage(
         side=None if beside is None else beside.frames,
         length_m=length_m,
         name=top.name,
-        tick=count,
+        on_progress=count,
     )
     facts = facts_of(matched.postures) | {
         "length_px": round(matched.model.length_px, 1),

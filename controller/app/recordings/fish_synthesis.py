@@ -10,7 +10,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.capture.fish.joining import PieceGraph, piece_graph
+from snakewalk.controller.capture.fish.piece_graph import PieceGraph, piece_graph
 from snakewalk.controller.capture.fish.postures import Postures
 from snakewalk.controller.capture.fish.segments import (
     MotionSegment,
@@ -22,10 +22,12 @@ from snakewalk.controller.capture.fish.synthesis import (
     PieceSequence,
     at_random,
     compose,
+    joint_motion,
+    joint_pieces,
     junctions,
+    save_motion,
     through,
 )
-from snakewalk.controller.capture.fish.track_file import joint_motion, joint_pieces, save_motion
 from snakewalk.controller.kinematics.retarget import Retarget
 
 

@@ -1,28 +1,34 @@
-"""A whole film, one camera or two, to postures."""
+"""A whole film, one camera or two, to postures: calibrate, then track from frame to frame.
 
-from collections.abc import Callable, Iterator
+The last posture is the start of the next search; a fish that is lost is searched for anew.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.fish.calibrate import calibrate
-from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, SilhouetteFrame
+from snakewalk.controller.capture.fish.calibration import calibrate
+from snakewalk.controller.capture.fish.initial_posture import midline_starts, rough_midline
+from snakewalk.controller.capture.fish.matching import LEAST_VALUE, SilhouetteFrame
 from snakewalk.controller.capture.fish.model import FishModel
 from snakewalk.controller.capture.fish.postures import Postures
 from snakewalk.controller.capture.fish.side_view import SideCamera, SideView, align
-from snakewalk.controller.capture.fish.tracking import track_film
+from snakewalk.controller.capture.fish.top_view import Match, search
 
 Film = Callable[[], Iterator[SilhouetteFrame]]
 """Opens a film from its start."""
 SAMPLE = 9
 """Frames from which the model is calibrated."""
+_HEIGHT_FACTORS = np.array([0.55, 0.75, 1.0, 1.33, 1.8])
+_TIE = 0.05  # V by which one orientation must be better than the reversed one
 
 
 @dataclass(frozen=True, slots=True)
 class FilmMatch:
-    """What matching a film gave."""
+    """The postures of a film, and the model that was matched."""
 
     postures: Postures
     model: FishModel
@@ -36,6 +42,16 @@ class FilmMatch:
     """Frames without a posture, by reason."""
 
 
+@dataclass(frozen=True, slots=True)
+class TrackedFrame:
+    """The match of one frame, or why there is none."""
+
+    match: Match | None
+    """None where the fish was not found; the frame is left out, not guessed."""
+    reason: str = ""
+    """Why, for a frame without a match."""
+
+
 def match_film(
     top: Film,
     frames: int,
@@ -44,9 +60,8 @@ def match_film(
     rate_hz: float,
     side: Film | None = None,
     length_m: float | None = None,
-    weight: float = EDGE_WEIGHT,
     name: str = "fish",
-    tick: Callable[[], None] = lambda: None,
+    on_progress: Callable[[], None] = lambda: None,
 ) -> FilmMatch:
     """Calibrate the model on a few frames and match all of them.
 
@@ -57,9 +72,8 @@ def match_film(
         rate_hz: frames a second.
         side: the view from the side, frame by frame at the same moments.
         length_m: length of the fish; without it the unit is the body length.
-        weight: W of Eq. 3.
         name: of the recording.
-        tick: called after every frame.
+        on_progress: called after every frame.
 
     Raises:
         InputError: fewer than 2 frames, no body in the silhouettes, or views that do not fit.
@@ -67,39 +81,41 @@ def match_film(
     """
     if frames < 2:
         raise InputError(f"{name}: {frames} frames; a motion has at least 2")
-    at = set(np.linspace(0, frames - 1, min(frames, SAMPLE)).astype(int).tolist())
-    sample = [seen for k, seen in enumerate(top()) if k in at]
-    model = calibrate(model, sample, weight, name)
-    way, camera, looking = _way(sample), None, None
+    numbers = set(np.linspace(0, frames - 1, min(frames, SAMPLE)).astype(int).tolist())
+    sample = [frame for k, frame in enumerate(top()) if k in numbers]
+    model = calibrate(model, sample, name)
+    camera, side_view = None, None
     if side is not None:
-        beside = [seen for k, seen in enumerate(side()) if k in at]
-        if len(beside) != len(sample):
+        side_sample = [frame for k, frame in enumerate(side()) if k in numbers]
+        if len(side_sample) != len(sample):
             raise InputError(f"{name}: the two films differ in length; both must show every moment")
-        camera = align(sample, beside, name)
-        looking = SideView(_tall(model, camera, sample, beside, weight), camera, weight)
+        camera = align(sample, side_sample, name)
+        side_view = SideView(_with_height(model, camera, sample, side_sample), camera)
     rows, sides, values = [], [], []
     lost: dict[str, int] = {}
-    flank = side() if side is not None else None
-    nothing, no_side = np.full(3 + model.joints, np.nan), np.full(2, np.nan)
-    for step in track_film(top(), model, way=way, weight=weight):
-        rows.append(nothing if step.match is None else step.match.parameters)
-        values.append(np.nan if step.match is None else step.match.value)
-        if step.match is None:
-            lost[step.reason] = lost.get(step.reason, 0) + 1
-        if looking is not None and flank is not None:
-            beside_now = next(flank, None)
-            seen_aside = (
-                looking.find(beside_now, rows[-1])
-                if beside_now is not None and step.match is not None
-                else None
-            )
-            sides.append(no_side if seen_aside is None else seen_aside[0])
-        tick()
+    side_frames = side() if side is not None else None
+    no_posture, no_side = np.full(3 + model.joints, np.nan), np.full(2, np.nan)
+    for tracked in track_film(top(), model, travel=_travel(sample)):
+        match = tracked.match
+        rows.append(no_posture if match is None else match.parameters)
+        values.append(np.nan if match is None else match.value)
+        if match is None:
+            lost[tracked.reason] = lost.get(tracked.reason, 0) + 1
+        if side_view is not None and side_frames is not None:
+            frame = next(side_frames, None)
+            found = None
+            if frame is not None and match is not None:
+                found = side_view.search(frame, match.parameters)
+            sides.append(no_side if found is None else found[0])
+        on_progress()
     parameters = np.array(rows)
     if int(np.isfinite(parameters[:, 2]).sum()) < 2:
         raise InputError(f"{name}: the model fits fewer than 2 of {len(rows)} frames")
     unit = (1.0 if length_m is None else length_m) / model.length_px
-    aside = np.array(sides) if sides else None
+    side_found = np.array(sides) if sides else None
+    height = None
+    if side_found is not None and camera is not None:
+        height = side_found[:, 0] * unit / camera.scale
     postures = Postures(
         base=parameters[:, :2] * unit,
         head_rad=_unwrapped(parameters[:, 2]),
@@ -107,53 +123,118 @@ def match_film(
         joints_at=model.joints_at,
         rate_hz=rate_hz,
         length_m=length_m,
-        height=None if aside is None or camera is None else aside[:, 0] * unit / camera.scale,
-        pitch_rad=None if aside is None else aside[:, 1],
+        height=height,
+        pitch_rad=None if side_found is None else side_found[:, 1],
         value=np.array(values),
         name=name,
     )
-    return FilmMatch(postures, model, parameters, aside, camera, lost)
+    return FilmMatch(postures, model, parameters, side_found, camera, lost)
 
 
-def _way(sample: list[SilhouetteFrame]) -> Floats | None:
-    """Where the silhouette's centre goes over the sample, x right and y up."""
+def track_film(
+    frames: Iterable[SilhouetteFrame], model: FishModel, *, travel: Floats | None = None
+) -> Iterator[TrackedFrame]:
+    """Match every frame.
+
+    A search starts from the last frame's posture moved on by the last step ([TH]: around the
+    prolongation of the head), from the last frame's posture itself, and from the silhouette's own
+    skeleton with its head at the same end; the last one finds a fish that beats its tail fast.
+    Where V falls below ``LEAST_VALUE`` the head may be at either end again.
+
+    Args:
+        frames: grey pictures and silhouettes.
+        model: the calibrated fish.
+        travel: (2,) displacement of the fish in the first frames, x right and y up; decides which
+            end is the head where the build does not.
+
+    """
+    last: Floats | None = None
+    moved = np.zeros(3)
+    for frame in frames:
+        line = None if frame.reason else rough_midline(frame.mask)
+        if line is None:
+            last = None
+            yield TrackedFrame(None, frame.reason or "no silhouette")
+            continue
+        found: Match | None = None
+        starts = midline_starts(model, line)
+        if last is not None:
+            ahead = last.copy()
+            ahead[:3] += moved
+            aligned = [at for at in starts if np.cos(at[2] - last[2]) > 0.0]
+            found = search(frame, model, [ahead, last, *aligned], near=ahead[:2], from_level=1)
+        if found is None or found.value < LEAST_VALUE:
+            found = _search_anew(frame, model, starts, travel if last is None else None)
+        if found is None or found.value < LEAST_VALUE:
+            last = None
+            yield TrackedFrame(None, "no posture fits")
+            continue
+        here = found.parameters.copy()
+        if last is not None:
+            here[2] = last[2] + np.angle(np.exp(1j * (here[2] - last[2])))
+            moved = (here - last)[:3]
+        else:
+            moved = np.zeros(3)
+        last = here
+        yield TrackedFrame(Match(here, found.value))
+
+
+def _search_anew(
+    frame: SilhouetteFrame, model: FishModel, starts: list[Floats], travel: Floats | None
+) -> Match | None:
+    """Search with the head at either end; V decides, and the direction of travel only in a tie."""
+    matches = [match for start in starts if (match := search(frame, model, [start])) is not None]
+    if not matches:
+        return None
+    matches.sort(key=lambda match: -match.value)
+    if len(matches) > 1 and travel is not None and matches[0].value - matches[1].value < _TIE:
+        matches.sort(
+            key=lambda match: (
+                -float(
+                    np.cos(match.parameters[2]) * travel[0]
+                    + np.sin(match.parameters[2]) * travel[1]
+                )
+            )
+        )
+    return matches[0]
+
+
+def _travel(sample: list[SilhouetteFrame]) -> Floats | None:
+    """Displacement (2,) of the silhouette's centre between two frames, x right and y up."""
     centres = [
         np.array([columns.mean(), -rows.mean()])
-        for rows, columns in (np.nonzero(seen.mask) for seen in sample)
+        for rows, columns in (np.nonzero(frame.mask) for frame in sample)
         if len(rows)
     ]
     return centres[1] - centres[0] if len(centres) > 1 else None
 
 
-def _tall(
+def _with_height(
     model: FishModel,
     camera: SideCamera,
     top: list[SilhouetteFrame],
     side: list[SilhouetteFrame],
-    weight: float,
 ) -> FishModel:
     """Scale the model's height to the side view ([TH] 3.2.3)."""
-    steps = [
-        (step.match.parameters, beside)
-        for seen, beside in zip(top, side, strict=True)
-        for step in track_film([seen], model, weight=weight)
-        if step.match is not None
-    ]
-    factors = np.array([0.55, 0.75, 1.0, 1.33, 1.8])
-    steps = steps[::3]
+    pairs = [
+        (tracked.match.parameters, beside)
+        for above, beside in zip(top, side, strict=True)
+        for tracked in track_film([above], model)
+        if tracked.match is not None
+    ][::3]
+    first = [SideView(model, camera).search(frame, at) for at, frame in pairs]
 
-    first = [SideView(model, camera, weight).find(seen, at) for at, seen in steps]
-
-    def worth(factor: float) -> float:
-        view = SideView(model.sized(model.length_px, height=factor), camera, weight)
+    def median_value(factor: float) -> float:
+        view = SideView(model.sized(model.length_px, height=factor), camera)
         values = []
-        for (at, seen), begun in zip(steps, first, strict=True):
-            view.last = None if begun is None else begun[0]
-            found = view.find(seen, at)
+        for (at, frame), start in zip(pairs, first, strict=True):
+            view.last = None if start is None else start[0]
+            found = view.search(frame, at)
             values.append(-np.inf if found is None else found[1])
         return float(np.median(values or [-np.inf]))
 
-    scores = np.array([worth(float(factor)) for factor in factors])
+    factors = _HEIGHT_FACTORS
+    scores = np.array([median_value(float(factor)) for factor in factors])
     k = int(scores.argmax())
     if 0 < k < len(factors) - 1 and np.isfinite(scores[k - 1 : k + 2]).all():
         curve = np.polyfit(np.log(factors[k - 1 : k + 2]), scores[k - 1 : k + 2], 2)

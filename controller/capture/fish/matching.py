@@ -11,9 +11,11 @@ from snakewalk.controller.capture.fish.raster import Grey, Window, draw_area, dr
 
 EDGE_WEIGHT = 0.3
 """W of Eq. 3."""
+LEAST_VALUE = 0.3
+"""A posture of a smaller V explains nothing: the fish is lost."""
 
 
-def agreement(drawn: Grey, seen: Grey) -> float:
+def agreement(drawn: Grey, observed: Grey) -> float:
     """Eq. 1 and 2: ``(f(P and S) - f(P xor S)) / f(P)``; 1 for the same area, below it otherwise.
 
     With shaded pixels the smaller of two values is their AND and the difference their XOR; so
@@ -22,8 +24,8 @@ def agreement(drawn: Grey, seen: Grey) -> float:
     area = float(cv2.sumElems(drawn)[0])
     if area <= 0.0:
         return float("-inf")
-    both = float(cv2.sumElems(cv2.min(drawn, seen))[0])
-    return (3.0 * both - area - float(cv2.sumElems(seen)[0])) / area
+    both = float(cv2.sumElems(cv2.min(drawn, observed))[0])
+    return (3.0 * both - area - float(cv2.sumElems(observed)[0])) / area
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,20 +43,20 @@ class SilhouetteFrame:
 class Target:
     """One frame at one size, against which postures are scored."""
 
-    def __init__(self, seen: SilhouetteFrame, window: Window, blur_px: int) -> None:
+    def __init__(self, frame: SilhouetteFrame, window: Window, blur_px: int) -> None:
         """Reduce the frame.
 
         Args:
-            seen: the frame.
+            frame: grey picture and silhouette.
             window: which part, how small.
             blur_px: width of edges on the canvas; wide ones are found from further away.
 
         """
         self.window = window
         self._thickness = blur_px
-        mask = seen.mask.astype(np.uint8) * 255
+        mask = frame.mask.astype(np.uint8) * 255
         self._area = window.cut(mask)
-        self._edge = _edges(window.cut(seen.grey), self._area, blur_px)
+        self._edge = _edges(window.cut(frame.grey), self._area, blur_px)
         self._canvas = np.zeros(window.shape, dtype=np.uint8)
         self.soft_area = self._soften(self._area)
 
@@ -84,7 +86,7 @@ class Target:
         blurred = cv2.blur(area, (width, width))
         return np.asarray(blurred, dtype=np.float32) * np.float32(1.0 / 255.0)
 
-    def value_of_pieces(self, pieces_px: list[Floats], weight: float = EDGE_WEIGHT) -> float:
+    def value_of_pieces(self, pieces_px: list[Floats]) -> float:
         """V of convex pieces that overlap: the rim of what they cover is the outline."""
         draw_pieces(self._canvas, self.window, pieces_px)
         area = agreement(self._canvas, self._area)
@@ -92,7 +94,7 @@ class Target:
             return area
         near = np.ones((self._thickness, self._thickness), dtype=np.uint8)
         rim = cv2.subtract(cv2.dilate(self._canvas, near), cv2.erode(self._canvas, near))
-        return area + weight * agreement(np.asarray(rim, dtype=np.uint8), self._edge)
+        return area + EDGE_WEIGHT * agreement(np.asarray(rim, dtype=np.uint8), self._edge)
 
 
 def _edges(grey: Grey, area: Grey, width_px: int) -> Grey | None:

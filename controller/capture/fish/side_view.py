@@ -6,11 +6,10 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, SilhouetteFrame, Target
+from snakewalk.controller.capture.fish.matching import LEAST_VALUE, SilhouetteFrame, Target
 from snakewalk.controller.capture.fish.model import FishModel
 from snakewalk.controller.capture.fish.pattern_search import pattern_search
 from snakewalk.controller.capture.fish.raster import Window, side_outline
-from snakewalk.controller.capture.fish.tracking import LOST
 
 _LIMIT_RAD = 1.2
 
@@ -37,7 +36,7 @@ def align(
     """
     here, there = [], []
     for above, beside in zip(top, side, strict=True):
-        wide = [np.flatnonzero(seen.mask.any(axis=0)) for seen in (above, beside)]
+        wide = [np.flatnonzero(frame.mask.any(axis=0)) for frame in (above, beside)]
         if all(len(columns) for columns in wide):
             here += [wide[0][0], wide[0][-1]]
             there += [wide[1][0], wide[1][-1]]
@@ -54,26 +53,26 @@ def align(
 
 
 class SideView:
-    """Searches height and pitch frame by frame, the last ones as start."""
+    """Searches height and pitch frame by frame, starting from the last ones."""
 
-    def __init__(self, model: FishModel, camera: SideCamera, weight: float = EDGE_WEIGHT) -> None:
-        self._camera, self._weight = camera, weight
+    def __init__(self, model: FishModel, camera: SideCamera) -> None:
+        self._camera = camera
         self._model = model.sized(model.length_px * camera.scale)
         self.last: Floats | None = None
-        """Height and pitch (2,) from which the next search starts; None looks everywhere."""
+        """Height and pitch (2,) from which the next search starts; None searches everywhere."""
 
-    def find(self, seen: SilhouetteFrame, parameters: Floats) -> tuple[Floats, float] | None:
+    def search(self, frame: SilhouetteFrame, parameters: Floats) -> tuple[Floats, float] | None:
         """Height of the base (px of the side view, up) and pitch (rad), and their V.
 
         Args:
-            seen: the frame of the side camera.
+            frame: of the side camera.
             parameters: (3 + J,) the posture from above.
 
         Returns:
             None where the side view shows nothing.
 
         """
-        rows, columns = (np.flatnonzero(seen.mask.any(axis=k)) for k in (1, 0))
+        rows, columns = (np.flatnonzero(frame.mask.any(axis=k)) for k in (1, 0))
         if len(rows) == 0:
             self.last = None
             return None
@@ -81,15 +80,15 @@ class SideView:
         scale = min(1.0, 180.0 / model.length_px)
         edge = max(8, round(0.15 * model.length_px))
         left, top = max(int(columns[0]) - edge, 0), max(int(rows[0]) - edge, 0)
-        right = min(int(columns[-1]) + edge, seen.mask.shape[1])
-        bottom = min(int(rows[-1]) + edge, seen.mask.shape[0])
+        right = min(int(columns[-1]) + edge, frame.mask.shape[1])
+        bottom = min(int(rows[-1]) + edge, frame.mask.shape[0])
         window = Window(left, top, right - left, bottom - top, scale)
-        target = Target(seen, window, 3)
+        target = Target(frame, window, 3)
 
         def value(at: Floats) -> float:
             if abs(at[1]) > _LIMIT_RAD:
                 return float("-inf")
-            return target.value_of_pieces(self.pieces(parameters, at), self._weight)
+            return target.value_of_pieces(self.pieces(parameters, at))
 
         middle = -0.5 * float(rows[0] + rows[-1])
         fresh = [np.array([middle, pitch]) for pitch in (0.0, 0.3, -0.3)]
@@ -102,7 +101,7 @@ class SideView:
             return max(ends, key=lambda end: end[1])
 
         found = best(fresh if self.last is None else [self.last])
-        if found[1] < LOST:
+        if found[1] < LEAST_VALUE:
             found = best(fresh)
         self.last = found[0]
         return found

@@ -1,14 +1,17 @@
 """New motion from segments: at random ([TH] 4.2.2), or through control points ([TH] 5)."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.fish.joining import PieceGraph, placed
-from snakewalk.controller.capture.fish.junction import join
-from snakewalk.controller.capture.fish.postures import Postures
+from snakewalk.controller.capture.fish.piece_graph import PieceGraph, placed
+from snakewalk.controller.capture.fish.postures import Postures, tangents
+from snakewalk.controller.kinematics.retarget import Retarget
+from snakewalk.controller.kinematics.smoothstep import quintic
 
 BLEND_S = 0.25
 _BEAM = 40
@@ -193,3 +196,95 @@ def _cost(node: _Node, points: Floats) -> tuple[int, float]:
     far = float(np.hypot(*away))
     off = float(np.abs(np.angle(np.exp(1j * (np.arctan2(away[1], away[0]) - node.head_rad)))))
     return -len(node.reached_at), far + 0.2 * far * off + 1e-3 * node.samples
+
+
+def fading(step: Floats, slope: Floats, duration: float, time: Floats) -> Floats:
+    """Offset (n, K) that starts as ``step`` (K,) with ``slope`` (K,) and is gone at ``duration``.
+
+    The quintic with ``d(0) = step, d'(0) = slope, d''(0) = 0`` and ``d = d' = d'' = 0`` at the end.
+
+    Args:
+        step: at time 0.
+        slope: its rate at time 0, per unit of ``time``.
+        duration: > 0; beyond it the offset is 0.
+        time: (n,) >= 0.
+
+    """
+    u = np.clip(np.asarray(time, dtype=float) / duration, 0.0, 1.0)
+    value = 1.0 - quintic(u)
+    rate = u * (1.0 + u * u * (-6.0 + u * (8.0 - 3.0 * u)))
+    return np.outer(value, step) + np.outer(rate, slope) * duration
+
+
+def join(pieces: list[Floats], samples: int) -> Floats:
+    """Join pieces (T_k, K) whose ends fall on one moment: the last sample of one is left out.
+
+    Args:
+        pieces: joint angles over time, two or more samples each.
+        samples: how long the difference takes to fade; what is left of it at the end of a shorter
+            piece is part of the difference there.
+
+    Returns:
+        (sum of T_k - 1, plus 1; K). The first piece is unchanged; so is everything if the pieces
+        meet in value and slope.
+
+    Raises:
+        ValueError: no piece, a piece of one sample, or ``samples`` below 1.
+
+    """
+    if not pieces or any(len(piece) < 2 for piece in pieces) or samples < 1:
+        raise ValueError("pieces of two or more samples, and a fade of one or more")
+    whole = np.concatenate([pieces[0]] + [piece[1:] for piece in pieces[1:]])
+    at = len(pieces[0]) - 1
+    for piece in pieces[1:]:
+        # what stands here holds what is left of the fade before, which this one takes over
+        step = whole[at] - piece[0]
+        slope = whole[at] - whole[at - 1] - (piece[1] - piece[0])
+        count = len(piece) - 1
+        whole[at + 1 : at + 1 + count] += fading(
+            step, slope, float(samples), np.arange(1.0, count + 1.0)
+        )
+        at += count
+    return whole
+
+
+def joint_pieces(pieces: PieceGraph, sequence: PieceSequence, retarget: Retarget) -> list[Floats]:
+    """Each piece as joint angles (n, joints of the robot), not yet joined."""
+    return [
+        retarget.joints_rad(tangents(part.head_rad, part.angles_rad, pieces.joints_at))
+        for part in (pieces.pieces[k] for k in sequence.order)
+    ]
+
+
+def joint_motion(
+    pieces: PieceGraph, sequence: PieceSequence, retarget: Retarget, blend_s: float = BLEND_S
+) -> Floats:
+    """(T, joints) the whole motion, joined with a blend at the joint layer."""
+    samples = max(1, round(blend_s * pieces.rate_hz))
+    return join(joint_pieces(pieces, sequence, retarget), samples)
+
+
+def save_motion(
+    path: Path | BinaryIO,
+    postures: Postures,
+    joints_rad: Floats,
+    robot: str,
+    sequence: PieceSequence,
+) -> None:
+    """Write a motion; ``controller.capture.readers.load.load_track`` reads it as any recording."""
+    np.savez_compressed(
+        path,
+        points=postures.points(),
+        rate_hz=postures.rate_hz,
+        length_m=np.nan if postures.length_m is None else postures.length_m,
+        base=postures.base,
+        head_rad=postures.head_rad,
+        angles_rad_spine=postures.angles_rad,
+        joints_at=postures.joints_at,
+        joints_rad=joints_rad,
+        robot=robot,
+        segments=np.array(sequence.order),
+        name=postures.name,
+        source=postures.source,
+        licence=postures.licence,
+    )

@@ -1,5 +1,12 @@
-"""One frame from above: a posture searched coarse to fine, [TH] 3.3.3."""
+"""One frame from above: a posture searched coarse to fine, [TH] 3.3.3.
 
+The last step moves all parameters at once, by least squares on shaded areas. A coordinate search
+stops on a ridge: two spine angles that change against each other hardly move the outline, so that
+from a start five degrees off it leaves the angles where they are (measured: docs/fish.md). The
+difference of areas is a sum over pixels, so its derivative is cheap.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,14 +16,14 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, SilhouetteFrame, Target
 from snakewalk.controller.capture.fish.model import FishModel
 from snakewalk.controller.capture.fish.raster import Window
-from snakewalk.controller.capture.fish.refine import refine
 
 LEVELS = ((70.0, 5, 6), (140.0, 3, 6), (260.0, 3, 6))
 """Coarse to fine: body length on the canvas (px), width of edges (px), rounds at most."""
 STIFFNESS = 0.15
-"""Cost of a spine that goes to and fro, per px of body length on the canvas, with four angles; with
+"""Cost of spine angles that alternate, per px of body length on the canvas, with four angles; with
 more it falls with the cube of their number, since a wave then turns back within fewer of them."""
 _FOLDED_RAD = 1.5
+_NUDGE_PX, _NUDGE_RAD = 0.5, 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +37,10 @@ class Match:
 
 
 def window_of(
-    seen: SilhouetteFrame, model: FishModel, near: Floats | None, scale: float
+    frame: SilhouetteFrame, model: FishModel, near: Floats | None, scale: float
 ) -> Window | None:
     """The part of a frame where the fish may be: around the mask, or around ``near`` (x, y)."""
-    rows, columns = seen.mask.shape
+    rows, columns = frame.mask.shape
     low_x, high_x, low_y, high_y = 0, columns, 0, rows
     if near is not None:
         reach = round(1.25 * model.length_px)
@@ -42,7 +49,7 @@ def window_of(
         low_y, high_y = max(row - reach, 0), min(row + reach, rows)
         if high_x - low_x < 2 or high_y - low_y < 2:
             return None
-    part = seen.mask[low_y:high_y, low_x:high_x]
+    part = frame.mask[low_y:high_y, low_x:high_x]
     tall, wide = np.flatnonzero(part.any(axis=1)), np.flatnonzero(part.any(axis=0))
     if len(tall) == 0:
         return None
@@ -56,14 +63,13 @@ def window_of(
 class TopView:
     """A frame at one size, as a function of the posture's parameters (3 + J,)."""
 
-    def __init__(self, target: Target, model: FishModel, pitch_rad: float, weight: float) -> None:
-        self._target, self._model = target, model
-        self._pitch_rad, self._weight = pitch_rad, weight
+    def __init__(self, target: Target, model: FishModel, weight: float = EDGE_WEIGHT) -> None:
+        self._target, self._model, self._weight = target, model, weight
 
     def outline(self, at: Floats) -> Floats:
         """(n, 2) outline of parameters."""
         model = self._model
-        return model.outline(model.midline(at[:2], float(at[2]), at[3:], self._pitch_rad))
+        return model.outline(model.midline(at[:2], float(at[2]), at[3:]))
 
     def picture(self, at: Floats) -> NDArray[np.float32]:
         """Blurred area of parameters."""
@@ -77,25 +83,21 @@ class TopView:
 
 
 def search(
-    seen: SilhouetteFrame,
+    frame: SilhouetteFrame,
     model: FishModel,
     starts: list[Floats],
     *,
-    pitch_rad: float = 0.0,
-    weight: float = EDGE_WEIGHT,
     near: Floats | None = None,
     from_level: int = 0,
 ) -> Match | None:
     """Best posture of a frame.
 
     Args:
-        seen: the frame.
+        frame: grey picture and silhouette.
         model: the fish.
         starts: parameters (3 + J,) to begin from; all are tried at the first size, and the one of
             the largest V goes on.
-        pitch_rad: how far the head is lifted, if a side view says so.
-        weight: W of Eq. 3.
-        near: (2,) look only around here.
+        near: (2,) search only around this place.
         from_level: entry of ``LEVELS`` to begin with; a good start needs no coarse one.
 
     Returns:
@@ -106,11 +108,11 @@ def search(
     tried = starts
     for length, blur, rounds in LEVELS[from_level:]:
         scale = min(1.0, length / model.length_px)
-        window = window_of(seen, model, near, scale)
+        window = window_of(frame, model, near, scale)
         if window is None or not tried:
             return best
-        target = Target(seen, window, blur)
-        view = TopView(target, model, pitch_rad, weight)
+        target = Target(frame, window, blur)
+        view = TopView(target, model)
         stiffness = STIFFNESS * (4.0 / model.joints) ** 3 * model.length_px * scale
         ends = [
             refine(
@@ -129,3 +131,67 @@ def search(
         if scale >= 1.0 and blur <= LEVELS[-1][1]:
             break
     return best
+
+
+def refine(
+    picture: Callable[[Floats], NDArray[np.float32]],
+    target: NDArray[np.float32],
+    start: Floats,
+    *,
+    rounds: int,
+    nudge: float = 1.0,
+    stiffness: float = 0.0,
+) -> Floats:
+    """Parameters near ``start`` whose picture differs least from the silhouette.
+
+    Levenberg and Marquardt, derivatives by differences.
+
+    Args:
+        picture: the blurred area of parameters (P,).
+        target: the blurred silhouette.
+        start: (P,) two positions in pixels, then angles in rad.
+        rounds: at most so many steps.
+        nudge: pixels of the frame per pixel of the canvas, for the derivative.
+        stiffness: cost, per rad squared, of spine angles that alternate; a noisy outline shows
+            little of them.
+
+    """
+    count = len(start)
+    size = np.full(count, _NUDGE_RAD)
+    size[:2] = _NUDGE_PX * nudge
+    here = np.array(start, dtype=float)
+    kinks = stiffness * _alternation(len(start))
+    apart = target - picture(here)
+    cost, damping = float(np.vdot(apart, apart)) + float(here @ kinks @ here), 1e-2
+    for _ in range(rounds):
+        slope = np.empty((count, apart.size), dtype=np.float32)
+        for k in range(count):
+            step = np.zeros_like(here)
+            step[k] = size[k]
+            slope[k] = ((picture(here + step) - picture(here - step)) * 0.5).ravel()
+        units = np.outer(size, size)
+        square = np.asarray(slope @ slope.T, dtype=float) + kinks * units
+        pull = np.asarray(slope @ apart.ravel(), dtype=float) - (kinks @ here) * size
+        gained = 0.0
+        for _ in range(4):
+            held = square + damping * np.diag(np.diag(square) + 1e-3 * np.trace(square))
+            step = np.clip(np.linalg.solve(held, pull), -12.0, 12.0) * size
+            away = target - picture(here + step)
+            found = float(np.vdot(away, away)) + float((here + step) @ kinks @ (here + step))
+            if found < cost:
+                gained = cost - found
+                here, apart, cost, damping = here + step, away, found, max(damping / 5.0, 1e-4)
+                break
+            damping *= 5.0
+        if gained < 1e-3 * cost:
+            break
+    return here
+
+
+def _alternation(parameters: int) -> Floats:
+    """(P, P) squared second difference of the spine angles, and a little of their size."""
+    joints = parameters - 3
+    second = np.diff(np.eye(joints), n=2, axis=0) if joints > 2 else np.zeros((1, joints))
+    square = np.zeros((parameters, parameters))
+    square[3:, 3:] = second.T @ second + 0.1 * np.eye(joints)
+    return square

@@ -1,7 +1,8 @@
 """The medial axis of a silhouette as one ordered curve from tip to tip ([PT] 2.3).
 
-Thinned at a fixed working width, so that the cost does not depend on the size of the body; side
-branches pruned by taking the longest way between two ends; then extended to both tips.
+The body is thinned at a fixed working width, so that the cost does not depend on its size. Side
+branches are pruned by taking the longest path between two ends. The line of pixels is centred and
+extended to both tips.
 """
 
 from dataclasses import dataclass
@@ -9,14 +10,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 from skimage.morphology import skeletonize
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
-from snakewalk.controller.capture.image.ridge import WORKING_WIDTH, sample, to_the_tips
-from snakewalk.controller.capture.image.thinning import filled, largest, longest_way
-from snakewalk.controller.capture.small_body.thin_body_fit import THIN_PX, fitted
+from snakewalk.controller.capture.image.thin_body_fit import THIN_PX, fitted
 
 Level = NDArray[np.float32]
 SEGMENTS = 100
@@ -27,6 +27,11 @@ _THIN_TIP = 0.2  # of the contrast, where a body two pixels wide ends: blur take
 _UNSURE_PX = 4.5  # a thinner body's line is used only where its blurred picture fits
 _LONG = 2.5  # widths: what is shorter is no long body
 _BRANCH = 0.14  # of the length: a longer side branch is a part of the body
+WORKING_WIDTH = 14.0
+"""Width of the body while it is thinned, px."""
+_SMOOTH = 3.0  # of the chain of pixels, working px
+_CENTRINGS = 2
+_FOLLOW = 1.0  # how readily the way to a tip turns with the ridge
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,23 +104,23 @@ def skeleton_of_level(
         return no_skeleton(FrameStatus.BLOB)
     step = min(WORKING_WIDTH / width, _LARGEST_PX / max(level.shape))
     fine = _rescaled(level, step)
-    solid = largest(fine > threshold)
+    solid = _largest(fine > threshold)
     if solid is None:
         return no_skeleton(FrameStatus.NOTHING)
-    solid, looped = filled(solid, _HOLE * WORKING_WIDTH**2)
+    solid, looped = _filled(solid, _HOLE * WORKING_WIDTH**2)
     if looped:
         return no_skeleton(FrameStatus.LOOP)
     depth = np.asarray(cv2.distanceTransform(solid, cv2.DIST_L2, 5), dtype=np.float32)
     thin = skeletonize(solid > 0)  # type: ignore[no-untyped-call]
-    way = longest_way(np.asarray(thin, dtype=bool))
-    if way is None:
+    path = _longest_path(np.asarray(thin, dtype=bool))
+    if path is None:
         return no_skeleton(FrameStatus.BLOB)
-    curve, branch = way
+    curve, branch = path
     if branch > _BRANCH * len(curve) + float(depth.max()):
         return no_skeleton(FrameStatus.BRANCH)
     inside = float(np.percentile(fine[solid > 0], 75))
     tip = inside * float(np.clip(_THIN_TIP + 0.075 * (width - 2.0), _THIN_TIP, 0.5))
-    line = to_the_tips(curve, fine, threshold, depth, min(threshold, max(tip, least)))
+    line = _to_the_tips(curve, fine, threshold, depth, min(threshold, max(tip, least)))
     if line is None:
         return no_skeleton(FrameStatus.BLOB)
     if width < THIN_PX and grey:
@@ -128,7 +133,7 @@ def skeleton_of_level(
         even = equipartition(line, SEGMENTS)
     except (NoEquipartitionError, ValueError):
         return no_skeleton(FrameStatus.BLOB)
-    radius = sample(depth, even.points) / step
+    radius = _sample(depth, even.points) / step
     points = (even.points - _MARGIN + 0.5) / step - 0.5 + np.asarray(origin_px)
     return Skeleton(points, radius, even.chord * SEGMENTS / step, FrameStatus.GOOD)
 
@@ -159,3 +164,149 @@ def _rescaled(level: Level, scale: float) -> Level:
     )
     fine = cv2.copyMakeBorder(fine, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=0)
     return np.asarray(cv2.GaussianBlur(fine, (0, 0), 1.0), dtype=np.float32)
+
+
+def _to_the_tips(
+    chain: Floats, fine: Level, threshold: float, depth: Level, tip: float
+) -> Floats | None:
+    """Smooth the chain of pixels, cut the forks off its ends, and go on to the boundary."""
+    line = gaussian_filter1d(chain, _SMOOTH, axis=0, mode="nearest")
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    deep = _sample(depth, line)
+    # within a radius of the end the axis of a blunt body turns into one of its corners
+    inner = np.flatnonzero((arc >= deep) & (arc[-1] - arc >= deep))
+    if len(inner) < 4:
+        return None
+    core = line[inner[0] : inner[-1] + 1]
+    for _ in range(_CENTRINGS):
+        core = _centred(core, fine, threshold)
+    reach = min(round(WORKING_WIDTH), len(core))
+    head = _tip(core[:reach][::-1], fine, tip)
+    tail = _tip(core[-reach:], fine, tip)
+    return np.vstack([head[::-1], core, tail])
+
+
+def _centred(line: Floats, fine: Level, threshold: float) -> Floats:
+    """Move each point to the middle between both sides.
+
+    Thinning is off by up to a pixel, and smoothing cuts bends short.
+    """
+    along = np.gradient(line, axis=0)
+    side = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
+    out = np.arange(0.0, WORKING_WIDTH, 0.5)
+    reach = []
+    for sign in (1.0, -1.0):
+        ray = line[:, None] + sign * out[:, None] * side[:, None]
+        level = _sample(fine, ray)
+        below = level < threshold
+        last = np.argmax(below, axis=1)
+        row = np.arange(len(line))
+        high, low = level[row, np.maximum(last - 1, 0)], level[row, last]
+        part = np.clip((high - threshold) / np.maximum(high - low, 1e-6), 0.0, 1.0)
+        reach.append(np.where(last > 0, out[last] - 0.5 + 0.5 * part, np.nan))
+    off = 0.5 * (reach[0] - reach[1])
+    known = np.flatnonzero(np.abs(off) < 0.25 * WORKING_WIDTH)
+    if not known.size:
+        return line
+    off = np.interp(np.arange(len(line)), known, off[known])
+    return np.asarray(line + gaussian_filter1d(off, _SMOOTH, mode="nearest")[:, None] * side)
+
+
+def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
+    """Points on from the last of ``end`` (K, 2), along the ridge, to where the body ends."""
+    ahead = end[-1] - end[0]
+    ahead = ahead / np.hypot(*ahead)
+    across = np.linspace(-0.5, 0.5, 15) * WORKING_WIDTH
+    here, found, last = end[-1], [], threshold
+    for _ in range(round(4.0 * WORKING_WIDTH)):
+        there = here + ahead
+        side = np.array([-ahead[1], ahead[0]])
+        level = _sample(fine, np.vstack([there, there + across[:, None] * side]))
+        if level[0] <= threshold:
+            part = (last - threshold) / max(last - level[0], 1e-6)
+            found.append(here + float(np.clip(part, 0.0, 1.0)) * ahead)
+            break
+        last = float(level[0])
+        weight = np.maximum(level[1:] - threshold, 0.0)
+        off = float((weight * across).sum() / max(float(weight.sum()), 1e-9))
+        turned = ahead + _FOLLOW * off / WORKING_WIDTH * side
+        ahead = turned / np.hypot(*turned)
+        here = there + 0.5 * _FOLLOW * off * side
+        found.append(here)
+    return np.asarray(found)
+
+
+def _sample(image: NDArray[np.generic], points: Floats) -> Floats:
+    """Values (...) between the pixels at points (..., 2), one or two leading axes; 0 outside."""
+    rows = points if points.ndim == 3 else points[:, None]
+    x, y = np.ascontiguousarray(np.moveaxis(rows, -1, 0), dtype=np.float32)
+    found = cv2.remap(
+        np.asarray(image, dtype=np.float32),
+        x,
+        y,
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=0,
+    )
+    return np.asarray(found, dtype=float).reshape(points.shape[:-1])
+
+
+def _largest(mask: NDArray[np.bool_]) -> NDArray[np.uint8] | None:
+    """(h, w) the largest part, 1 inside; None where there is nothing."""
+    count, label, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
+    if count < 2:
+        return None
+    best = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    return np.asarray(label == best, dtype=np.uint8)
+
+
+def _filled(solid: NDArray[np.uint8], hole_px: float) -> tuple[NDArray[np.uint8], bool]:
+    """Holes filled, and whether one was larger than ``hole_px``, so that the body encloses it."""
+    count, label, stats, _ = cv2.connectedComponentsWithStats(1 - solid, connectivity=8)
+    outside = label[0, 0]
+    holes = [stats[k, cv2.CC_STAT_AREA] for k in range(1, count) if k != outside]
+    looped = max(holes, default=0) > hole_px
+    return (label != outside).astype(np.uint8), bool(looped)
+
+
+def _longest_path(thin: NDArray[np.bool_]) -> tuple[Floats, float] | None:
+    """The longest path between two ends (K, 2) x, y, and how far off it another part reaches."""
+    rows, columns = np.nonzero(thin)
+    if len(rows) < 3:
+        return None
+    one = _paths_from(rows, columns, thin.shape, [0])
+    first = int(np.argmax(one[0]))
+    far, before = _paths_from(rows, columns, thin.shape, [first])
+    end = int(np.argmax(far))
+    chain = [end]
+    while before[chain[-1]] >= 0:
+        chain.append(before[chain[-1]])
+    away, _ = _paths_from(rows, columns, thin.shape, chain)
+    return np.column_stack([columns[chain], rows[chain]]).astype(float), float(max(away))
+
+
+def _paths_from(
+    rows: NDArray[np.intp], columns: NDArray[np.intp], shape: tuple[int, ...], start: list[int]
+) -> tuple[list[float], list[int]]:
+    """Shortest paths over the pixels of a thin line from ``start``: lengths and predecessors."""
+    wide = shape[1]
+    place = {int(r) * wide + int(c): k for k, (r, c) in enumerate(zip(rows, columns, strict=True))}
+    flat = list(place)
+    slanted = 2.0**0.5
+    sides = [(step, 1.0) for step in (1, -1, wide, -wide)]
+    sides += [(step, slanted) for step in (wide + 1, wide - 1, -wide + 1, -wide - 1)]
+    length, before = [-1.0] * len(flat), [-1] * len(flat)
+    for k in start:
+        length[k] = 0.0
+    front = list(start)
+    while front:
+        later = []
+        for k in front:
+            for step, cost in sides:
+                other = place.get(flat[k] + step, -1)
+                if other >= 0 and length[other] < 0.0:
+                    length[other] = length[k] + cost
+                    before[other] = k
+                    later.append(other)
+        front = later
+    return length, before

@@ -12,9 +12,9 @@ from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.identity import margins
 from snakewalk.controller.capture.image.medial_axis import no_skeleton
 from snakewalk.controller.capture.image.silhouette import Polarity
-from snakewalk.controller.capture.small_body.crop import crop_body
-from snakewalk.controller.capture.small_body.film_view import bends_of, turned_round
-from snakewalk.controller.capture.small_body.fit import fit_film
+from snakewalk.controller.capture.image.thin_body_fit import fitted
+from snakewalk.controller.capture.small_body.crop import bends_of, crop_body, turned_round
+from snakewalk.controller.capture.small_body.film_fit import fit_film
 from snakewalk.controller.capture.small_body.ribbon import (
     BENDS,
     FRAME,
@@ -25,7 +25,6 @@ from snakewalk.controller.capture.small_body.ribbon import (
     curve_slopes,
     gram,
 )
-from snakewalk.controller.capture.small_body.thin_body_fit import fitted
 from tests.oracles.rendered_snake import SnakeScene, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
 

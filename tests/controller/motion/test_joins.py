@@ -14,11 +14,10 @@ from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.app.runs.walk_run import WalkRun
-from snakewalk.controller.capture.fish.joining import piece_graph
+from snakewalk.controller.capture.fish.piece_graph import piece_graph
 from snakewalk.controller.capture.fish.segments import cut
 from snakewalk.controller.capture.fish.swimmer import swim
-from snakewalk.controller.capture.fish.synthesis import at_random
-from snakewalk.controller.capture.fish.track_file import joint_motion
+from snakewalk.controller.capture.fish.synthesis import at_random, joint_motion
 from snakewalk.controller.gaits.gait import ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.kinematics.links import BodyView, body_in_world

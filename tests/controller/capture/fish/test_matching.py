@@ -5,8 +5,8 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.fish.accuracy import compare
-from snakewalk.controller.capture.fish.first_frame import rough_midline, starts
-from snakewalk.controller.capture.fish.match_film import match_film
+from snakewalk.controller.capture.fish.initial_posture import midline_starts, rough_midline
+from snakewalk.controller.capture.fish.match_film import match_film, track_film
 from snakewalk.controller.capture.fish.matching import SilhouetteFrame, Target, agreement
 from snakewalk.controller.capture.fish.model import fish_model
 from snakewalk.controller.capture.fish.pattern_search import pattern_search
@@ -15,7 +15,6 @@ from snakewalk.controller.capture.fish.raster import Window
 from snakewalk.controller.capture.fish.rendered_fish import FilmConditions
 from snakewalk.controller.capture.fish.swimmer import Stroke, swim
 from snakewalk.controller.capture.fish.top_view import TopView, search
-from snakewalk.controller.capture.fish.tracking import track_film
 from tests.helpers.pools import film, side_film
 
 TRUTH = swim()
@@ -91,7 +90,7 @@ def test_an_edge_one_pixel_wide_says_nothing_two_pixels_away_and_a_wide_one_does
 
     def scores(width: int) -> list[float]:
         view = Target(top[0], window, width)
-        shape = TopView(view, model, 0.0, 1.0)
+        shape = TopView(view, model, 1.0)
         return [
             view.edge(shape.outline(at + np.array([0, dy, 0, 0, 0, 0, 0]))) for dy in (3.0, 4.5)
         ]
@@ -111,7 +110,7 @@ def test_coordinates_in_turn_stop_on_a_ridge_where_least_squares_goes_on() -> No
     for seen, k, place in zip(top, frames, base, strict=True):
         truth = np.array([*place, TRUTH.head_rad[k], *TRUTH.angles_rad[k]])
         window = Window(0, 0, seen.grey.shape[1], seen.grey.shape[0], 1.0)
-        view = TopView(Target(seen, window, 3), model, 0.0, 0.3)
+        view = TopView(Target(seen, window, 3), model, 0.3)
         steps = np.array([1.0, 1.0, 0.02, 0.05, 0.05, 0.05, 0.05])
         found, _ = pattern_search(view.value, truth + off, steps, halvings=3)
         printed.append(np.abs(found - truth)[3:].mean())
@@ -126,7 +125,7 @@ def test_head_and_tail_of_a_fish_at_rest_are_told_apart_by_its_build() -> None:
     still = swim((Stroke("glide", 0.2),))
     top, model, _ = film(still, range(0, 4), 100.0)
     same = [top[0]] * 3  # the centre's way from frame to frame is 0
-    for step in track_film(same, model, way=np.zeros(2)):
+    for step in track_film(same, model, travel=np.zeros(2)):
         assert step.match is not None
         assert np.cos(step.match.parameters[2] - still.head_rad[0]) > 0.99
 
@@ -135,8 +134,8 @@ def test_a_backing_fish_keeps_its_head() -> None:
     """The printed reading would put the head where the fish goes."""
     ahead = swim((Stroke("glide", 0.5),))
     top, model, _ = film(ahead, range(0, 12, 3), 100.0)
-    way = np.array([-1.0, 0.0])
-    for step in track_film(top[::-1], model, way=way):
+    travel = np.array([-1.0, 0.0])
+    for step in track_film(top[::-1], model, travel=travel):
         assert step.match is not None
         assert np.cos(step.match.parameters[2] - ahead.head_rad[0]) > 0.99
 
@@ -155,9 +154,9 @@ def test_the_skeleton_of_a_mask_runs_from_end_to_end_and_gives_starts_both_ways(
     line = rough_midline(top[0].mask)
     assert line is not None
     assert np.hypot(*np.diff(line, axis=0).T).sum() == pytest.approx(150.0, rel=0.15)
-    heads = [at[2] for at in starts(model, line)]
+    heads = [at[2] for at in midline_starts(model, line)]
     assert np.cos(heads[0] - heads[1]) < -0.7
-    near = min(np.hypot(*(at[:2] - base[0])) for at in starts(model, line))
+    near = min(np.hypot(*(at[:2] - base[0])) for at in midline_starts(model, line))
     assert near < 0.08 * 150.0
     assert rough_midline(np.zeros((20, 20), dtype=bool)) is None
 

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.capture.fish.joining import Piece, PieceGraph, piece_graph, placed
-from snakewalk.controller.capture.fish.junction import fading, join
+from snakewalk.controller.capture.fish.piece_graph import Piece, PieceGraph, piece_graph, placed
 from snakewalk.controller.capture.fish.postures import Postures, postures_of_track
 from snakewalk.controller.capture.fish.segments import (
     MotionSegment,
@@ -23,8 +22,16 @@ from snakewalk.controller.capture.fish.segments import (
     turned,
 )
 from snakewalk.controller.capture.fish.swimmer import Stroke, swim
-from snakewalk.controller.capture.fish.synthesis import at_random, compose, junctions, through
-from snakewalk.controller.capture.fish.track_file import joint_motion, joint_pieces
+from snakewalk.controller.capture.fish.synthesis import (
+    at_random,
+    compose,
+    fading,
+    join,
+    joint_motion,
+    joint_pieces,
+    junctions,
+    through,
+)
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.kinematics.retarget import Retarget
 

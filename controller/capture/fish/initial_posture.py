@@ -1,8 +1,8 @@
-"""Where the first posture comes from: the silhouette's skeleton, tried both ways round.
+"""The first posture of a search: the silhouette's skeleton, with the head at either end.
 
-[TH] 3.3.1 takes the way of the silhouette's centre from the first frame to the second for the
-direction of the head. A fish at rest has no such way, and one that backs has the wrong one, so the
-build decides: both ways are matched, and the better one is kept.
+[TH] 3.3.1 takes the displacement of the silhouette's centre from the first frame to the second for
+the direction of the head. A fish at rest has no displacement, and one that backs has the wrong one,
+so the build decides: both orientations are matched, and the better one is kept.
 """
 
 import cv2
@@ -18,7 +18,7 @@ _AROUND = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)]
 
 
 def rough_midline(mask: Bools, size_px: float = 120.0) -> Floats | None:
-    """Longest way through the skeleton of a mask: (P, 2), x right, y up, ends at the body's rim.
+    """Longest path through the skeleton of a mask: (P, 2), x right, y up, ends at the body's rim.
 
     None where the mask holds no body of 8 pixels length. The mask is reduced to ``size_px`` first.
     """
@@ -34,23 +34,23 @@ def rough_midline(mask: Bools, size_px: float = 120.0) -> Floats | None:
         skeletonize(cv2.medianBlur(small.astype(np.uint8), 3) > 0),  # type: ignore[no-untyped-call]
         dtype=np.bool_,
     )
-    way = _longest(bones)
-    if way is None or len(way) < 8:
+    path = _longest_path(bones)
+    if path is None or len(path) < 8:
         return None
     depth = cv2.distanceTransform(small.astype(np.uint8), cv2.DIST_L2, 5)
-    points = np.column_stack([way[:, 1], -way[:, 0]]).astype(float)
+    points = np.column_stack([path[:, 1], -path[:, 0]]).astype(float)
     soft = 3
     smooth = np.stack(
         [points[max(0, k - soft) : k + soft + 1].mean(axis=0) for k in range(len(points))]
     )
-    ends = [_beyond(smooth, float(depth[tuple(way[0])])),
-            _beyond(smooth[::-1], float(depth[tuple(way[-1])]))]  # fmt: skip
+    ends = [_beyond(smooth, float(depth[tuple(path[0])])),
+            _beyond(smooth[::-1], float(depth[tuple(path[-1])]))]  # fmt: skip
     whole = np.concatenate([ends[0][None], smooth[::4], smooth[-1:], ends[1][None]])
     return np.asarray((whole + np.array([-1.5, 1.5])) / scale + np.array([left - 0.5, -top + 0.5]))
 
 
-def starts(model: FishModel, midline: Floats) -> list[Floats]:
-    """Parameters (3 + J,) base x, base y, head, angles of a midline, read both ways."""
+def midline_starts(model: FishModel, midline: Floats) -> list[Floats]:
+    """Parameters (3 + J,) of a midline, base x, y, head, angles, with the head at either end."""
     found = []
     for points in (midline, midline[::-1]):
         head, angles = midline_angles(points, model.joints_at)
@@ -67,8 +67,8 @@ def _beyond(points: Floats, reach: float) -> Floats:
     return np.asarray(points[0] + step / max(float(np.hypot(*step)), 1e-9) * reach)
 
 
-def _longest(bones: Bools) -> NDArray[np.int64] | None:
-    """Pixels (P, 2), row and column, of the longest shortest way in the largest skeleton part."""
+def _longest_path(bones: Bools) -> NDArray[np.int64] | None:
+    """Pixels (P, 2), row and column, of the longest shortest path in any part of the skeleton."""
     pixels = {(int(r), int(c)) for r, c in np.argwhere(bones)}
     best: list[tuple[int, int]] = []
     while pixels:
@@ -76,12 +76,12 @@ def _longest(bones: Bools) -> NDArray[np.int64] | None:
         reached = _walk(first, pixels)
         end = reached[-1][0]
         before = dict(_walk(end, pixels))
-        way: list[tuple[int, int]] = []
+        path: list[tuple[int, int]] = []
         step: tuple[int, int] | None = list(before)[-1]
         while step is not None:
-            way.append(step)
+            path.append(step)
             step = before[step]
-        best = max(best, way, key=len)
+        best = max(best, path, key=len)
         pixels -= set(before)
     return np.array(best, dtype=np.int64) if best else None
 

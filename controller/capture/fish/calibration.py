@@ -1,8 +1,8 @@
 """The model's size and sections from the film itself, [TH] 3.2.3, without a fish that holds still.
 
 The text films a straight fish and grows a small model until it fits best. Here the posture is
-searched in a few frames, the width is read off the silhouettes along the found spines, and length
-and width are grown to the largest V; twice.
+searched in a few frames, the width is read off the silhouettes along the spines found, and length
+and width are scaled to the largest V; twice.
 """
 
 from dataclasses import replace
@@ -12,8 +12,8 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.fish.first_frame import rough_midline, starts
-from snakewalk.controller.capture.fish.matching import EDGE_WEIGHT, SilhouetteFrame, Target
+from snakewalk.controller.capture.fish.initial_posture import midline_starts, rough_midline
+from snakewalk.controller.capture.fish.matching import SilhouetteFrame, Target
 from snakewalk.controller.capture.fish.model import STATIONS, FishModel
 from snakewalk.controller.capture.fish.pattern_search import pattern_search
 from snakewalk.controller.capture.fish.top_view import Match, TopView, search, window_of
@@ -21,50 +21,46 @@ from snakewalk.controller.capture.fish.top_view import Match, TopView, search, w
 SHORTEST_PX = 20.0
 
 
-def calibrate(
-    model: FishModel, sample: list[SilhouetteFrame], weight: float = EDGE_WEIGHT, name: str = "film"
-) -> FishModel:
+def calibrate(model: FishModel, sample: list[SilhouetteFrame], name: str = "film") -> FishModel:
     """Fit the build to a few frames of one fish.
 
     Args:
         model: the build to begin with; its length is not used.
         sample: frames, best of different postures.
-        weight: W of Eq. 3.
         name: of the film, for faults.
 
     Raises:
         InputError: no frame holds a silhouette of a body, or the body is below 20 px.
 
     """
-    reasons = sorted({seen.reason for seen in sample if seen.reason})
-    midlines = [None if seen.reason else rough_midline(seen.mask) for seen in sample]
-    seen_by = [
-        (seen, line) for seen, line in zip(sample, midlines, strict=True) if line is not None
+    reasons = sorted({frame.reason for frame in sample if frame.reason})
+    midlines = [None if frame.reason else rough_midline(frame.mask) for frame in sample]
+    usable = [
+        (frame, line) for frame, line in zip(sample, midlines, strict=True) if line is not None
     ]
-    if not seen_by:
+    if not usable:
         why = f" ({'; '.join(reasons)})" if reasons else ""
         raise InputError(
             f"{name}: no silhouette of one body in {len(sample)} frames{why}; a fish that hardly "
             "moves needs --background, a picture of the empty scene"
         )
-    lengths = [float(np.hypot(*np.diff(line, axis=0).T).sum()) for _, line in seen_by]
+    lengths = [float(np.hypot(*np.diff(line, axis=0).T).sum()) for _, line in usable]
     length = float(np.median(lengths))
     if length < SHORTEST_PX:
         raise InputError(f"{name}: the body is {length:.0f} px long; at least {SHORTEST_PX:.0f}")
     model = model.sized(length)
-    for measured in (True, True):
+    for _ in range(2):
         found: list[tuple[SilhouetteFrame, Match]] = []
-        for seen, line in seen_by:
-            match = search(seen, model, starts(model, line), weight=weight)
+        for frame, line in usable:
+            match = search(frame, model, midline_starts(model, line))
             if match is not None and np.isfinite(match.value):
-                found.append((seen, match))
+                found.append((frame, match))
         if not found:
             raise InputError(f"{name}: no posture of the model fits any of {len(sample)} frames")
         found.sort(key=lambda pair: -pair[1].value)
         good = found[: max(1, (len(found) + 1) // 2)]
-        if measured:
-            model = replace(model, half_width=_widths(model, good))
-        sizes = np.array([_size(model, seen, match, weight) for seen, match in good])
+        model = replace(model, half_width=_widths(model, good))
+        sizes = np.array([_size(model, frame, match) for frame, match in good])
         grown = np.median(sizes, axis=0)
         model = model.sized(model.length_px * float(grown[0]), width=float(grown[1]))
     return model
@@ -73,9 +69,9 @@ def calibrate(
 def _widths(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> Floats:
     """(STATIONS,) half widths in body lengths: median over frames of the silhouette's depth."""
     rows = []
-    for seen, match in good:
+    for frame, match in good:
         at = match.parameters
-        deep = cv2.distanceTransform(seen.mask.astype(np.uint8), cv2.DIST_L2, 5)
+        deep = cv2.distanceTransform(frame.mask.astype(np.uint8), cv2.DIST_L2, 5)
         line = model.midline(at[:2], float(at[2]), at[3:])
         column = np.clip(np.rint(line[:, 0]), 0, deep.shape[1] - 1).astype(int)
         row = np.clip(np.rint(-line[:, 1]), 0, deep.shape[0] - 1).astype(int)
@@ -86,15 +82,13 @@ def _widths(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> Floa
     return np.asarray(soft[:STATIONS] / model.length_px)
 
 
-def _size(
-    model: FishModel, seen: SilhouetteFrame, match: Match, weight: float
-) -> tuple[float, float]:
+def _size(model: FishModel, frame: SilhouetteFrame, match: Match) -> tuple[float, float]:
     """Factors of length and width of the largest V, the fish free to slide along its head."""
     scale = min(1.0, 200.0 / model.length_px)
-    window = window_of(seen, model, match.parameters[:2], scale)
+    window = window_of(frame, model, match.parameters[:2], scale)
     if window is None:
         return 1.0, 1.0
-    target = Target(seen, window, 3)
+    target = Target(frame, window, 3)
     ahead = np.array([np.cos(match.parameters[2]), np.sin(match.parameters[2])])
 
     def value(size: Floats) -> float:
@@ -103,7 +97,7 @@ def _size(
         grown = model.sized(model.length_px * float(size[0]), width=float(size[1]))
         at = match.parameters.copy()
         at[:2] += ahead * size[2]
-        return TopView(target, grown, 0.0, weight).value(at)
+        return TopView(target, grown).value(at)
 
     first = np.array([0.05, 0.1, 0.03 * model.length_px])
     found, _ = pattern_search(value, np.array([1.0, 1.0, 0.0]), first, halvings=4, evaluations=200)
