@@ -207,7 +207,8 @@ def main() -> None:
         print(f"snakewalk: {needed}", file=sys.stderr)
         raise SystemExit(2) from None
     except OSError as error:
-        print(f"snakewalk: {Path(str(error.filename or ''))}: {error.strerror}", file=sys.stderr)
+        place = f"{Path(str(error.filename))}: " if error.filename else ""
+        print(f"snakewalk: {place}{error.strerror or error}", file=sys.stderr)
         raise SystemExit(2) from None
 
 

@@ -10,8 +10,8 @@ from rich.progress import Progress
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite, whole_file
 from snakewalk.controller.app.report.plots.capture import contact_sheet, overlay_film, step_picture
+from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.capture.body_detector import BodyDetector, make_detector
 from snakewalk.controller.capture.capture import Capture, capture, save_capture
 from snakewalk.controller.capture.image.video import Footage, open_footage, read_image
@@ -73,7 +73,7 @@ def capture_file(wanted: Wanted) -> dict[str, object]:
         )
         if wanted.length_m is not None:
             m_per_px = scale_of_length(wanted.length_m, captured.length_px)
-        with whole_file(wanted.output) as part:
+        with atomic_write(wanted.output) as part:
             save_capture(
                 part,
                 captured,

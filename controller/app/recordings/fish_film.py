@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.app.result_files import atomic_write
 from snakewalk.controller.capture.fish.model import fish_model
 from snakewalk.controller.capture.fish.postures import Postures, postures_of_track, save_postures
 from snakewalk.controller.capture.fish.raster import Grey
@@ -70,7 +71,8 @@ def render(
             high_px = np.interp(known, at, model.half_height * length_px)
             _write(folder / "side" / f"{k:05d}.png", beside.side(seen, wide, high_px))
         tick(k + 1, len(spine))
-    save_postures(folder / "truth.npz", truth)
+    with atomic_write(folder / "truth.npz") as part:
+        save_postures(part, truth)
     return truth
 
 

@@ -9,6 +9,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.report.build import build_report
 from snakewalk.controller.app.report.film import film_run
+from snakewalk.controller.app.result_files import atomic_write
 from snakewalk.controller.runlog.reader import read_log
 
 FILM, REPORT = "film.mp4", "report.html"
@@ -63,15 +64,15 @@ def _film(log: Path, path: Path, fine: bool, notes: list[str]) -> Path | None:
     ) as progress:
         task = progress.add_task("film", total=None)
         try:
-            film_run(
-                record,
-                path,
-                fine=fine,
-                on_frame=lambda done, of: progress.update(task, completed=done, total=of),
-            )
+            with atomic_write(path) as part:
+                film_run(
+                    record,
+                    part,
+                    fine=fine,
+                    on_frame=lambda done, of: progress.update(task, completed=done, total=of),
+                )
         except InputError as error:
             progress.remove_task(task)
-            path.unlink(missing_ok=True)
             notes += [f"no film: {line}" for line in error.faults]
             return None
     return path

@@ -6,6 +6,7 @@ from pathlib import Path
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.report.film_on_page import film_html
 from snakewalk.controller.app.report.page import Section, page
+from snakewalk.controller.app.result_files import atomic_write
 from snakewalk.controller.metrics.summary import Summary, summary
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
@@ -30,16 +31,17 @@ def build_report(log_path: Path, out_dir: Path, film: Path | None = None) -> Pat
     }
     html = page(numbers, _sections(record), film=shown, events=record.events, config=config)
     path = out_dir / "report.html"
-    path.write_text(html, encoding="utf-8")
+    with atomic_write(path) as part:
+        part.write_text(html, encoding="utf-8")
     return path
 
 
 def write_summary(record: RunRecord, out_dir: Path) -> Summary:
     """Write ``out_dir/summary.json`` and return the numbers; needs no matplotlib."""
     numbers = summary(record)
-    out_dir.mkdir(parents=True, exist_ok=True)
     text = json.dumps(numbers, indent=2, ensure_ascii=False, allow_nan=False)
-    (out_dir / "summary.json").write_text(text + "\n", encoding="utf-8")
+    with atomic_write(out_dir / "summary.json") as part:
+        part.write_text(text + "\n", encoding="utf-8")
     return numbers
 
 

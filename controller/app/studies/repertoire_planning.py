@@ -10,6 +10,7 @@ from snakewalk.config.loader import checked, load_robot, load_run, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.app.result_files import atomic_write
 from snakewalk.controller.app.runs.repertoire_run import (
     RepertoireRun,
     initial_frame,
@@ -117,7 +118,8 @@ def save_plan(job: RepertoireRun, path: Path) -> None:
         "robot": job.robot.model_dump(mode="json"),
         "world": job.world.model_dump(mode="json"),
     }
-    path.write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
+    with atomic_write(path) as part:
+        part.write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
 
 
 def load_plan(path: Path, *, replan: bool = True) -> RepertoireRun:

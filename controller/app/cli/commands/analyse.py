@@ -10,9 +10,8 @@ from rich.progress import track as progress
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
 from snakewalk.controller.app.cli.options import Json, console
-from snakewalk.controller.app.cli.picture_file import check_picture
+from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
 
 def analyse(

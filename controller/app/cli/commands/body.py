@@ -9,9 +9,8 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
 from snakewalk.controller.app.cli.options import Force, Json, show
-from snakewalk.controller.app.cli.picture_file import check_picture
+from snakewalk.controller.app.result_files import atomic_write, check_picture, refuse_to_overwrite
 
 if TYPE_CHECKING:
     import numpy as np
@@ -75,7 +74,9 @@ def body(
             points = points * [1.0, -1.0]
     skeleton = _skeleton(track, points, frame) if posed else model.straight()
     mesh = body_mesh(one, skeleton)
-    files = write_mesh(output, mesh, texture)
+    with atomic_write(output) as part:
+        write_mesh(part, mesh, texture)
+    files = mesh_files(output, texture is not None)
     if picture is not None:
         from snakewalk.controller.app.report.plots.body import draw_body  # noqa: PLC0415
 

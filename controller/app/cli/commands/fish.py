@@ -8,9 +8,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
 from snakewalk.controller.app.cli.options import Force, Json, show
-from snakewalk.controller.app.cli.picture_file import check_picture
+from snakewalk.controller.app.result_files import atomic_write, check_picture, refuse_to_overwrite
 
 if TYPE_CHECKING:
     from snakewalk.controller.capture.fish.postures import Postures
@@ -108,9 +107,8 @@ def match(
             )  # fmt: skip
         found = matched.postures
     accuracy = None if known is None else compare(found, known)
-    output.parent.mkdir(parents=True, exist_ok=True)
-    with output.open("wb") as stream:
-        save_postures(stream, found)
+    with atomic_write(output) as part:
+        save_postures(part, found)
     if picture is not None:
         from snakewalk.controller.app.report.plots.fish import draw_match  # noqa: PLC0415
 
@@ -161,8 +159,8 @@ def synthesise(
     _check_npz(output)
     source: Postures = load_postures(postures)
     made = synthesise_motion(source, wanted)
-    output.parent.mkdir(parents=True, exist_ok=True)
-    made.save(output)
+    with atomic_write(output) as part:
+        made.save(part)
     if picture is not None:
         from snakewalk.controller.app.report.plots.fish_path import draw_synthesis  # noqa: PLC0415
 

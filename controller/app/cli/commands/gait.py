@@ -9,7 +9,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.options import Json, Robot, console, show
-from snakewalk.controller.app.cli.picture_file import check_picture
+from snakewalk.controller.app.result_files import check_picture
 
 if TYPE_CHECKING:
     from snakewalk.controller.gaits.gait import Gait

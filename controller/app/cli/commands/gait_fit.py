@@ -9,7 +9,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.options import Force, Json, Robot, show
-from snakewalk.controller.app.cli.picture_file import check_picture
+from snakewalk.controller.app.result_files import check_picture
 
 if TYPE_CHECKING:
     from snakewalk.controller.gaits.backbone import BackboneFit
@@ -35,7 +35,7 @@ def fit_gait(
     import numpy as np  # noqa: PLC0415  heavy; --help stays quick
 
     from snakewalk.config.loader import load_robot  # noqa: PLC0415
-    from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite, whole_file  # noqa: PLC0415
+    from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite  # noqa: PLC0415
     from snakewalk.controller.gaits.backbone import fit_backbone  # noqa: PLC0415
 
     check_picture(picture)
@@ -49,7 +49,7 @@ def fit_gait(
     except InputError as error:
         raise InputError([f"{curve}: {line}" for line in error.faults]) from None
     if output is not None:
-        with whole_file(output) as part:
+        with atomic_write(output) as part:
             np.savez(
                 part,
                 joint_rad=fit.joint_rad,
@@ -60,8 +60,7 @@ def fit_gait(
                 robot=np.array(body.name),
             )
     if picture is not None:
-        with whole_file(picture) as part:
-            _draw(fit, points_m, body.name, part)
+        _draw(fit, points_m, body.name, picture)
     limit = np.array(body.limit_rad)
     found: dict[str, object] = {
         "curve": str(curve),
@@ -122,7 +121,14 @@ def _draw(fit: "BackboneFit", curve_m: list[list[float]], robot: str, path: Path
     import numpy as np  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415  an extra
 
-    from snakewalk.controller.app.report.figures.style import AMBER, BLUE, INK, RED, style  # noqa: PLC0415
+    from snakewalk.controller.app.report.figures.style import (  # noqa: PLC0415
+        AMBER,
+        BLUE,
+        INK,
+        RED,
+        save_picture,
+        style,
+    )
 
     points = np.array(curve_m)
     with style():
@@ -141,4 +147,4 @@ def _draw(fit: "BackboneFit", curve_m: list[list[float]], robot: str, path: Path
         angles.set(xlabel="joint, from the head", ylabel="angle, rad")
         title = f"{robot}: at most {1000.0 * fit.residual_m:.1f} mm from the curve"
         figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
-        figure.savefig(path, dpi=110)
+        save_picture(figure, path, dpi=110)

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
 from snakewalk.controller.app.cli.commands.repertoire import bar, carry_out
 from snakewalk.controller.app.cli.options import show
+from snakewalk.controller.app.result_files import refuse_to_overwrite
 
 
 def plan_with_repertoire(

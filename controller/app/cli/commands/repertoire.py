@@ -10,7 +10,6 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
 from snakewalk.controller.app.cli.options import (
     Film,
     Force,
@@ -21,7 +20,7 @@ from snakewalk.controller.app.cli.options import (
     leave,
     show,
 )
-from snakewalk.controller.app.cli.picture_file import check_picture
+from snakewalk.controller.app.result_files import atomic_write, check_picture, refuse_to_overwrite
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.runs.repertoire_run import RepertoireRun
@@ -42,7 +41,6 @@ def record(
 ) -> None:
     """Run forward, left and right actions on the physics and keep a settled cycle of each."""
     from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.app.report.plots.repertoire import draw_actions  # noqa: PLC0415
     from snakewalk.controller.app.studies.repertoire_planning import default_file, flat  # noqa: PLC0415
     from snakewalk.controller.app.studies.repertoire_recording import ACTIONS, record  # noqa: PLC0415
 
@@ -63,9 +61,12 @@ def record(
 
         repertoire = record(body, ground, told=told)
         progress.update(task, completed=float(len(ACTIONS)), description="recorded")
-    repertoire.save(file)
+    with atomic_write(file) as part:
+        repertoire.save(part)
     if picture is not None:
-        draw_actions(repertoire, picture)
+        from snakewalk.controller.app.report.plots import repertoire as plots  # noqa: PLC0415
+
+        plots.draw_actions(repertoire, picture)
     _show_actions(file, repertoire, as_json)
 
 
@@ -76,14 +77,15 @@ def show_file(
     as_json: Json = False,
 ) -> None:
     """Show the actions of a repertoire: way, turn and closure error of a cycle."""
-    from snakewalk.controller.app.report.plots.repertoire import draw_actions  # noqa: PLC0415
     from snakewalk.controller.repertoire.repertoire import load_repertoire  # noqa: PLC0415
 
     repertoire = load_repertoire(file)
     refuse_to_overwrite([picture], force)
     check_picture(picture)
     if picture is not None:
-        draw_actions(repertoire, picture)
+        from snakewalk.controller.app.report.plots import repertoire as plots  # noqa: PLC0415
+
+        plots.draw_actions(repertoire, picture)
     _show_actions(file, repertoire, as_json)
 
 
@@ -115,7 +117,6 @@ def carry_out(
 ) -> tuple[dict[str, object], bool]:
     """Execute a job with a bar; what it did, and whether it reached every waypoint."""
     from snakewalk.controller.app.cli.progress import TimeBar  # noqa: PLC0415
-    from snakewalk.controller.app.report.plots.repertoire import draw_way  # noqa: PLC0415
     from snakewalk.controller.app.studies.repertoire_run import default_folder, run_route  # noqa: PLC0415
 
     check_picture(picture)
@@ -125,7 +126,9 @@ def carry_out(
     log = ran.finished.log
     left = leave(log, folder, film=film)
     if picture is not None:
-        draw_way(job, ran.finished.record, picture)
+        from snakewalk.controller.app.report.plots import repertoire as plots  # noqa: PLC0415
+
+        plots.draw_way(job, ran.finished.record, picture)
     return ran.facts() | {"log": str(log)} | left.facts(), ran.complete
 
 

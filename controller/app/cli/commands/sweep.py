@@ -11,7 +11,7 @@ from rich.table import Table
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.options import Json, console
-from snakewalk.controller.app.cli.picture_file import check_picture
+from snakewalk.controller.app.result_files import check_picture
 
 _HEADS = {
     "points": "n",

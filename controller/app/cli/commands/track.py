@@ -10,7 +10,7 @@ from rich.progress import track as progress
 from rich.table import Table
 
 from snakewalk.controller.app.cli.options import Json, console
-from snakewalk.controller.app.cli.picture_file import check_picture
+from snakewalk.controller.app.result_files import check_picture
 
 
 def track(

@@ -10,8 +10,8 @@ from rich.console import Console
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.app.cli.atomic_write import refuse_to_overwrite
 from snakewalk.controller.app.cli.options import Json, Robot, show
+from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
 
 def tune(
@@ -73,6 +73,7 @@ def tune(
         ]
         lines += [f'gait = "{gait}"', f'robot = "{body}"', "", "[parameters]"]
         lines += [f"{key} = {json.dumps(value)}" for key, value in found.parameters.items()]
-        out.write_text("\n".join(lines) + "\n")
+        with atomic_write(out) as part:
+            part.write_text("\n".join(lines) + "\n")
         facts["set"] = str(out)
     show(facts, as_json)

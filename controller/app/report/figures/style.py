@@ -4,6 +4,7 @@ import base64
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
+from pathlib import Path
 from typing import Any, Final
 
 import matplotlib as mpl
@@ -13,6 +14,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.app.result_files import atomic_write
 
 INK: Final = "#22303c"
 GREY: Final = "#8796a5"
@@ -119,6 +121,12 @@ def mark_waypoints(panels: list[Axes], times_s: Floats) -> None:
             str(number), (time, 1.0), (3, -3), xycoords=("data", "axes fraction"),
             textcoords="offset points", va="top", color=GREEN, fontsize=9, fontweight="bold",
         )  # fmt: skip
+
+
+def save_picture(figure: Figure, path: Path, dpi: float | None = None) -> None:
+    """Write a figure in the format of the path's ending, whole or not at all."""
+    with atomic_write(path) as part:
+        figure.savefig(part, dpi=dpi or figure.dpi)
 
 
 def data_uri(figure: Figure) -> str:

@@ -11,7 +11,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from snakewalk.controller.app.cli.picture_file import check_picture
 from snakewalk.controller.app.report.figures.style import (
     AMBER,
     BLUE,
@@ -19,10 +18,12 @@ from snakewalk.controller.app.report.figures.style import (
     GREEN,
     GREY,
     INK,
+    save_picture,
     style,
 )
 from snakewalk.controller.app.report.plots.body_map import body_map
 from snakewalk.controller.app.report.plots.recording import midlines
+from snakewalk.controller.app.result_files import check_picture
 from snakewalk.controller.capture.analysis import Analysis
 from snakewalk.controller.capture.undulation import even_points
 
@@ -63,7 +64,7 @@ def draw_analysis(found: Analysis, file: Path) -> None:
         )
         speeds.set_title("pulse speed, positive towards the tail; grey: not known")
         file.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(file)
+        save_picture(figure, file)
 
 
 def _tracks(axes: Axes, found: Analysis) -> None:

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from snakewalk.config.arrays import Floats, Image
-from snakewalk.controller.app.cli.picture_file import check_picture
-from snakewalk.controller.app.report.figures.style import AMBER, BLUE, INK, RED, style
+from snakewalk.controller.app.report.figures.style import AMBER, BLUE, INK, RED, save_picture, style
+from snakewalk.controller.app.result_files import check_picture
 from snakewalk.controller.capture.mesh.body_model import BodyModel
 from snakewalk.controller.capture.mesh.mesh import Mesh
 from snakewalk.controller.capture.mesh.mesh_files import SKIN_RGB
@@ -53,8 +53,7 @@ def draw_body(
             second.set_title("skin unrolled, head at the left")
             _sections(third, model)
         _solid(right, mesh, texture)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(file)
+        save_picture(figure, file)
 
 
 def _place(axes: Axes, image: Image, points: Floats, radius: Floats) -> None:

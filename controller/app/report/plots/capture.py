@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.atomic_write import whole_file
+from snakewalk.controller.app.result_files import atomic_write
 from snakewalk.controller.capture.body_detector import BodyDetector
 from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.capture.frame_status import FrameStatus
@@ -63,7 +63,7 @@ def contact_sheet(
     wide = min(columns, len(tiles))
     tiles += [empty] * (-len(tiles) % wide)
     sheet = np.vstack([np.hstack(tiles[k : k + wide]) for k in range(0, len(tiles), wide)])
-    with whole_file(path) as part:
+    with atomic_write(path) as part:
         if not _written(part, sheet):
             raise InputError(f"{path}: a contact sheet is a .png or .jpg")
 
@@ -119,7 +119,7 @@ def step_picture(path: Path, image: Image, detector: BodyDetector, points_px: Fl
         _words(tile, name, good=True)
     wide = round(image.shape[1] * factor) + 8
     sheet = np.hstack([tile[:, : max(wide, 120)] for tile in named.values()])
-    with whole_file(path) as part:
+    with atomic_write(path) as part:
         if not _written(part, sheet):
             raise InputError(f"{path}: a picture is a .png or .jpg")
 
@@ -150,7 +150,7 @@ def overlay_film(
     kind = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "mp4v"}.get(path.suffix.lower())
     if kind is None:
         raise InputError(f"{path}: an overlay film is an .mp4, .mkv or .avi")
-    with whole_file(path) as part:
+    with atomic_write(path) as part:
         film: cv2.VideoWriter | None = None
         wide = high = 0
         for number, image in enumerate(frames):

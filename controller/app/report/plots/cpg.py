@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.loader import load_robot
+from snakewalk.controller.app.report.figures.style import save_picture
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.motion.cpg_motion import CpgMotion
@@ -56,7 +57,7 @@ def draw(out: Path) -> None:
     axes[0].set_ylabel("joint, rad")
     axes[1].set_ylabel("joint speed, rad/s")
     axes[1].set_xlabel("time, s (orange: the change; dashed: limits)")
-    figure.savefig(out, dpi=72)
+    save_picture(figure, out, dpi=72)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from snakewalk.controller.app.cli.picture_file import check_picture
 from snakewalk.controller.app.report.figures.style import (
     AMBER,
     BLUE,
@@ -15,8 +14,10 @@ from snakewalk.controller.app.report.figures.style import (
     PURPLE,
     RED,
     SKY,
+    save_picture,
     style,
 )
+from snakewalk.controller.app.result_files import check_picture
 from snakewalk.controller.capture.fish.match_film import FilmMatch
 from snakewalk.controller.capture.fish.postures import Postures
 from snakewalk.controller.capture.fish.silhouettes import grey
@@ -56,7 +57,7 @@ def draw_match(
         )
         _angles(list(rows[:, 0]), found, known)
         file.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(file)
+        save_picture(figure, file)
 
 
 def _frames(panels: list[Axes], matched: FilmMatch, footage: Path) -> None:

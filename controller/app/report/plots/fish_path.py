@@ -9,9 +9,18 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from snakewalk.controller.app.cli.picture_file import check_picture
 from snakewalk.controller.app.recordings.fish_synthesis import Made, Wanted
-from snakewalk.controller.app.report.figures.style import BLUE, FAINT, GREEN, GREY, INK, RED, style
+from snakewalk.controller.app.report.figures.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    GREY,
+    INK,
+    RED,
+    save_picture,
+    style,
+)
+from snakewalk.controller.app.result_files import check_picture
 from snakewalk.controller.capture.fish.synthesis import junctions
 
 KINDS = {"glide": GREY, "forward": GREEN, "left": BLUE, "right": RED}
@@ -34,7 +43,7 @@ def draw_synthesis(file: Path, made: Made, wanted: Wanted) -> None:
         _graph(right, made)
         _way(lower.subplots(1, 1), made, wanted)
         file.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(file)
+        save_picture(figure, file)
 
 
 def _pieces(axes: Axes, made: Made) -> None:

@@ -39,7 +39,14 @@ def draw_gait(gait: Gait, robot: RobotConfig, path: Path) -> None:
     from matplotlib.collections import LineCollection  # noqa: PLC0415  an extra
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    from snakewalk.controller.app.report.figures.style import BLUE, GREY, INK, RED, style  # noqa: PLC0415
+    from snakewalk.controller.app.report.figures.style import (  # noqa: PLC0415
+        BLUE,
+        GREY,
+        INK,
+        RED,
+        save_picture,
+        style,
+    )
 
     bodies = bodies_m(gait, robot)
     length = robot.length_m
@@ -80,4 +87,4 @@ def draw_gait(gait: Gait, robot: RobotConfig, path: Path) -> None:
         rows[1][0].set_ylabel(side)
         figure.suptitle(f"{gait.name} on {robot.name}", x=0.01, ha="left", fontweight="bold")
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=110, metadata={} if path.suffix == ".png" else None)
+        save_picture(figure, path, dpi=110)

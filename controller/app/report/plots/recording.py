@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from snakewalk.controller.app.cli.picture_file import check_picture
-from snakewalk.controller.app.report.figures.style import style
+from snakewalk.controller.app.report.figures.style import save_picture, style
 from snakewalk.controller.app.report.plots.body_map import body_map
+from snakewalk.controller.app.result_files import check_picture
 from snakewalk.controller.capture.track import Track
 
 _SHOWN = 24  # midlines over a recording: more run together
@@ -34,7 +34,7 @@ def draw(tracks: list[tuple[Track, str]], file: Path) -> None:
             body_map(figure, right, track, swing, "tangent angle, rad")
             left.set_title(caption)
         file.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(file)
+        save_picture(figure, file)
 
 
 def midlines(axes: Axes, track: Track) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from snakewalk.controller.app.report.figures.style import save_picture
 from snakewalk.controller.app.runs.repertoire_run import RepertoireRun
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.repertoire.repertoire import Repertoire
@@ -40,7 +41,7 @@ def draw_actions(repertoire: Repertoire, path: Path) -> None:
         axis.set_aspect("equal")
         axis.tick_params(labelsize=7)
         axis.grid(alpha=0.25)
-    figure.savefig(path, dpi=90)
+    save_picture(figure, path, dpi=90)
 
 
 def draw_way(job: RepertoireRun, record: RunRecord, path: Path) -> None:
@@ -69,4 +70,4 @@ def draw_way(job: RepertoireRun, record: RunRecord, path: Path) -> None:
     axis.set_ylabel("y, m")
     axis.grid(alpha=0.25)
     figure.legend(fontsize=8, loc="outside lower center", ncols=3)
-    figure.savefig(path, dpi=90)
+    save_picture(figure, path, dpi=90)

@@ -7,6 +7,7 @@ import matplotlib.pyplot as plt
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from snakewalk.controller.app.report.figures.style import save_picture
 from snakewalk.controller.app.studies.sweep_digest import UNITS, pace
 from snakewalk.controller.app.studies.sweep_table import number
 from snakewalk.controller.gaits.registry import GAITS
@@ -48,5 +49,5 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
         for colour, robot in zip(_COLOURS, robots, strict=False)
     ]
     figure.legend(handles=handles, loc="outside upper right", fontsize=8, ncols=4, frameon=False)
-    figure.savefig(path, dpi=110)
+    save_picture(figure, path, dpi=110)
     plt.close(figure)

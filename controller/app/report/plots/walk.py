@@ -6,8 +6,16 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from snakewalk.controller.app.cli.picture_file import check_picture
-from snakewalk.controller.app.report.figures.style import AMBER, BLUE, GREEN, PURPLE, RED, style
+from snakewalk.controller.app.report.figures.style import (
+    AMBER,
+    BLUE,
+    GREEN,
+    PURPLE,
+    RED,
+    save_picture,
+    style,
+)
+from snakewalk.controller.app.result_files import check_picture
 from snakewalk.controller.app.studies.graph_study import StudyResult
 
 _COLORS = {
@@ -53,4 +61,4 @@ def draw(results: Sequence[StudyResult], file: Path) -> None:
         handles, labels = panels[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
         file.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(file)
+        save_picture(figure, file)

@@ -1,0 +1,149 @@
+"""Results are whole or absent: an error or a full disk in mid-write leaves an old file alone."""
+
+import ast
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pytest_mock import MockerFixture
+
+from snakewalk.controller.app.cli.main import main
+from snakewalk.controller.app.result_files import atomic_write
+from snakewalk.controller.app.studies.tune import Tuned
+from snakewalk.controller.repertoire.repertoire import Repertoire
+
+APP = Path(__file__).resolve().parents[3] / "controller" / "app"
+WRITERS = {"write_text", "write_bytes", "savefig", "save", "save_postures", "write_mesh"}
+STREAMS = {"bus.py": "a recording of the line grows", "sweep_table.py": "a table grows by rows"}
+"""Files that grow, each row whole, in place of being written at once."""
+
+
+@contextmanager
+def full_disk(limit_bytes: int) -> Iterator[None]:
+    """Let no file grow beyond ``limit_bytes``."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_an_error_leaves_no_file(tmp_path: Path) -> None:
+    with suppress(KeyboardInterrupt), atomic_write(tmp_path / "new.txt") as part:
+        part.write_text("half")
+        raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    with full_disk(100), pytest.raises(OSError, match="File too large"), atomic_write(path) as part:
+        part.write_text("new" * 100)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_files_beside_it_are_moved_along(tmp_path: Path) -> None:
+    with atomic_write(tmp_path / "sub" / "a.obj") as part:
+        part.write_text("mesh")
+        part.with_suffix(".mtl").write_text("material")
+    assert sorted(file.name for file in (tmp_path / "sub").iterdir()) == ["a.mtl", "a.obj"]
+
+
+def arguments(command: str, out: Path) -> list[str]:
+    return {
+        "match": ["fish", "match", "midlines.npz", "-o", str(out)],
+        "record": ["repertoire", "record", "-o", str(out)],
+        "tune": ["tune", "rolling", "-o", str(out)],
+        "mesh": ["body", "worm-like", "-o", str(out)],
+        "gait": ["gait", "show", "rolling", "--picture", str(out)],
+        "analysis": ["analyse", "worm-like", "--picture", str(out)],
+    }[command]
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        *(("match", "p.npz"), ("record", "r.npz"), ("tune", "t.toml"), ("mesh", "m.glb")),
+        *(("gait", "g.png"), ("analysis", "a.png")),
+    ],
+)
+@pytest.mark.parametrize("old", [b"old", None])
+def test_commands_leave_nothing_on_a_full_disk(
+    command: str,
+    name: str,
+    old: bytes | None,
+    tmp_path: Path,
+    mocker: MockerFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    out = tmp_path / "results" / name
+    out.parent.mkdir()
+    words = arguments(command, out)
+    if old is not None:
+        out.write_bytes(old)
+        words += ["--force"] if command != "gait" else []
+    points = np.cumsum(np.ones((20, 100, 2)), axis=1) / 100.0
+    points[..., 1] += 0.1 * np.sin(np.arange(20.0)[:, None] + np.linspace(0, 6, 100))
+    np.savez(tmp_path / "midlines.npz", points=points, rate_hz=25.0)
+    mocker.patch(
+        "snakewalk.controller.app.studies.repertoire_recording.record",
+        return_value=Repertoire("yaw16", "y" * 16, "flat", 1.0, ()),
+    )
+    mocker.patch(
+        "snakewalk.controller.app.studies.tune.tune",
+        return_value=Tuned("rolling", "yaw16", "speed", {"frequency_hz": 0.1}, 8, (1.0,), (1.1,)),
+    )
+    monkeypatch.setattr("sys.argv", ["snakewalk", *words])
+    with full_disk(20), pytest.raises(SystemExit):
+        main()
+    assert capsys.readouterr().err.splitlines()[-1] == "snakewalk: File too large"
+    assert [file.name for file in out.parent.iterdir()] == ([] if old is None else [name])
+    if old is not None:
+        assert out.read_bytes() == old
+
+
+def unsafe(source: str) -> list[int]:
+    """Lines that write a file outside a ``with atomic_write`` block."""
+    tree = ast.parse(source)
+    safe: set[ast.AST] = set()
+    for block in ast.walk(tree):
+        if isinstance(block, ast.With):
+            calls = [item.context_expr for item in block.items]
+            names = {getattr(c.func, "id", "") for c in calls if isinstance(c, ast.Call)}
+            if "atomic_write" in names:
+                safe |= set(ast.walk(block))
+        elif isinstance(block, ast.FunctionDef) and block.name == "save":
+            safe |= set(ast.walk(block))  # a writer itself: its callers are examined
+    return [
+        node.lineno
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and node not in safe and writes(node)
+    ]
+
+
+def writes(call: ast.Call) -> bool:
+    """Whether a call writes a file."""
+    name = getattr(call.func, "attr", None) or getattr(call.func, "id", "")
+    if call.args and getattr(call.args[0], "id", "") == "buffer":
+        return False  # in memory
+    modes = [arg.value for arg in call.args if isinstance(arg, ast.Constant)]
+    opened = name == "open" and any(str(mode)[:1] in "wax" for mode in modes)
+    return opened or name in WRITERS or name.startswith("savez")
+
+
+def test_every_result_is_written_atomically() -> None:
+    found = {
+        f"{file.relative_to(APP)}:{line}"
+        for file in sorted(APP.rglob("*.py"))
+        if file.name not in STREAMS
+        for line in unsafe(file.read_text(encoding="utf-8"))
+    }
+    assert found == set()
