@@ -7,8 +7,8 @@ bit times (start, eight data bits, stop). Packet lengths: e-manual, DYNAMIXEL Pr
 from dataclasses import dataclass
 
 from snakewalk.drivers.errors import BudgetError
+from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 
-BITS_PER_BYTE = 10
 GROUP_BYTES = 14
 """Sync instruction: header 4, id, length 2, instruction, address 2, data length 2, CRC 2."""
 STATUS_BYTES = 11

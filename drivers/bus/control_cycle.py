@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools
-from snakewalk.drivers.bus.budget import BITS_PER_BYTE
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.bus.serial_fast_path import SerialFastPath
 from snakewalk.drivers.port.byte_port import BytePort, DescriptorPort
+from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 
 FAST_FAILURES = 3
 """Fast reads failing in a row until plain ones are used (ours)."""

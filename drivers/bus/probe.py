@@ -6,9 +6,10 @@ return delays or clocks differ; one strict ping would show neither.
 
 from dataclasses import dataclass
 
-from snakewalk.drivers.bus.budget import BITS_PER_BYTE, STATUS_BYTES
+from snakewalk.drivers.bus.budget import STATUS_BYTES
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.packet import (
+    BITS_PER_BYTE,
     Instruction,
     InstructionPacket,
     StatusPacket,

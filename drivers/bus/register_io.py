@@ -1,12 +1,13 @@
 """Reading and writing one register of one servo, with a strict codec in place of the SDK's."""
 
-from snakewalk.drivers.bus.budget import BITS_PER_BYTE, STATUS_BYTES
+from snakewalk.drivers.bus.budget import STATUS_BYTES
 from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.errors import BusError, NoAnswerError, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import Register
 from snakewalk.drivers.protocol.packet import (
     ALERT,
+    BITS_PER_BYTE,
     Instruction,
     InstructionPacket,
     ResultError,

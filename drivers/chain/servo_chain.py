@@ -20,7 +20,7 @@ from snakewalk.drivers.chain.start_up import (
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import BusError, ChainError, PortError
 from snakewalk.drivers.port.byte_port import BytePort, reopen
-from snakewalk.drivers.protocol.registers import WATCHDOG_UNIT_S, ServoUnits
+from snakewalk.drivers.protocol.registers import WATCHDOG_TRIPPED, WATCHDOG_UNIT_S, ServoUnits
 from snakewalk.drivers.types import JointCommand, JointState
 
 _FIRST_READS = 5
@@ -282,10 +282,6 @@ class ServoChain:
             self._readings.update_alarm(joint, self._bus.read(servo_id, "Hardware Error Status"))
         except BusError:
             return  # the error byte carries the alert already; asked again in the next cycle
-
-
-WATCHDOG_TRIPPED = 0xFF
-"""Bus Watchdog(98) reads -1 in its error state (e-manual)."""
 
 
 class LivenessCheck:

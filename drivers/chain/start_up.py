@@ -16,14 +16,14 @@ from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.errors import ChainError
 from snakewalk.drivers.protocol.control_table import model_numbers
 from snakewalk.drivers.protocol.registers import (
+    CURRENT_POSITION_MODE,
+    POSITION_MODE,
     RETURN_DELAY_UNIT_S,
     VOLTAGE_UNIT_V,
     ServoUnits,
     alarm_names,
 )
 
-POSITION_MODE = 3
-CURRENT_BASED_POSITION_MODE = 5
 FAST_READ_FIRMWARE = 45
 """First firmware with fast sync read (e-manual, DYNAMIXEL Protocol 2.0, Fast Sync Read)."""
 _SLACK_RAD = 0.2
@@ -125,7 +125,7 @@ def configure(
         bus.write_verified(servo_id, "Status Return Level", 2)
         bus.write_verified(servo_id, "Return Delay Time", 0)
         pitch = robot.joint_axes[joint] == "p"
-        mode = CURRENT_BASED_POSITION_MODE if pitch else POSITION_MODE
+        mode = CURRENT_POSITION_MODE if pitch else POSITION_MODE
         bus.write_verified(servo_id, "Operating Mode", mode)  # before the rest: it resets gains
         bus.write_verified(servo_id, "Min Position Limit", int(limits[joint, 0]))
         bus.write_verified(servo_id, "Max Position Limit", int(limits[joint, 1]))

@@ -12,6 +12,8 @@ from snakewalk.drivers.errors import ProtocolError, StuffingError
 from snakewalk.drivers.protocol.crc import crc16
 
 HEADER = b"\xff\xff\xfd\x00"
+BITS_PER_BYTE = 10
+"""On the line: start, eight data bits, stop."""
 BROADCAST_ID = 0xFE
 MAX_ID = 0xFC
 STATUS = 0x55

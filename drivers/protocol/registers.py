@@ -1,8 +1,8 @@
-"""Raw register values to SI units and back, per servo model.
+"""What register values mean: units, operating modes, alarm bits, baud rates; for host and servo.
 
-Positions and velocities are scaled as the SDK's control tables say. For the current these tables
+The host scales positions and velocities by the SDK's control tables. For the current these tables
 give "raw", or a torque, so its unit is here, from the e-manual's page of each model, Current
-Limit(38) and Present Current(126). A model that is not in the table is refused: a current of
+Limit(38) and Present Current(126). The host refuses a model that is not in the table: a current of
 unknown scale must not look like zero, or safe.
 """
 
@@ -15,7 +15,7 @@ from snakewalk.config.arrays import Floats, SignedInts
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.control_table import ControlTable
 
-_CURRENT_UNIT_A = {
+CURRENT_UNIT_A = {
     **dict.fromkeys(("XM430-W210", "XM430-W350", "XM540-W150", "XM540-W270"), 2.69e-3),
     **dict.fromkeys(("XH430-W210", "XH430-W350"), 2.69e-3),
     **dict.fromkeys(("XH430-V210", "XH430-V350"), 1.34e-3),
@@ -24,12 +24,25 @@ _CURRENT_UNIT_A = {
     **dict.fromkeys(("PH42-020-S300", "PH54-100-S500", "PH54-200-S500"), 1e-3),
     **dict.fromkeys(("PM42-010-S260", "PM54-040-S250", "PM54-060-S250"), 1e-3),
 }
+"""Present Current(126), by model."""
 VOLTAGE_UNIT_V = 0.1
 """Present Input Voltage(144), all series of Protocol 2.0."""
 WATCHDOG_UNIT_S = 0.02
 """Bus Watchdog(98)."""
+WATCHDOG_TRIPPED = 0xFF
+"""Bus Watchdog(98) reads -1 in its error state."""
 RETURN_DELAY_UNIT_S = 2e-6
 """Return Delay Time(9)."""
+VELOCITY_UNIT_RAD_S = 0.229 * 2.0 * np.pi / 60.0
+"""Profile Velocity(112), Present Velocity(128): 0.229 rev/min a unit; the SDK's files round it."""
+ACCELERATION_UNIT_RAD_S2 = 214.577 * 2.0 * np.pi / 3600.0
+"""Profile Acceleration(108): 214.577 rev/min^2 a unit."""
+CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, EXTENDED_MODE = 0, 1, 3, 4
+CURRENT_POSITION_MODE, PWM_MODE = 5, 16
+MODES = (0, 1, 3, 4, 5, 16)
+"""Operating Mode(11)."""
+CURRENT_MODES = (CURRENT_MODE, CURRENT_POSITION_MODE)
+"""Those that a model without current sensing lacks."""
 
 
 class Alarm(IntFlag):
@@ -68,13 +81,13 @@ class ServoUnits:
 
         """
         faults = []
-        velocity, current = table.rad_s_per_velocity, _CURRENT_UNIT_A.get(table.model)
+        velocity, current = table.rad_s_per_velocity, CURRENT_UNIT_A.get(table.model)
         if velocity is None:
             faults.append(f"{table.model}: the SDK's table gives no unit of velocity")
         if current is None:
             faults.append(
                 f"{table.model}: unit of current not known; known are "
-                f"{', '.join(sorted(_CURRENT_UNIT_A))}"
+                f"{', '.join(sorted(CURRENT_UNIT_A))}"
             )
         if velocity is None or current is None:
             raise ControlTableError(faults)
@@ -98,7 +111,7 @@ class ServoUnits:
 
 
 BAUDS = (9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
-"""By code."""
+"""Baud Rate(8), by value."""
 FACTORY_BAUD = 57_600
 _UP_TO_4M = ("XL330", "XC330")
 _ALL = ("XL430", "XC430", "XM", "XH", "XD", "XW", "MX", "2X")

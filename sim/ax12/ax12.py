@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Indices
 from snakewalk.config.errors import InputError
+from snakewalk.drivers.protocol.registers import VELOCITY_UNIT_RAD_S
 from snakewalk.sim.ax12.alarms import Ax12Alarms
 from snakewalk.sim.ax12.protocol1 import MAX_ID, Error1
 from snakewalk.sim.ax12.table import AT, CELLS, EEPROM_END, MODEL, TABLE_BYTES, Cell
@@ -12,7 +13,7 @@ from snakewalk.sim.plant import Plant
 from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 from snakewalk.sim.servo.event_queue import EventQueue
 from snakewalk.sim.servo.motor import MotorModel, make_drive
-from snakewalk.sim.servo.profile import VELOCITY_UNIT_RAD_S, Trajectory
+from snakewalk.sim.servo.profile import Trajectory
 
 CENTRE_TICKS, TICKS_PER_RAD = 512, 1023.0 / np.radians(300.0)
 SPEED_UNIT_RAD_S = 0.111 * 2.0 * np.pi / 60.0

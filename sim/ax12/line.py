@@ -6,6 +6,8 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
+from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
 from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.protocol1 import (
     BROADCAST_ID,
@@ -19,7 +21,7 @@ from snakewalk.sim.ax12.protocol1 import (
 from snakewalk.sim.ax12.table import TABLE_BYTES
 from snakewalk.sim.line.bus_contention import bus_contention
 from snakewalk.sim.line.clock import SimClock
-from snakewalk.sim.line.instruction_handler import BITS_PER_BYTE, RETURN_DELAY_UNIT_S, Reply
+from snakewalk.sim.line.instruction_handler import Reply
 from snakewalk.sim.line.wire import Wire
 
 BAUD_CLOCK = 2_000_000

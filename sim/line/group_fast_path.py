@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Bytes
 from snakewalk.drivers.protocol.crc import TABLE, crc16
 from snakewalk.drivers.protocol.packet import HEADER, STATUS, Instruction, fast_head, stuff
-from snakewalk.sim.line.instruction_handler import RETURN_DELAY_UNIT_S, InstructionHandler, Reply
+from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
+from snakewalk.sim.line.instruction_handler import InstructionHandler, Reply
 from snakewalk.sim.servo.servo_loops import crc_of, fill_replies
 
 MOTION = range(126, 136)

@@ -7,6 +7,7 @@ same result.
 from typing import NamedTuple
 
 from snakewalk.drivers.protocol.packet import (
+    BITS_PER_BYTE,
     BROADCAST_ID,
     Instruction,
     InstructionPacket,
@@ -15,6 +16,7 @@ from snakewalk.drivers.protocol.packet import (
     encode_fast,
     encode_status,
 )
+from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
 from snakewalk.sim.line.bus_contention import bus_contention
 from snakewalk.sim.line.id_directory import IdDirectory
 from snakewalk.sim.line.instructions import Instructions, word
@@ -22,10 +24,7 @@ from snakewalk.sim.servo.firmware import Firmware
 
 LONGEST = 0xFFFF
 """What the length field of a packet ends at."""
-RETURN_DELAY_UNIT_S = 2e-6
 """Return Delay Time(9), e-manual."""
-BITS_PER_BYTE = 10
-"""Start bit, eight data bits, stop bit."""
 
 
 class Reply(NamedTuple):

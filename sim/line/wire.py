@@ -16,8 +16,9 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 
 from snakewalk.drivers.errors import PortError
+from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 from snakewalk.sim.line.clock import SimClock
-from snakewalk.sim.line.instruction_handler import BITS_PER_BYTE, Reply
+from snakewalk.sim.line.instruction_handler import Reply
 from snakewalk.sim.line.noise import FaultScript
 from snakewalk.sim.line.rx_queue import RxQueue
 

@@ -18,8 +18,8 @@ from types import TracebackType
 
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.clock import Clock
+from snakewalk.drivers.protocol.registers import BAUDS
 from snakewalk.sim.line.wire import Wire
-from snakewalk.sim.servo.register_rules import BAUDS
 
 IDLE_S = 0.02
 """How often physics catches up while no client talks."""

@@ -13,17 +13,19 @@ from snakewalk.config.arrays import Indices, SignedInts
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.control_table import Register
 from snakewalk.drivers.protocol.packet import ALERT, ResultError
-from snakewalk.sim.servo.indirect import Indirect
-from snakewalk.sim.servo.register_rules import (
+from snakewalk.drivers.protocol.registers import (
     BAUDS,
     CURRENT_MODES,
-    EEPROM_END,
-    GOALS,
-    MODE_RESETS,
     MODES,
     POSITION_MODE,
     VELOCITY_MODE,
     WATCHDOG_TRIPPED,
+)
+from snakewalk.sim.servo.indirect import Indirect
+from snakewalk.sim.servo.register_rules import (
+    EEPROM_END,
+    GOALS,
+    MODE_RESETS,
     indirect_blocks,
     registers_of,
 )

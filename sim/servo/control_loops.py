@@ -10,16 +10,18 @@ for the other terms: they are taken a control period, one millisecond (ours).
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
-from snakewalk.sim.plant import Plant, ServoDrive
-from snakewalk.sim.servo.bank import ServoBank
-from snakewalk.sim.servo.motor import PWM_FULL, TICKS_PER_RAD, MotorModel, p_gain_per_rad
-from snakewalk.sim.servo.profile import ACCELERATION_UNIT_RAD_S2, VELOCITY_UNIT_RAD_S, Trajectory
-from snakewalk.sim.servo.register_rules import (
+from snakewalk.drivers.protocol.registers import (
+    ACCELERATION_UNIT_RAD_S2,
     CURRENT_POSITION_MODE,
     EXTENDED_MODE,
     POSITION_MODE,
     VELOCITY_MODE,
+    VELOCITY_UNIT_RAD_S,
 )
+from snakewalk.sim.plant import Plant, ServoDrive
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.motor import PWM_FULL, TICKS_PER_RAD, MotorModel, p_gain_per_rad
+from snakewalk.sim.servo.profile import Trajectory
 
 CONTROL_S = 1e-3
 TIME_BASED = 0x04

@@ -7,6 +7,13 @@ protection is due), and only then registers are read or written.
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.drivers.protocol.registers import (
+    CURRENT_MODE,
+    CURRENT_POSITION_MODE,
+    POSITION_MODE,
+    PWM_MODE,
+    WATCHDOG_TRIPPED,
+)
 from snakewalk.sim.plant import Plant
 from snakewalk.sim.servo.bank import TABLE_BYTES, ServoBank
 from snakewalk.sim.servo.blocked_shaft import BlockedShaft
@@ -16,14 +23,7 @@ from snakewalk.sim.servo.motor import MOTORS, PWM_FULL, TICKS_PER_RAD, TICKS_PER
 from snakewalk.sim.servo.motor_output import MotorOutput
 from snakewalk.sim.servo.present_values import PRESENT, SUPPLY, PresentValues
 from snakewalk.sim.servo.protection import SLICE_S, Protection, SupplyAndAmbient
-from snakewalk.sim.servo.register_rules import (
-    CURRENT_MODE,
-    CURRENT_POSITION_MODE,
-    EXTENDED_RANGE_TICKS,
-    POSITION_MODE,
-    PWM_MODE,
-    WATCHDOG_TRIPPED,
-)
+from snakewalk.sim.servo.register_rules import EXTENDED_RANGE_TICKS
 from snakewalk.sim.servo.servo_loops import accept_goals
 from snakewalk.sim.servo.watchdog import Watchdog
 

@@ -35,7 +35,6 @@ class ModelFacts:
     """Initial value of Velocity Limit(44), 0.229 rev/min."""
     current_limit: int | None = None
     """Initial and greatest Current Limit(38); None: the model measures no current."""
-    current_unit_a: float = 2.69e-3
     volts: tuple[int, int] = (95, 160)
     """Range of Min and Max Voltage Limit(34, 32), and their initial values, 0.1 V."""
     min_volts: int | None = None
@@ -46,12 +45,10 @@ class ModelFacts:
     shutdown: int = 52
     moving_threshold: int = 10
     pwm_slope: int | None = None
-    bauds: int = 8
-    """Entries of the baud rate table: XL330 and XC330 end at 4 Mbit/s."""
     standby_a: float = 0.040
 
 
-def _small(  # XL330 and XC330: another microcontroller, an extra register, a shorter baud table
+def _small(  # XL330 and XC330: another microcontroller, an extra register
     volts: float,
     torque: float,
     amps: float,
@@ -72,7 +69,6 @@ def _small(  # XL330 and XC330: another microcontroller, an extra register, a sh
         rpm,
         limit,
         current,
-        1e-3,
         range_v,
         min_v,
         gains,
@@ -80,7 +76,6 @@ def _small(  # XL330 and XC330: another microcontroller, an extra register, a sh
         2_047,
         shutdown,
         pwm_slope=slope,
-        bauds=7,
         standby_a=0.017,
     )
 
@@ -138,12 +133,8 @@ MODELS: Mapping[str, ModelFacts] = {
     "XM430-W350": ModelFacts(12.0, 4.1, 2.3, 46, 200, 1_193),
     "XH430-W210": ModelFacts(12.0, 2.5, 1.3, 50, 360, 648, gains=_P900),
     "XH430-W350": ModelFacts(12.0, 3.4, 1.3, 30, 130, 648, gains=_P900),
-    "XH430-V210": ModelFacts(
-        24.0, 2.6, 0.7, 52, 380, 689, 1.34e-3, volts=(110, 300), standby_a=0.036
-    ),
-    "XH430-V350": ModelFacts(
-        24.0, 3.3, 0.7, 31, 285, 689, 1.34e-3, volts=(110, 300), standby_a=0.036
-    ),
+    "XH430-V210": ModelFacts(24.0, 2.6, 0.7, 52, 380, 689, volts=(110, 300), standby_a=0.036),
+    "XH430-V350": ModelFacts(24.0, 3.3, 0.7, 31, 285, 689, volts=(110, 300), standby_a=0.036),
     "XD430-T210": ModelFacts(12.0, 2.5, 1.3, 50, 360, 648, gains=_P900),
     "XD430-T350": ModelFacts(12.0, 3.4, 1.3, 30, 130, 648, gains=_P900),
     # No specifications in the page's data: motor of XH430-W350, speed from Velocity Limit.

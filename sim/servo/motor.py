@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.arrays import AnyInts, Floats
+from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A
 from snakewalk.sim.plant import ServoDrive
 from snakewalk.sim.servo.models import MODELS, ModelFacts
 
@@ -26,6 +27,8 @@ _DIVISOR = 128.0
 _DIVISOR_330 = 256.0
 """The 330 models: the e-manual says 128 here too, but in recordings of a real XL330-M288 (Rhoban,
 bam) the output follows the position error at gain / 256, r > 0.998 at three gains, up to 885."""
+_CURRENT_UNIT_A = 2.69e-3
+"""Models that the register table does not list: as the others of the 12 V series (ours)."""
 _HEAVY_A = 1.6
 """Models that stall at less heat up quicker (ours)."""
 
@@ -63,7 +66,7 @@ class MotorModel:
         return self.nominal_v / self.no_load_rad_s
 
 
-def _motor(facts: ModelFacts) -> MotorModel:
+def _motor(model: str, facts: ModelFacts) -> MotorModel:
     small = facts.pwm_slope is not None
     light = small or facts.stall_current_a < _HEAVY_A
     return MotorModel(
@@ -71,7 +74,7 @@ def _motor(facts: ModelFacts) -> MotorModel:
         facts.stall_torque_n_m,
         facts.stall_current_a,
         facts.no_load_rpm * _RPM,
-        facts.current_unit_a,
+        CURRENT_UNIT_A.get(model, _CURRENT_UNIT_A),
         _DIVISOR_330 if small else _DIVISOR,
         facts.standby_a,
         12.0 if light else 6.0,
@@ -79,7 +82,7 @@ def _motor(facts: ModelFacts) -> MotorModel:
     )
 
 
-MOTORS: Mapping[str, MotorModel] = {model: _motor(facts) for model, facts in MODELS.items()}
+MOTORS: Mapping[str, MotorModel] = {model: _motor(model, facts) for model, facts in MODELS.items()}
 
 
 def p_gain_per_rad(register: int | AnyInts, motor: MotorModel) -> Floats:

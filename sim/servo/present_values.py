@@ -6,14 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
+from snakewalk.drivers.protocol.registers import (
+    CURRENT_MODE,
+    PWM_MODE,
+    VELOCITY_MODE,
+    VELOCITY_UNIT_RAD_S,
+)
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.control_loops import ControlLoops
 from snakewalk.sim.servo.motor import PWM_FULL, TICKS_PER_RAD, MotorModel
 from snakewalk.sim.servo.motor_output import MotorOutput
-from snakewalk.sim.servo.profile import VELOCITY_UNIT_RAD_S
 from snakewalk.sim.servo.protection import Protection
-from snakewalk.sim.servo.register_rules import CURRENT_MODE, PWM_MODE, VELOCITY_MODE
 from snakewalk.sim.servo.servo_loops import write_motion
 
 IN_POSITION_TICKS, FOLLOWING_TICKS = 20, 100

@@ -8,11 +8,8 @@ Profile Velocity 0 is a step, Profile Acceleration 0 a rectangle, else a trapezo
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
+from snakewalk.drivers.protocol.registers import ACCELERATION_UNIT_RAD_S2, VELOCITY_UNIT_RAD_S
 
-VELOCITY_UNIT_RAD_S = 0.229 * 2.0 * np.pi / 60.0
-"""Profile Velocity(112), Present Velocity(128): 0.229 rev/min a unit, e-manual."""
-ACCELERATION_UNIT_RAD_S2 = 214.577 * 2.0 * np.pi / 3600.0
-"""Profile Acceleration(108): 214.577 rev/min^2 a unit, e-manual."""
 STEP, RECTANGULAR, TRIANGULAR, TRAPEZOIDAL = 0x00, 0x10, 0x20, 0x30
 """Moving Status(123), bits 4 and 5."""
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
-from snakewalk.drivers.protocol.registers import Alarm
+from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V, Alarm
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.motor import MotorModel
@@ -131,7 +131,7 @@ class Protection:
         outside = (tenths < low) | (tenths > high)
         hot = np.rint(self.temperature_c) > hottest
         overload = self._blocked_s >= OVERLOAD_S
-        starved = (drive.supply_v < STARVED * low * 0.1) & (drive.torque_on > 0)
+        starved = (drive.supply_v < STARVED * low * VOLTAGE_UNIT_V) & (drive.torque_on > 0)
         self._note(
             Alarm.INPUT_VOLTAGE * outside
             | Alarm.OVERHEATING * hot

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from snakewalk.drivers.protocol.control_table import ControlTable, Register, load_control_table
+from snakewalk.drivers.protocol.registers import bauds_of
 from snakewalk.sim.servo.models import facts_of
 
 
@@ -30,17 +31,7 @@ EEPROM_END = 64
 """Addresses below are the EEPROM area: locked while Torque Enable(64) is 1."""
 EXTENDED_RANGE_TICKS = 1_048_575
 """Goal Position(116) in the multi-turn modes: -256 to 256 revolutions."""
-WATCHDOG_TRIPPED = 0xFF
-"""Bus Watchdog(98) reads -1 in its error state."""
 GOALS = ("Goal PWM", "Goal Current", "Goal Velocity", "Goal Position")
-CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, EXTENDED_MODE = 0, 1, 3, 4
-CURRENT_POSITION_MODE, PWM_MODE = 5, 16
-MODES = (0, 1, 3, 4, 5, 16)
-"""Operating Mode(11)."""
-CURRENT_MODES = (CURRENT_MODE, CURRENT_POSITION_MODE)
-"""Those that a model without current sensing lacks."""
-BAUDS = (9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
-"""Baud Rate(8), by value."""
 MODE_RESETS = (
     *("Velocity I Gain", "Velocity P Gain", "Position D Gain", "Position I Gain"),
     *("Position P Gain", "Feedforward 2nd Gain", "Feedforward 1st Gain"),
@@ -164,7 +155,7 @@ def _rules(model: str) -> dict[str, Rule]:
     gains = facts.gains
     own = {
         "Model Number": Rule(load_control_table(model).model_number),
-        "Baud Rate": Rule(1, 0, facts.bauds - 1),
+        "Baud Rate": Rule(1, 0, len(bauds_of(model)) - 1),
         "Moving Threshold": Rule(facts.moving_threshold, 0, 1_023),
         "Temperature Limit": Rule(facts.temperature_limit_c, 0, 100),
         "Max Voltage Limit": Rule(high, low, high),

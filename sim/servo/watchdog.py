@@ -7,10 +7,9 @@ has run out reads -1 until 0 is written. (e-manual, Bus Watchdog.)
 import numpy as np
 
 from snakewalk.config.arrays import Bools
+from snakewalk.drivers.protocol.registers import WATCHDOG_TRIPPED, WATCHDOG_UNIT_S
 from snakewalk.sim.servo.bank import ServoBank
-from snakewalk.sim.servo.register_rules import WATCHDOG_TRIPPED
 
-UNIT_S = 0.02
 ROUNDING_S = 1e-9
 """Times closer than this are the same."""
 
@@ -33,12 +32,12 @@ class Watchdog:
         dog = self._bank["Bus Watchdog"]
         self._watched = (dog > 0) & (dog < WATCHDOG_TRIPPED) & on
         watched = self._watched
-        self.timeout_s = UNIT_S * float(dog[watched].min()) if watched.any() else np.inf
+        self.timeout_s = WATCHDOG_UNIT_S * float(dog[watched].min()) if watched.any() else np.inf
         self.due_s = self.fed_s + self.timeout_s
 
     def trip(self, time_s: float) -> Bools:
         """Put those that have run out by ``time_s`` into the error state; which (S,) they are."""
         dog = self._bank["Bus Watchdog"]
-        late = self._watched & (self.fed_s + UNIT_S * dog <= time_s + ROUNDING_S)
+        late = self._watched & (self.fed_s + WATCHDOG_UNIT_S * dog <= time_s + ROUNDING_S)
         dog[late] = WATCHDOG_TRIPPED
         return late

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from snakewalk.drivers.protocol.packet import Instruction, ResultError
+from snakewalk.drivers.protocol.registers import ACCELERATION_UNIT_RAD_S2, VELOCITY_UNIT_RAD_S
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 from snakewalk.sim.servo.models import MODELS
-from snakewalk.sim.servo.profile import ACCELERATION_UNIT_RAD_S2, VELOCITY_UNIT_RAD_S, Trajectory
+from snakewalk.sim.servo.profile import Trajectory
 from tests.helpers.bus import a_line, ask, group_params, read, write
 
 RUN = ((64, 1, 1),)
