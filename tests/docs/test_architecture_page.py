@@ -1,0 +1,66 @@
+"""The page of rooms: all of them in their order, and the ways of data through files that exist."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.architecture.test_rooms import ORDER
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+LONGEST = {
+    "From a shape's coefficients to a joint goal": 12,
+    "From radians to bytes": 8,
+    "From bytes to radians": 8,
+    "A servo's fault, from its cause to the report": 12,
+    "`snakewalk run`, from the command to the loop": 15,
+}
+
+
+def ways() -> dict[str, list[tuple[str, str]]]:
+    """(file, name) of each step, by heading."""
+    sections = re.findall(r"^### (.+)\n((?:.*\n)*?)(?=^#|\Z)", PAGE, re.MULTILINE)
+    step = re.compile(r"^\d+\. `([\w/]+\.py)`: `(\w+)`", re.MULTILINE)
+    return {heading: step.findall(text) for heading, text in sections}
+
+
+def names_in(path: Path) -> set[str]:
+    """Functions, classes, methods and constants that a file defines."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.Assign):
+            found |= {target.id for target in node.targets if isinstance(target, ast.Name)}
+    return found
+
+
+def test_every_room_is_there_in_the_order_of_imports() -> None:
+    rows = re.findall(r"^\| `([\w/]+)` \| ", PAGE, re.MULTILINE)
+    rooms = [room.replace(".", "/") for rooms in ORDER.values() for room in rooms]
+    tops = [top for top in ORDER if top not in rooms]
+    assert [room for room in rows if room not in tops] == rooms
+
+
+def test_the_sub_rooms_of_app_are_named() -> None:
+    rooms = {path.parent.name for path in (ROOT / "controller" / "app").glob("*/__init__.py")}
+    assert {room for room in rooms if f"`{room}` (" not in PAGE} == set()
+
+
+@pytest.mark.parametrize("heading", LONGEST)
+def test_a_way_of_data_is_short_and_true(heading: str) -> None:
+    steps = ways()[heading]
+    assert len({file for file, _ in steps}) <= LONGEST[heading]
+    wrong = [
+        (file, name)
+        for file, name in steps
+        if not (ROOT / file).is_file() or name not in names_in(ROOT / file)
+    ]
+    assert wrong == []
+
+
+def test_no_way_is_left_unchecked() -> None:
+    assert set(ways()) == set(LONGEST)
