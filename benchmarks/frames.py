@@ -46,7 +46,7 @@ def run() -> list[Row]:
         plan = synthesise(
             walker.track, law, FRAMES, DT_S, segment_m, grow=lambda _: walker.decide(0.0, 0.0)
         )
-        return ground.frames(plan.angles_rad, plan.points_m[:, -1], segment_m, 0.03)
+        return ground.place(plan.angles_rad, plan.points_m[:, -1], segment_m, 0.03)
 
     spent_s = cpu_s(synthesis, 3)
     return [

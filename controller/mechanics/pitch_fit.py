@@ -1,6 +1,6 @@
-"""What the pitch joints do on uneven ground ([PT] 2.6.5 for a chain of links).
+"""The pitch fit: pitch goals that follow uneven ground ([PT] 2.6.5 for a chain of links).
 
-The ground step lays the links' middle line on the ground; pitch goals then bring the link centres
+The ground step places the links' middle line on the ground; pitch goals then bring the link centres
 as near to it as the robot can. A robot without pitch joints can only tilt as a whole, and the
 residual says how badly it lies.
 """
@@ -19,11 +19,11 @@ _REGULAR = 0.05  # of a link length: a straight body's roll changes no height; g
 
 
 @dataclass(frozen=True, slots=True)
-class Lifted:
-    """Pitch goals and how well the body then lies."""
+class PitchFit:
+    """Pitch goals, and how well the body then lies."""
 
     goal_rad: Floats
-    """(J,) goals, positive lifts the head side; 0 on yaw joints."""
+    """(J,) goals, positive raises the head side; 0 on yaw joints."""
     gap_m: Floats
     """(J + 1,) height of each link's centre over where the ground step puts it."""
     pitch_rad: Floats
@@ -35,7 +35,7 @@ class Lifted:
         return float(np.sqrt(np.mean(self.gap_m**2)))
 
 
-class Lift:
+class PitchFitter:
     """Pitch goals of one robot on one ground; ``None`` is a level floor."""
 
     def __init__(self, robot: RobotConfig, ground: HeightField | None) -> None:
@@ -48,7 +48,7 @@ class Lift:
         behind = np.arange(robot.joint_count + 1)[:, None] > self._pitch
         self._behind = behind.astype(float)
 
-    def __call__(self, head_in_world_m: ArrayLike, heading_rad: Floats) -> Lifted:
+    def __call__(self, head_in_world_m: ArrayLike, heading_rad: Floats) -> PitchFit:
         """Fit the chain to the ground under it.
 
         Heights of link centres are linear in the joints for the slopes that [PT] allows (25
@@ -62,8 +62,8 @@ class Lift:
         """
         forward = np.column_stack([np.cos(heading_rad), np.sin(heading_rad)])
         tip = np.asarray(head_in_world_m, float)[:2] + 0.5 * self._link_m * forward[0]
-        laid = self._step.one(heading_rad, tip, self._link_m, self._half_m, known="head")
-        wanted = 0.5 * (laid.points_m[1:, 2] + laid.points_m[:-1, 2])
+        skeleton = self._step.place(heading_rad, tip, self._link_m, self._half_m, known="head")
+        height = 0.5 * (skeleton.points_m[1:, 2] + skeleton.points_m[:-1, 2])
 
         ends = np.zeros((self._joints + 2, 2))
         ends[1:] = -self._link_m * np.cumsum(forward, axis=0)
@@ -73,7 +73,7 @@ class Lift:
         rise = np.column_stack([centres - centres.mean(axis=0), lever])
 
         mean = rise.mean(axis=0)
-        centred, target = rise - mean, wanted - wanted.mean()
+        centred, target = rise - mean, height - height.mean()
         normal = centred.T @ centred
         normal.flat[:: len(normal) + 1] += (_REGULAR * self._link_m) ** 2
         tilt = np.linalg.solve(normal, centred.T @ target)
@@ -81,4 +81,4 @@ class Lift:
         goal = np.zeros(self._joints)
         goal[self._pitch] = np.clip(tilt[2:], -self._limit_rad, self._limit_rad)
         tilt[2:] = goal[self._pitch]
-        return Lifted(goal, centred @ tilt - target, laid.pitch_rad)
+        return PitchFit(goal, centred @ tilt - target, skeleton.pitch_rad)

@@ -19,7 +19,7 @@ _NONE = np.zeros((3, 3))
 
 
 class NoBalanceError(ArithmeticError):
-    """The pull is more than friction can hold: a body without inertia would be infinitely fast."""
+    """The slope's load is more than friction holds: without inertia, an infinite velocity."""
 
 
 def rigid_velocity(
@@ -29,8 +29,8 @@ def rigid_velocity(
     friction: FrictionConfig,
     guess: Floats | None = None,
     *,
-    pull: Floats | None = None,
-    share: Floats | None = None,
+    tangential: Floats | None = None,
+    normal: Floats | None = None,
 ) -> Floats:
     """Velocity (vx, vy, omega) of a body frame at its origin that balances friction.
 
@@ -40,25 +40,25 @@ def rigid_velocity(
         shape_m_s: (L, 2) velocities of the links relative to the body frame.
         friction: the ellipse; every link carries the same weight.
         guess: start of the iteration, the last solution in a sequence.
-        pull: (L, 2) tangential part of gravity on each link, in the body frame, in weights of a
-            link: ``sin(slope)`` down the slope. None is level ground.
-        share: (L,) load of each link on the ground, in weights of a link: ``cos(slope)``.
+        tangential: (L, 2) part of gravity along the ground on each link, in the body frame, in
+            weights of a link: ``sin(slope)`` down the slope. None is level ground.
+        normal: (L,) load of each link on the ground, in weights of a link: ``cos(slope)``.
 
     Returns:
         (3,) m/s, m/s, rad/s.
 
     Raises:
-        NoBalanceError: the pull is more than friction can hold; the body slides.
+        NoBalanceError: the slope's load is more than friction can hold; the body slides.
 
     """
     velocity = np.zeros(3) if guess is None else np.array(guess, dtype=float)
-    fall = np.zeros(3) if pull is None else _about(points_m, pull)
-    if not _solved(points_m, headings_rad, shape_m_s, friction, share, fall, _NONE, velocity):
+    linear = np.zeros(3) if tangential is None else _wrench(points_m, tangential)
+    if not _solved(points_m, headings_rad, shape_m_s, friction, normal, linear, _NONE, velocity):
         raise NoBalanceError
     return velocity
 
 
-def carried_velocity(
+def inertial_velocity(
     points_m: Floats,
     headings_rad: Floats,
     shape_m_s: Floats,
@@ -67,8 +67,8 @@ def carried_velocity(
     step_s: float,
     guess: Floats | None = None,
     *,
-    pull: Floats | None = None,
-    share: Floats | None = None,
+    tangential: Floats | None = None,
+    normal: Floats | None = None,
 ) -> Floats:
     """``rigid_velocity`` of a body with inertia, at the end of a step (implicit Euler).
 
@@ -83,26 +83,26 @@ def carried_velocity(
         before_m_s: (L, 2) velocities of the links at the start of the step, in the body frame.
         step_s: of time.
         guess: as in ``rigid_velocity``.
-        pull: likewise.
-        share: likewise.
+        tangential: likewise.
+        normal: likewise.
 
     Returns:
         (3,) m/s, m/s, rad/s.
 
     """
     velocity = np.zeros(3) if guess is None else np.array(guess, dtype=float)
-    heavy = 1.0 / (GRAVITY_M_S2 * step_s)
+    inertia = 1.0 / (GRAVITY_M_S2 * step_s)
     x, y = points_m[:, 0], points_m[:, 1]
     links, sx, sy = float(len(x)), x.sum(), y.sum()
-    heft = heavy * np.array([[links, 0.0, -sy], [0.0, links, sx], [-sy, sx, x @ x + y @ y]])
-    fall = heavy * _about(points_m, before_m_s - shape_m_s)
-    if pull is not None:
-        fall += _about(points_m, pull)
-    _solved(points_m, headings_rad, shape_m_s, friction, share, fall, heft, velocity)
+    quadratic = inertia * np.array([[links, 0.0, -sy], [0.0, links, sx], [-sy, sx, x @ x + y @ y]])
+    linear = inertia * _wrench(points_m, before_m_s - shape_m_s)
+    if tangential is not None:
+        linear += _wrench(points_m, tangential)
+    _solved(points_m, headings_rad, shape_m_s, friction, normal, linear, quadratic, velocity)
     return velocity
 
 
-def _about(points_m: Floats, force: Floats) -> Floats:
+def _wrench(points_m: Floats, force: Floats) -> Floats:
     """Sum (3,) of forces (L, 2) and of their moments about the origin."""
     (px, py), (x, y) = force.T, points_m.T
     return np.array([px.sum(), py.sum(), x @ py - y @ px])
@@ -113,9 +113,9 @@ def _solved(
     headings_rad: Floats,
     shape_m_s: Floats,
     friction: FrictionConfig,
-    share: Floats | None,
-    fall: Floats,
-    heft: Floats,
+    normal: Floats | None,
+    linear: Floats,
+    quadratic: Floats,
     velocity: Floats,
 ) -> bool:
     """``_balance`` of arrays of any layout."""
@@ -125,9 +125,9 @@ def _solved(
         np.ascontiguousarray(shape_m_s, dtype=float),
         friction.along,
         friction.across,
-        np.ones(len(points_m)) if share is None else np.ascontiguousarray(share, dtype=float),
-        fall,
-        heft,
+        np.ones(len(points_m)) if normal is None else np.ascontiguousarray(normal, dtype=float),
+        linear,
+        quadratic,
         velocity,
     )
 
@@ -137,14 +137,14 @@ def _solved(
     " float64[::1])"
 )
 def _power(
-    rows: Floats, start: Floats, still: float, fall: Floats, heft: Floats, w: Floats
+    rows: Floats, start: Floats, still: float, linear: Floats, quadratic: Floats, w: Floats
 ) -> float:
-    """Dissipated by all links, less what the pull does; arguments as in ``_balance``."""
+    """Power that all links dissipate, less gravity's; arguments as in ``_balance``."""
     power = 0.0
     for i in range(3):
-        power -= fall[i] * w[i]
+        power -= linear[i] * w[i]
         for j in range(3):
-            power += 0.5 * heft[i, j] * w[i] * w[j]
+            power += 0.5 * quadratic[i, j] * w[i] * w[j]
     for k in range(len(start)):
         u, v = start[k, 0], start[k, 1]
         for i in range(3):
@@ -174,8 +174,8 @@ def _solve(a: Floats, b: Floats, x: Floats) -> None:
 
 
 @compiled("boolean(float64[:, ::1], float64[::1], float64[::1])")
-def _runaway(rows: Floats, fall: Floats, w: Floats) -> bool:
-    """Whether the pull outdoes friction ever faster in the direction ``w``: no minimum."""
+def _is_unbounded(rows: Floats, linear: Floats, w: Floats) -> bool:
+    """Whether gravity outdoes friction ever faster in the direction ``w``: no minimum."""
     power = 0.0
     for k in range(len(rows) // 2):
         u, v = 0.0, 0.0
@@ -183,7 +183,7 @@ def _runaway(rows: Floats, fall: Floats, w: Floats) -> bool:
             u += rows[2 * k, i] * w[i]
             v += rows[2 * k + 1, i] * w[i]
         power += np.sqrt(u * u + v * v)
-    gain = fall[0] * w[0] + fall[1] * w[1] + fall[2] * w[2]
+    gain = linear[0] * w[0] + linear[1] * w[1] + linear[2] * w[2]
     return bool(power < (1.0 - 1e-9) * gain)
 
 
@@ -197,14 +197,14 @@ def _balance(
     shape_m_s: Floats,
     along: float,
     across: float,
-    share: Floats,
-    fall: Floats,
-    heft: Floats,
+    normal: Floats,
+    linear: Floats,
+    quadratic: Floats,
     w: Floats,
 ) -> bool:
     """Newton's method on the power, from ``w`` (3,) on, which is written; whether it has a minimum.
 
-    ``fall`` (3,) is the pull's power per (vx, vy, omega), ``heft`` (3, 3) a quadratic term.
+    ``linear`` (3,) is gravity's power per (vx, vy, omega), ``quadratic`` (3, 3) that of inertia.
     """
     links = len(points_m)
     # weighted along and across velocity of each link as a linear map of (vx, vy, omega)
@@ -212,25 +212,27 @@ def _balance(
     for k in range(links):
         c, s = np.cos(headings_rad[k]), np.sin(headings_rad[k])
         x, y = points_m[k, 0], points_m[k, 1]
-        ease, grip = along * share[k], across * share[k]
+        along_k, across_k = along * normal[k], across * normal[k]
         rows[2 * k, 0], rows[2 * k, 1], rows[2 * k, 2] = (
-            c * ease,
-            s * ease,
-            (s * x - c * y) * ease,
+            c * along_k,
+            s * along_k,
+            (s * x - c * y) * along_k,
         )
-        rows[2 * k + 1, 0], rows[2 * k + 1, 1] = -s * grip, c * grip
-        rows[2 * k + 1, 2] = (c * x + s * y) * grip
+        rows[2 * k + 1, 0], rows[2 * k + 1, 1] = -s * across_k, c * across_k
+        rows[2 * k + 1, 2] = (c * x + s * y) * across_k
         u, v = shape_m_s[k, 0], shape_m_s[k, 1]
-        start[k, 0], start[k, 1] = (c * u + s * v) * ease, (c * v - s * u) * grip
+        start[k, 0], start[k, 1] = (c * u + s * v) * along_k, (c * v - s * u) * across_k
     still = _STILL_M_S * across
-    gradient, step, pull, trial = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    gradient, step, direction, trial = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     hessian = np.empty((3, 3))
-    falling = not heft.any() and (fall[0] != 0.0 or fall[1] != 0.0 or fall[2] != 0.0)
-    best = _power(rows, start, still, fall, heft, w)
+    may_slide = not quadratic.any() and (linear[0] != 0.0 or linear[1] != 0.0 or linear[2] != 0.0)
+    best = _power(rows, start, still, linear, quadratic, w)
     for _ in range(_STEPS):
         for i in range(3):
-            gradient[i] = heft[i, 0] * w[0] + heft[i, 1] * w[1] + heft[i, 2] * w[2] - fall[i]
-        hessian[:] = heft
+            gradient[i] = (
+                quadratic[i, 0] * w[0] + quadratic[i, 1] * w[1] + quadratic[i, 2] * w[2] - linear[i]
+            )
+        hessian[:] = quadratic
         for k in range(links):
             u, v = start[k, 0], start[k, 1]
             for i in range(3):
@@ -238,13 +240,13 @@ def _balance(
                 v += rows[2 * k + 1, i] * w[i]
             size = np.sqrt(u * u + v * v + still * still)
             for i in range(3):
-                pull[i] = (u * rows[2 * k, i] + v * rows[2 * k + 1, i]) / size
-                gradient[i] += pull[i]
+                direction[i] = (u * rows[2 * k, i] + v * rows[2 * k + 1, i]) / size
+                gradient[i] += direction[i]
             for i in range(3):
                 for j in range(i + 1):
                     stiff = rows[2 * k, i] * rows[2 * k, j]
                     stiff += rows[2 * k + 1, i] * rows[2 * k + 1, j]
-                    hessian[i, j] += (stiff - pull[i] * pull[j]) / size
+                    hessian[i, j] += (stiff - direction[i] * direction[j]) / size
         steepest = max(abs(gradient[0]), abs(gradient[1]), abs(gradient[2]))
         if steepest < 1e-9 * links * across:
             break
@@ -254,15 +256,15 @@ def _balance(
         slope = gradient[0] * step[0] + gradient[1] * step[1] + gradient[2] * step[2]
         scale = 1.0
         trial[:] = w + step
-        now = _power(rows, start, still, fall, heft, trial)
+        now = _power(rows, start, still, linear, quadratic, trial)
         while now > best + 1e-4 * scale * slope and scale > 1e-9:
             scale *= 0.5
             trial[:] = w + scale * step
-            now = _power(rows, start, still, fall, heft, trial)
+            now = _power(rows, start, still, linear, quadratic, trial)
         if now >= best:
             break
         w[:] = trial
         best = now
-        if falling and _runaway(rows, fall, w):
+        if may_slide and _is_unbounded(rows, linear, w):
             return False
     return True

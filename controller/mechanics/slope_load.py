@@ -1,4 +1,4 @@
-"""What a hillside does to a planar body: it bears less, and gravity pulls it down the slope."""
+"""The load of a slope on a planar body: less on the ground, and gravity's part down the slope."""
 
 import numpy as np
 
@@ -10,30 +10,37 @@ from snakewalk.controller.mechanics.rigid_motion import NoBalanceError, rigid_ve
 _HALVINGS = 20
 
 
-def pull_and_share(ground: HeightField | None, link_m: Floats) -> tuple[Floats, Floats]:
-    """Gravity on each link, in its weights: (L, 2) along the ground in plan, (L,) into it.
+def slope_load(ground: HeightField | None, link_m: Floats) -> tuple[Floats, Floats]:
+    """Gravity on each link in weights of a link: (L, 2) along the ground in plan, (L,) into it.
 
     Args:
         ground: None is a level floor.
-        link_m: (L, 2 or more) link centres in the world; each is borne by the triangle under it.
+        link_m: (L, 2 or more) link centres in the world; each stands on the triangle under it.
 
     """
     if ground is None:
         return np.zeros((len(link_m), 2)), np.ones(len(link_m))
     _, gx, gy = ground.plane(link_m[:, 0], link_m[:, 1])
-    share = 1.0 / np.sqrt(1.0 + gx**2 + gy**2)
-    return np.stack([-gx * share, -gy * share], axis=1), share
+    normal = 1.0 / np.sqrt(1.0 + gx**2 + gy**2)
+    return np.stack([-gx * normal, -gy * normal], axis=1), normal
 
 
-def held_factor(
-    points_m: Floats, headings_rad: Floats, friction: FrictionConfig, pull: Floats, share: Floats
+def holding_factor(
+    points_m: Floats,
+    headings_rad: Floats,
+    friction: FrictionConfig,
+    tangential: Floats,
+    normal: Floats,
 ) -> float:
-    """Largest factor, at most 1, on ``pull`` at which friction still holds the body."""
+    """Largest factor on ``tangential``, at most 1, at which friction still holds the body."""
     still, low, high = np.zeros_like(points_m), 0.0, 1.0
     for _ in range(_HALVINGS):
         factor = 0.5 * (low + high)
         try:
-            rigid_velocity(points_m, headings_rad, still, friction, pull=factor * pull, share=share)
+            rigid_velocity(
+                points_m, headings_rad, still, friction,
+                tangential=factor * tangential, normal=normal,
+            )  # fmt: skip
             low = factor
         except NoBalanceError:
             high = factor

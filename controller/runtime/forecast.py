@@ -19,10 +19,10 @@ from snakewalk.controller.kinematics.links import BodyView, body_in_world, mean_
 from snakewalk.controller.mechanics.load import friction_n, yaw_load_n_m
 from snakewalk.controller.mechanics.rigid_motion import (
     NoBalanceError,
-    carried_velocity,
+    inertial_velocity,
     rigid_velocity,
 )
-from snakewalk.controller.mechanics.slope_load import held_factor, pull_and_share
+from snakewalk.controller.mechanics.slope_load import holding_factor, slope_load
 from snakewalk.controller.walk.pilot import Pilot
 
 
@@ -125,27 +125,34 @@ def forecast(
         points, headings = before.link_m[:, :2], before.headings_rad
         c, s = np.cos(head_rad), np.sin(head_rad)
         turn = np.array([[c, -s], [s, c]])
-        pull, share = pull_and_share(ground, view.link_m)
-        pull = pull @ turn
+        tangential, normal = slope_load(ground, view.link_m)
+        tangential = tangential @ turn
         was_m_s = moving_m_s @ turn
         try:
             velocity = rigid_velocity(
-                points, headings, shape_m_s, friction, velocity, pull=pull, share=share
+                points,
+                headings,
+                shape_m_s,
+                friction,
+                velocity,
+                tangential=tangential,
+                normal=normal,
             )
             held = True
         except NoBalanceError:
-            velocity = carried_velocity(
+            velocity = inertial_velocity(
                 points, headings, shape_m_s, friction, was_m_s, step_s, velocity,
-                pull=pull, share=share,
+                tangential=tangential, normal=normal,
             )  # fmt: skip
             held = False
         lever = np.stack([-points[:, 1], points[:, 0]], axis=1)
         moving = shape_m_s + velocity[:2] + velocity[2] * lever
         force_n = (
-            friction_n(moving, headings, friction, weight_n) * share[:, None] + weight_n * pull
+            friction_n(moving, headings, friction, weight_n) * normal[:, None]
+            + weight_n * tangential
         )
         if not held:
-            slide = _worse(slide, points, headings, friction, pull, share, step_s)
+            slide = _worse(slide, points, headings, friction, tangential, normal, step_s)
             force_n -= robot.link_mass_kg * (moving - was_m_s) / step_s
         moving_m_s = moving @ turn.T
         torques.append(yaw * yaw_load_n_m(points, headings, robot.link_length_m, force_n))
@@ -176,13 +183,13 @@ def _worse(
     points_m: Floats,
     headings_rad: Floats,
     friction: FrictionConfig,
-    pull: Floats,
-    share: Floats,
+    tangential: Floats,
+    normal: Floats,
     step_s: float,
 ) -> Slide:
     """Add a step that nothing holds; keep where the body falls short most."""
-    factor = held_factor(points_m, headings_rad, friction, pull, share)
-    steepness = float(np.hypot(*(pull / share[:, None]).mean(axis=0)))
+    factor = holding_factor(points_m, headings_rad, friction, tangential, normal)
+    steepness = float(np.hypot(*(tangential / normal[:, None]).mean(axis=0)))
     slope_rad, held_rad = float(np.arctan(steepness)), float(np.arctan(factor * steepness))
     lasted_s = step_s + (slide.lasted_s if slide else 0.0)
     if slide is not None and slide.held_rad - slide.slope_rad <= held_rad - slope_rad:

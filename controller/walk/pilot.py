@@ -19,7 +19,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.rotations import offset_rad
-from snakewalk.controller.mechanics.pitch_fit import Lift
+from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.walk.angle_track import AngleTrack
@@ -66,7 +66,7 @@ class Pilot:
         *,
         pace: Pace,
         plan: Planner,
-        lift: Lift | None = None,
+        pitch_fitter: PitchFitter | None = None,
         fall_back: Callable[[bool], None] = lambda lost: None,
         start_m: Floats,
         waypoints_m: Sequence[tuple[float, float]],
@@ -84,7 +84,7 @@ class Pilot:
         self._gain_rad_s2 = np.zeros(len(self._goal_rad))
         self._last_s = self._saved_s = 0.0
         self._plan = plan
-        self._lift = lift
+        self._pitch_fitter = pitch_fitter
         self._fall_back = fall_back
         self._pitch_rad: Floats | None = None
         self._waypoints_m = np.asarray(waypoints_m, float)
@@ -182,9 +182,9 @@ class Pilot:
 
         The pitch is smoothed over ``_LIFT_S``, because the ground is known in facets.
         """
-        if self._lift is None:
+        if self._pitch_fitter is None:
             return goal_rad
-        wanted = self._lift(view.link_m[0], view.headings_rad).goal_rad
+        wanted = self._pitch_fitter(view.link_m[0], view.headings_rad).goal_rad
         if self._pitch_rad is None:
             self._pitch_rad = wanted
         self._pitch_rad = self._pitch_rad + min(1.0, dt_s / _LIFT_S) * (wanted - self._pitch_rad)

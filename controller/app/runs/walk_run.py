@@ -15,7 +15,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.runs.prepared_run import pose_with
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.kinematics.retarget import Retarget
-from snakewalk.controller.mechanics.pitch_fit import Lift
+from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.controller.mechanics.traction import quasi_static_gain
 from snakewalk.controller.motion.source import MotionSource, Pace
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
@@ -83,9 +83,9 @@ class WalkRun:
         return self.planner.plan(np.vstack([self.run.start_m, self.run.waypoints_m]))
 
     @cached_property
-    def lift(self) -> Lift:
-        """Lays the chain on the ground; on a level floor it lifts nothing."""
-        return Lift(self.robot, self.ground)
+    def pitch_fitter(self) -> PitchFitter:
+        """Fits the pitch joints to the ground; on a level floor it bends none."""
+        return PitchFitter(self.robot, self.ground)
 
     @cached_property
     def gain(self) -> float:
@@ -130,7 +130,7 @@ class WalkRun:
             ),
             pace=Pace.limit(robot),
             plan=self.planner,
-            lift=None if level or self.ground is None else self.lift,
+            pitch_fitter=None if level or self.ground is None else self.pitch_fitter,
             fall_back=source.fall_back if isinstance(source, Fallback) else lambda lost: None,
             start_m=np.array(run.start_m),
             waypoints_m=run.waypoints_m,

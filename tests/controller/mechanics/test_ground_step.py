@@ -1,5 +1,8 @@
 """The ground step: exact lengths on any ground, closed forms on planes, one body or many."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +10,8 @@ from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 
 from snakewalk.config.heightfield import HeightField
-from snakewalk.controller.mechanics.ground_step import GroundStep, scalar_plane
+from snakewalk.controller.mechanics import ground_step
+from snakewalk.controller.mechanics.ground_step import GroundStep, Known
 
 R = 0.012
 S = (np.arange(100) + 0.5) / 100
@@ -37,7 +41,7 @@ def test_segment_lengths_are_exact_and_every_point_touches(
     seed: int, height_m: float, turn: float, known: str
 ) -> None:
     ground = rough(seed, height_m)  # up to 80 degrees
-    laid = GroundStep(ground).one(WAVE + turn, (0.1, -0.2), R, TAPERED, known)
+    laid = GroundStep(ground).place(WAVE + turn, (0.1, -0.2), R, TAPERED, known)
     lengths = np.linalg.norm(np.diff(laid.points_m, axis=0), axis=1)
     np.testing.assert_allclose(lengths, R, rtol=1e-12)
     lifted = ground.elevation_m(laid.points_m[:, 0], laid.points_m[:, 1]) + TAPERED
@@ -46,7 +50,7 @@ def test_segment_lengths_are_exact_and_every_point_touches(
 
 
 def test_segments_keep_their_heading_and_say_their_pitch() -> None:
-    laid = GroundStep(rough(3, 0.04)).one(WAVE, (0.0, 0.0), R, TAPERED)
+    laid = GroundStep(rough(3, 0.04)).place(WAVE, (0.0, 0.0), R, TAPERED)
     step = laid.points_m[:-1] - laid.points_m[1:]
     np.testing.assert_allclose(np.arctan2(step[:, 1], step[:, 0]), WAVE, atol=1e-9)
     np.testing.assert_allclose(np.arcsin(step[:, 2] / R), laid.pitch_rad, atol=1e-9)
@@ -57,22 +61,22 @@ def test_segments_keep_their_heading_and_say_their_pitch() -> None:
 def test_on_an_incline_the_pitch_is_the_slope_in_the_direction_of_travel(
     incline: float, heading: float
 ) -> None:
-    laid = GroundStep(slope(incline)).one(np.full(20, heading), (0.0, 0.0), 0.05, 0.03)
+    laid = GroundStep(slope(incline)).place(np.full(20, heading), (0.0, 0.0), 0.05, 0.03)
     expected = np.arctan(np.tan(incline) * np.cos(heading))
     np.testing.assert_allclose(laid.pitch_rad, expected, atol=1e-8)
 
 
 def test_on_a_level_floor_a_tapered_body_tilts_by_its_taper_alone() -> None:
     half = np.linspace(0.03, 0.01, 101)  # thick at the head
-    laid = GroundStep(None).one(WAVE, (0.0, 0.0), R, half)
+    laid = GroundStep(None).place(WAVE, (0.0, 0.0), R, half)
     np.testing.assert_allclose(laid.points_m[:, 2], half, atol=1e-12)
     np.testing.assert_allclose(laid.pitch_rad, np.arcsin(0.0002 / R), rtol=1e-9)
 
 
 def test_tail_first_and_head_first_give_the_same_body() -> None:
     ground = GroundStep(rough(5, 0.02))
-    tail_first = ground.one(WAVE, (-0.3, 0.1), R, TAPERED)
-    head_first = ground.one(WAVE, tail_first.points_m[0, :2], R, TAPERED, "head")
+    tail_first = ground.place(WAVE, (-0.3, 0.1), R, TAPERED)
+    head_first = ground.place(WAVE, tail_first.points_m[0, :2], R, TAPERED, "head")
     np.testing.assert_allclose(head_first.points_m, tail_first.points_m, atol=1e-9)
 
 
@@ -80,9 +84,9 @@ def test_all_frames_at_once_are_the_frames_one_by_one() -> None:
     ground = GroundStep(rough(7, 0.05))
     angles = WAVE + np.linspace(0, 6, 12)[:, None]
     known = np.random.default_rng(1).uniform(-0.4, 0.4, (12, 2))
-    batch = ground.frames(angles, known, R, TAPERED)
+    batch = ground.place(angles, known, R, TAPERED)
     for k in range(12):
-        one = ground.one(angles[k], known[k], R, TAPERED)
+        one = ground.place(angles[k], known[k], R, TAPERED)
         np.testing.assert_allclose(batch.points_m[k], one.points_m, atol=1e-12)
         np.testing.assert_allclose(batch.pitch_rad[k], one.pitch_rad, atol=1e-9)
 
@@ -91,7 +95,7 @@ def test_a_cliff_is_climbed_and_a_body_hangs_over_the_next() -> None:
     z = np.zeros((4, 41))
     z[:, 20:28] = 0.5  # a block with faces of 0.1 m, steeper than 78 degrees
     ground = HeightField(z, 0.1, -2.0, -0.2)
-    laid = GroundStep(ground).one(np.zeros(30), (-0.6, 0.0), 0.08, 0.0)
+    laid = GroundStep(ground).place(np.zeros(30), (-0.6, 0.0), 0.08, 0.0)
     np.testing.assert_allclose(np.linalg.norm(np.diff(laid.points_m, axis=0), axis=1), 0.08)
     np.testing.assert_allclose(laid.gap_m, 0.0, atol=1e-9)
     assert laid.points_m[:, 2].max() == pytest.approx(0.5)
@@ -102,8 +106,8 @@ def test_a_taper_steeper_than_the_half_circle_stands_upright_and_says_so() -> No
     half = np.zeros(4)
     half[1] = 0.5
     for laid in (
-        GroundStep(None).one(np.zeros(3), (0.0, 0.0), 0.1, half),
-        GroundStep(None).frames(np.zeros((2, 3)), (0.0, 0.0), 0.1, half),
+        GroundStep(None).place(np.zeros(3), (0.0, 0.0), 0.1, half),
+        GroundStep(None).place(np.zeros((2, 3)), (0.0, 0.0), 0.1, half),
     ):
         # the third point reaches 0.1 of 0.5; the head then comes down to the floor, in reach
         gap = np.atleast_2d(laid.gap_m)[0]
@@ -112,25 +116,39 @@ def test_a_taper_steeper_than_the_half_circle_stands_upright_and_says_so() -> No
 
 
 def test_beyond_the_border_the_edge_goes_on_level() -> None:
-    laid = GroundStep(slope(0.3)).one(np.zeros(50), (4.0, 0.0), 0.1, 0.0)
+    laid = GroundStep(slope(0.3)).place(np.zeros(50), (4.0, 0.0), 0.1, 0.0)
     assert laid.points_m[0, 0] > 5.5
     np.testing.assert_allclose(laid.pitch_rad[:20], 0.0, atol=1e-8)
 
 
-def test_the_scalar_look_up_is_the_field() -> None:
+@pytest.mark.parametrize("plane", [ground_step._plane, ground_step._plane.py_func])
+def test_the_look_up_of_one_point_is_that_of_the_field(plane: Callable[..., Any]) -> None:
     field = rough(9, 0.1)
-    plane = scalar_plane(field)
     x, y = np.random.default_rng(2).uniform(-1.6, 1.6, (2, 200))
     expected = np.stack(field.plane(x, y), axis=1)
-    got = [plane(a, b) for a, b in zip(x.tolist(), y.tolist(), strict=True)]
+    where = field.z_m, field.x0_m, field.y0_m, field.spacing_m
+    got = [plane(*where, a, b) for a, b in zip(x.tolist(), y.tolist(), strict=True)]
     np.testing.assert_allclose(got, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("known", ["tail", "head"])
+def test_the_loop_gives_the_same_compiled_and_interpreted(
+    known: Known, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ground = GroundStep(rough(7, 0.05))
+    fast = ground.place(WAVE, (0.1, 0.2), R, TAPERED, known)
+    monkeypatch.setattr(ground_step, "_place", ground_step._place.py_func)
+    slow = ground.place(WAVE, (0.1, 0.2), R, TAPERED, known)
+    np.testing.assert_allclose(fast.points_m, slow.points_m, atol=1e-14)
+    np.testing.assert_allclose(fast.pitch_rad, slow.pitch_rad, atol=1e-12)
+    np.testing.assert_allclose(fast.gap_m, slow.gap_m, atol=1e-12)
 
 
 def test_printed_lifting_after_the_crossing_changes_segment_lengths() -> None:
     half = np.linspace(0.03, 0.0, 11)  # a strong taper: 3 mm a segment of 12
-    bare = GroundStep(slope(0.35)).one(np.zeros(10), (0.0, 0.0), R, 0.0).points_m
+    bare = GroundStep(slope(0.35)).place(np.zeros(10), (0.0, 0.0), R, 0.0).points_m
     printed = bare + np.column_stack([np.zeros((11, 2)), half])
-    ours = GroundStep(slope(0.35)).one(np.zeros(10), (0.0, 0.0), R, half).points_m
+    ours = GroundStep(slope(0.35)).place(np.zeros(10), (0.0, 0.0), R, half).points_m
     drift = np.linalg.norm(np.diff(printed, axis=0), axis=1) / R - 1.0
     assert np.abs(drift).min() > 0.09
     np.testing.assert_allclose(np.linalg.norm(np.diff(ours, axis=0), axis=1), R, rtol=1e-12)

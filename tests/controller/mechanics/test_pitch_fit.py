@@ -7,7 +7,7 @@ from scipy.ndimage import gaussian_filter
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.kinematics.links import body_in_world
-from snakewalk.controller.mechanics.pitch_fit import Lift
+from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.drivers.types import BodyPose
 
 YAW, BOTH, LONG = (load_robot(name) for name in ("yaw16", "alternating16", "alternating32"))
@@ -28,32 +28,34 @@ def headings(robot, amplitude: float) -> np.ndarray:
 def test_nothing_lifts_on_a_floor_or_on_an_incline(robot) -> None:
     incline = HeightField(np.tile(0.3 * X, (len(X), 1)), 0.05, -3.0, -3.0)
     for ground in (None, incline):
-        straight = Lift(robot, ground)((0.6, 0.1), headings(robot, 0.0) + 0.4)
+        straight = PitchFitter(robot, ground)((0.6, 0.1), headings(robot, 0.0) + 0.4)
         np.testing.assert_allclose(straight.goal_rad, 0.0, atol=2e-3)
         assert straight.residual_m < 1e-4
-    bent = Lift(robot, None)((0.6, 0.1), headings(robot, 0.8))
+    bent = PitchFitter(robot, None)((0.6, 0.1), headings(robot, 0.8))
     np.testing.assert_allclose(bent.goal_rad, 0.0, atol=1e-9)
 
 
 def test_over_a_ridge_the_joints_carry_the_change_of_slope() -> None:
     # head on the far side, tail on the near one: the body is bent down at both ends
-    lifted = Lift(BOTH, ridge(0.08))((0.5, 0.0), np.zeros(17))
-    goals = lifted.goal_rad[list(BOTH.pitch_joints)]
-    assert not lifted.goal_rad[list(BOTH.yaw_joints)].any()
+    fit = PitchFitter(BOTH, ridge(0.08))((0.5, 0.0), np.zeros(17))
+    goals = fit.goal_rad[list(BOTH.pitch_joints)]
+    assert not fit.goal_rad[list(BOTH.yaw_joints)].any()
     assert goals[1:-1].max() < 0.0
-    change = lifted.pitch_rad[0] - lifted.pitch_rad[-1]
+    change = fit.pitch_rad[0] - fit.pitch_rad[-1]
     assert goals.sum() == pytest.approx(change, rel=0.2)
 
 
 def test_in_a_valley_the_signs_turn_over() -> None:
-    over, under = (Lift(BOTH, ridge(h))((0.5, 0.0), np.zeros(17)).goal_rad for h in (0.08, -0.08))
+    over, under = (
+        PitchFitter(BOTH, ridge(h))((0.5, 0.0), np.zeros(17)).goal_rad for h in (0.08, -0.08)
+    )
     np.testing.assert_allclose(over, -under, atol=2e-3)
 
 
 def test_a_robot_without_pitch_joints_reports_how_badly_it_lies() -> None:
-    stiff = [Lift(YAW, ridge(h))((0.5, 0.0), np.zeros(17)).residual_m for h in (0.02, 0.04)]
-    free = Lift(BOTH, ridge(0.04))((0.5, 0.0), np.zeros(17)).residual_m
-    assert not Lift(YAW, ridge(0.04))((0.5, 0.0), np.zeros(17)).goal_rad.any()
+    stiff = [PitchFitter(YAW, ridge(h))((0.5, 0.0), np.zeros(17)).residual_m for h in (0.02, 0.04)]
+    free = PitchFitter(BOTH, ridge(0.04))((0.5, 0.0), np.zeros(17)).residual_m
+    assert not PitchFitter(YAW, ridge(0.04))((0.5, 0.0), np.zeros(17)).goal_rad.any()
     assert stiff[1] == pytest.approx(2 * stiff[0], rel=0.05)
     assert free < 0.1 * stiff[1]
 
@@ -63,7 +65,7 @@ def test_the_real_chain_with_these_goals_lies_on_the_ground(robot) -> None:
     rng = np.random.default_rng(4)
     noise = gaussian_filter(rng.normal(size=(len(X), len(X))), 6.0)
     ground = HeightField(noise / noise.std() * 0.05, 0.05, -3.0, -3.0)
-    lift, stiff = Lift(robot, ground), []
+    fitter, stiff = PitchFitter(robot, ground), []
     for _ in range(20):
         heading = headings(robot, 0.7) + rng.uniform(-3, 3)
         head = rng.uniform(-1, 1, 2)
@@ -71,7 +73,7 @@ def test_the_real_chain_with_these_goals_lies_on_the_ground(robot) -> None:
         yaw = list(robot.yaw_joints)
         joints[yaw] = (heading[:-1] - heading[1:])[yaw]
         rms = []
-        for goals in (joints + lift(head, heading).goal_rad, joints):
+        for goals in (joints + fitter(head, heading).goal_rad, joints):
             view = body_in_world(robot, pose(head, heading[0]), goals)
             # free height, roll and pitch of the body as a whole: what is left must be small
             plane = np.column_stack([np.ones(len(heading)), view.link_m[:, :2]])
@@ -90,5 +92,5 @@ def pose(head_m: np.ndarray, heading: float) -> BodyPose:
 
 
 def test_goals_stay_within_the_joint_limits() -> None:
-    goals = Lift(BOTH, ridge(2.0))((0.9, 0.0), np.zeros(17)).goal_rad
+    goals = PitchFitter(BOTH, ridge(2.0))((0.9, 0.0), np.zeros(17)).goal_rad
     assert np.abs(goals).max() <= BOTH.pitch_limit_rad

@@ -9,10 +9,10 @@ from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.mechanics.rigid_motion import (
     NoBalanceError,
-    carried_velocity,
+    inertial_velocity,
     rigid_velocity,
 )
-from snakewalk.controller.mechanics.slope_load import held_factor
+from snakewalk.controller.mechanics.slope_load import holding_factor
 
 RNG = np.random.default_rng(11)
 SNAKE = FrictionConfig(along=0.1, across=0.7)
@@ -101,8 +101,8 @@ def ramp(slope_rad: float, down_rad: float, links: int = 17) -> dict[str, np.nda
     """Pull and share of links on a plane that falls by ``slope_rad`` towards ``down_rad``."""
     down = np.array([np.cos(down_rad), np.sin(down_rad)])
     return {
-        "pull": np.tile(np.sin(slope_rad) * down, (links, 1)),
-        "share": np.full(links, np.cos(slope_rad)),
+        "tangential": np.tile(np.sin(slope_rad) * down, (links, 1)),
+        "normal": np.full(links, np.cos(slope_rad)),
     }
 
 
@@ -118,7 +118,7 @@ def test_a_straight_body_lies_still_below_the_friction_angle_and_slides_above(
     with pytest.raises(NoBalanceError):
         rigid_velocity(LINE, np.zeros(17), still, SNAKE, **steep)
     expected = np.tan(holds_rad) / np.tan(1.01 * holds_rad)
-    assert held_factor(LINE, np.zeros(17), SNAKE, **steep) == pytest.approx(expected, abs=1e-3)
+    assert holding_factor(LINE, np.zeros(17), SNAKE, **steep) == pytest.approx(expected, abs=1e-3)
 
 
 @given(st.floats(0.05, 1.2), st.floats(-np.pi, np.pi))
@@ -126,7 +126,7 @@ def test_a_straight_body_holds_while_the_pull_is_inside_the_ellipse(
     slope: float, down: float
 ) -> None:
     share = np.hypot(np.cos(down) / SNAKE.along, np.sin(down) / SNAKE.across) * np.tan(slope)
-    found = held_factor(LINE, np.zeros(17), SNAKE, **ramp(slope, down))
+    found = holding_factor(LINE, np.zeros(17), SNAKE, **ramp(slope, down))
     assert found == pytest.approx(min(1.0, 1.0 / share), abs=1e-3)
 
 
@@ -163,8 +163,8 @@ def test_friction_carries_the_pull_of_the_slope() -> None:
         w = rigid_velocity(p0, h0, shape, SNAKE, **on)
         total, stuck = net(w, p0, h0, shape, SNAKE)
         total = total * np.cos(0.12)
-        total[:2] += on["pull"].sum(axis=0)
-        total[2] += (p0[:, 0] * on["pull"][:, 1] - p0[:, 1] * on["pull"][:, 0]).sum()
+        total[:2] += on["tangential"].sum(axis=0)
+        total[2] += (p0[:, 0] * on["tangential"][:, 1] - p0[:, 1] * on["tangential"][:, 0]).sum()
         assert np.abs(total[:2]).max() <= stuck * SNAKE.across + 0.01
         assert stuck <= 2
 
@@ -172,7 +172,7 @@ def test_friction_carries_the_pull_of_the_slope() -> None:
 @pytest.mark.parametrize("slope", [-0.2, 0.0, 0.2])
 def test_with_inertia_a_sliding_body_gains_what_friction_leaves_of_gravity(slope: float) -> None:
     before, step_s = np.tile([1.0, 0.0], (17, 1)), 0.02
-    w = carried_velocity(
+    w = inertial_velocity(
         LINE, np.zeros(17), np.zeros((17, 2)), SNAKE, before, step_s, **ramp(slope, 0.0)
     )
     gained = step_s * GRAVITY_M_S2 * (np.sin(slope) - SNAKE.along * np.cos(slope))
