@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.compiling import compiled, seen
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 Known = Literal["tail", "head"]
 _STEPS = 60
 _TOLERANCE = 1e-10  # of a segment length
-_FIELD = f"{seen(dimensions=2, layout='C')}, float64, float64, float64"
+_FIELD = f"{readonly_array(dimensions=2, layout='C')}, float64, float64, float64"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ def _plane(
 
 
 @compiled(
-    f"void({_FIELD}, float64[:, ::1], float64[:, ::1], {seen(dimensions=2)}, float64, {seen()},"
+    f"void({_FIELD}, float64[:, ::1], float64[:, ::1], {readonly_array(dimensions=2)}, float64, {readonly_array()},"
     " boolean, float64[:, :, ::1], float64[:, ::1], float64[:, ::1])"
 )
 def _place(
