@@ -111,8 +111,8 @@ def _plane(
 
 
 @compiled(
-    f"void({_FIELD}, float64[:, ::1], float64[:, ::1], {readonly_array(dimensions=2)}, float64, {readonly_array()},"
-    " boolean, float64[:, :, ::1], float64[:, ::1], float64[:, ::1])"
+    f"void({_FIELD}, float64[:, ::1], float64[:, ::1], {readonly_array(dimensions=2)}, float64,"
+    f" {readonly_array()}, boolean, float64[:, :, ::1], float64[:, ::1], float64[:, ::1])"
 )
 def _place(
     z_m: Floats,
