@@ -1,1 +1,1 @@
-"""recordings."""
+"""The work of the commands that take or make recordings: capture, track, and fish."""

@@ -1,4 +1,4 @@
-"""Recordings as numpy files: our own tracks, skeletons found in images, and joint angles."""
+"""Recordings as named arrays: .npz and MATLAB files of bodies, .npy files of joint angles."""
 
 import zipfile
 from collections.abc import Sequence
@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.readers.formats import KNOWN
 from snakewalk.controller.capture.resample import body_points
 from snakewalk.controller.capture.track import Track, track_from_points
 
 SKELETON_RATE_HZ = 30.0
 JOINT_RATE_HZ = 32.0
-"""Taken when nobody says otherwise: neither kind of file holds a frame rate."""
+"""Defaults: neither kind of file holds a frame rate."""
 _BODIES = ("points", "angles_rad", "x", "y", "skeletons")
 ARRAYS = {*_BODIES, "t", "rate_hz", "length_m", "score", "name", "source", "licence"}
-"""What is read of an .npz; others, such as the widths of a body, stay in the file."""
+"""The arrays that are read of an .npz; others, such as the widths of a body, stay in the file."""
 
 
 def save_track(path: Path, track: Track) -> None:
@@ -37,7 +38,7 @@ def save_track(path: Path, track: Track) -> None:
 
 
 def load_npz(file: Path, rate_hz: float | None, least_score: float | None = None) -> Track:
-    """Load the arrays of an .npz by ``track_from_arrays``; see ``formats.load_file``."""
+    """Load the arrays of an .npz by ``track_from_arrays``; see ``load.load_file``."""
     try:
         with np.load(file, allow_pickle=False) as data:
             held = {name: np.asarray(data[name]) for name in data.files if name in ARRAYS}
@@ -45,6 +46,21 @@ def load_npz(file: Path, rate_hz: float | None, least_score: float | None = None
     except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{file}: is not an .npz of plain arrays: {error}") from None
     return track_from_arrays(file, held, rate_hz, least_score, others)
+
+
+def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
+    """Load the variables of a MATLAB file up to version 7 by ``track_from_arrays``; 7.3 is HDF5."""
+    from scipy.io import loadmat  # noqa: PLC0415  slow to import
+
+    try:
+        held = loadmat(file)
+    except Exception as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InputError(
+            f"{file}: is no MAT file that can be read: {reason}; known: {KNOWN}"
+        ) from None
+    arrays = {name: np.asarray(data) for name, data in held.items() if not name.startswith("__")}
+    return track_from_arrays(file, arrays, rate_hz, least_score)
 
 
 def track_from_arrays(
@@ -68,7 +84,7 @@ def track_from_arrays(
         points = _bodies(file, held, length_m if np.isfinite(length_m) else 1.0)
         return track_from_points(
             _text(held, "name", file.stem),
-            _sure(file, points, held, least_score),
+            _without_unsure(file, points, held, least_score),
             given,
             scale_m=1.0 if np.isfinite(length_m) else None,
             source=_text(held, "source", "not stated"),
@@ -78,13 +94,13 @@ def track_from_arrays(
         points = _floats(file, "skeletons", held["skeletons"])
         if points.ndim == 3:
             points = points * [1.0, -1.0]
-        points = _sure(file, points, held, least_score)
+        points = _without_unsure(file, points, held, least_score)
         rate = SKELETON_RATE_HZ if given is None else given
         return track_from_points(file.stem, points, rate, rate_assumed=given is None)
-    found = ", ".join(sorted([*held, *others])[:12]) or "none"
+    names = ", ".join(sorted([*held, *others])[:12]) or "none"
     raise InputError(
         f"{file}: expected the arrays points or angles_rad (or x and y), and rate_hz or t (and "
-        f"length_m); or skeletons; found {found}"
+        f"length_m); or skeletons; found {names}"
     )
 
 
@@ -107,7 +123,9 @@ def _bodies(file: Path, held: dict[str, NDArray[np.generic]], length: float) -> 
     if "angles_rad" in held:
         angles = _floats(file, "angles_rad", held["angles_rad"])
         if angles.ndim != 2 or angles.shape[1] < 4:
-            raise InputError(f"{file}: angles_rad must be (frames, 4 or more), {_is(angles)}")
+            raise InputError(
+                f"{file}: angles_rad must be (frames, 4 or more), {_not_shape(angles)}"
+            )
         return body_points(angles, length)
     x, y = _floats(file, "x", held["x"]), _floats(file, "y", held["y"])
     if x.shape != y.shape or x.ndim != 2:
@@ -115,22 +133,22 @@ def _bodies(file: Path, held: dict[str, NDArray[np.generic]], length: float) -> 
     return np.stack([x, y], axis=-1)
 
 
-def _sure(
+def _without_unsure(
     file: Path, points: Floats, held: dict[str, NDArray[np.generic]], least_score: float | None
 ) -> Floats:
-    """Points with those that the tracker was not sure of missing."""
+    """Points; NaN where the tracker's score is below the least one."""
     if not least_score:
         return points
     if "score" not in held:
         raise InputError(f"{file}: holds no scores to compare with a least score of {least_score}")
     score = _floats(file, "score", held["score"])
     if score.shape != points.shape[:2]:
-        raise InputError(f"{file}: score must be (frames, points), {_is(score)}")
+        raise InputError(f"{file}: score must be (frames, points), {_not_shape(score)}")
     return np.where((score < least_score)[..., None], np.nan, points)
 
 
 def load_npy(file: Path, rate_hz: float | None) -> Track:
-    """Load joint angles (T, J), rad, column 0 next to the head; see ``formats.load_file``.
+    """Load joint angles (T, J), rad, column 0 next to the head; see ``load.load_file``.
 
     Positive bends the head side to the left. Where the body was and faced is not in such a file:
     every frame faces along x in the mean, its head at the origin.
@@ -141,7 +159,9 @@ def load_npy(file: Path, rate_hz: float | None) -> Track:
         raise InputError(f"{file}: is not an .npy of plain numbers: {error}") from None
     joints = _floats(file, "joint angles", np.asarray(held))
     if joints.ndim != 2 or joints.shape[1] < 3:
-        raise InputError(f"{file}: expected joint angles (frames, 3 or more joints), {_is(joints)}")
+        raise InputError(
+            f"{file}: expected joint angles (frames, 3 or more joints), {_not_shape(joints)}"
+        )
     link_rad = np.concatenate([np.zeros((len(joints), 1)), -np.cumsum(joints, axis=1)], axis=1)
     points = body_points(link_rad - link_rad.mean(axis=1, keepdims=True))
     rate = JOINT_RATE_HZ if rate_hz is None else rate_hz
@@ -157,7 +177,7 @@ def _floats(file: Path, what: str, values: NDArray[np.generic]) -> Floats:
 def _scalar(file: Path, what: str, value: NDArray[np.generic]) -> float:
     number = _floats(file, what, value)
     if number.size != 1:
-        raise InputError(f"{file}: {what}: expected one number, {_is(number)}")
+        raise InputError(f"{file}: {what}: expected one number, {_not_shape(number)}")
     return float(number.reshape(()))
 
 
@@ -167,5 +187,5 @@ def _text(held: dict[str, NDArray[np.generic]], name: str, default: str) -> str:
     return str(held[name].reshape(-1)[0])
 
 
-def _is(values: Floats) -> str:
+def _not_shape(values: Floats) -> str:
     return f"not an array of shape {values.shape}"

@@ -34,7 +34,7 @@ def is_deeplabcut(rows: list[list[str]]) -> bool:
 def load_rows(
     file: Path, rows: list[list[str]], rate_hz: float | None, least_score: float | None
 ) -> Track:
-    """Load the rows of a CSV; see ``formats.load_file``."""
+    """Load the rows of a CSV; see ``load.load_file``."""
     depth = 4 if rows[3][0] == "coords" else 3
     level = {row[0]: row for row in rows[:depth]}
     if not {"bodyparts", "coords"} <= level.keys() or level.keys() - _LEVELS:
@@ -64,7 +64,7 @@ def load_rows(
 
 
 def load_group(file: Path, group: Any, rate_hz: float | None, least_score: float | None) -> Track:
-    """Load the open HDF5 group that holds ``table``; see ``formats.load_file``."""
+    """Load the open HDF5 group that holds ``table``; see ``load.load_file``."""
     table = group["table"]
     blocks = [name for name in table.dtype.names or () if name.startswith("values_block_")]
     if len(blocks) != 1 or table.dtype[blocks[0]].base.kind != "f":

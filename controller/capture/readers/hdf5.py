@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.arrays import track_from_arrays
 from snakewalk.controller.capture.readers.deeplabcut import load_group
-from snakewalk.controller.capture.readers.kinds import KNOWN
+from snakewalk.controller.capture.readers.formats import KNOWN
 from snakewalk.controller.capture.readers.sleap import load_analysis
 from snakewalk.controller.capture.track import Track
 
 
 def load_hdf5(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
-    """Load whichever it is; see ``formats.load_file``."""
+    """Load an HDF5 file of any of these three kinds; see ``load.load_file``."""
     try:
         with h5py.File(file, "r") as held:
             if "tracks" in held and "track_occupancy" in held:

@@ -1,4 +1,4 @@
-"""Keypoints of pose trackers: what they were not sure of is missing, rows count downwards."""
+"""Keypoints of pose trackers: points with a low score are missing, rows count downwards."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.track import Track, track_from_points
 
 KEYPOINT_RATE_HZ = 30.0
-"""Taken when nobody says otherwise: neither SLEAP's nor DeepLabCut's files hold a frame rate."""
+"""Default: neither SLEAP's nor DeepLabCut's files hold a frame rate."""
 
 
 def track_from_keypoints(

@@ -1,13 +1,16 @@
-"""One door for recordings: a shipped name, figures of your own, or a file of tracked bodies."""
+"""The one entry for recordings: a shipped name, figures of your own, or a file of bodies."""
 
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load
 from snakewalk.config.recording import RecordingConfig
-from snakewalk.controller.capture.readers.formats import load_file
+from snakewalk.controller.capture.readers.arrays import load_mat, load_npy, load_npz
+from snakewalk.controller.capture.readers.formats import HEAD_BYTES, KNOWN, format_of
 from snakewalk.controller.capture.readers.generated import EMBEDDED, embedded, generate
-from snakewalk.controller.capture.readers.kinds import KNOWN
+from snakewalk.controller.capture.readers.tables import load_csv
+from snakewalk.controller.capture.readers.wcon import load_wcon, zipped_text
 from snakewalk.controller.capture.track import Track
 
 
@@ -18,8 +21,8 @@ def load_track(
 
     Args:
         name_or_path: a name of ``EMBEDDED``; or figures in a ``.toml`` (``RecordingConfig``); or a
-            file of one of the kinds of ``kinds.KNOWN``.
-        rate_hz: frames a second of a file, taken instead of what it (or its kind) says.
+            file of one of the formats of ``formats.KNOWN``.
+        rate_hz: frames a second of a file, taken instead of what it (or its format) says.
         least_score: keypoints of a file whose score is below it count as missing.
 
     Raises:
@@ -44,6 +47,58 @@ def load_track(
     if path.suffix == ".toml":
         return generate(load(path, RecordingConfig))
     return load_file(path, rate_hz, least_score)
+
+
+def load_file(
+    path: str | Path, rate_hz: float | None = None, least_score: float | None = None
+) -> Track:
+    """Load a recording from a file; its content, not its name, says which format it has.
+
+    Args:
+        path: of the file.
+        rate_hz: frames a second, taken instead of what the file (or its format) says.
+        least_score: keypoints whose score is below it count as missing; default 0, and for
+            DeepLabCut its own 0.6.
+
+    Raises:
+        InputError: no such file, none of the known formats, or a fault inside it.
+
+    """
+    file = Path(path)
+    if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
+        raise InputError(f"{file}: the frame rate must be above 0 Hz, not {rate_hz}")
+    if least_score is not None and not 0.0 <= least_score <= 1.0:
+        raise InputError(f"{file}: the least score must be from 0 to 1, not {least_score}")
+    try:
+        with file.open("rb") as stream:
+            kind = format_of(stream.read(HEAD_BYTES))
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror or error}") from None
+    match kind:
+        case "zip":
+            text = zipped_text(file)
+            if text is not None:
+                return load_wcon(file, text, rate_hz)
+            return load_npz(file, rate_hz, least_score)
+        case "npy":
+            return load_npy(file, rate_hz)
+        case "hdf5":
+            require_extra(f"{file}: HDF5 needs", "h5py")
+            from snakewalk.controller.capture.readers.hdf5 import load_hdf5  # noqa: PLC0415  an extra
+
+            return load_hdf5(file, rate_hz, least_score)
+        case "mat":
+            return load_mat(file, rate_hz, least_score)
+        case "json":
+            try:
+                return load_wcon(file, file.read_text(encoding="utf-8-sig"), rate_hz)
+            except UnicodeDecodeError:
+                raise InputError(f"{file}: is no JSON in UTF-8; known: {KNOWN}") from None
+        case "csv":
+            return load_csv(file, rate_hz, least_score)
+        case _:
+            reason = "is empty" if kind == "empty" else "is no recording"
+            raise InputError(f"{file}: {reason}; known: {KNOWN}")
 
 
 def track_beside(name_or_path: str, folder: Path | None) -> str:

@@ -46,7 +46,7 @@ def load_analysis(
     rate_hz: float | None,
     least_score: float | None,
 ) -> Track:
-    """Load the open analysis HDF5 ``held``; see ``formats.load_file``."""
+    """Load the open analysis HDF5 ``held``; see ``load.load_file``."""
     tracks = np.asarray(held["tracks"][:], dtype=float)
     nodes = len(held["node_names"]) if "node_names" in held else None
     if tracks.ndim != 4 or tracks.shape[1] != 2 or nodes not in (None, tracks.shape[2]):

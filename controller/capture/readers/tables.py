@@ -8,7 +8,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.deeplabcut import is_deeplabcut, load_rows
-from snakewalk.controller.capture.readers.kinds import KNOWN
+from snakewalk.controller.capture.readers.formats import KNOWN
 from snakewalk.controller.capture.readers.sleap import load_table
 from snakewalk.controller.capture.track import Track, track_from_points
 
@@ -16,7 +16,7 @@ _MIDLINE = {("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0}
 
 
 def load_csv(file: Path, rate_hz: float | None, least_score: float | None = None) -> Track:
-    """Load any of the tables; see ``formats.load_file``."""
+    """Load a CSV of any of these kinds; see ``load.load_file``."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
             rows = [row for row in csv.reader(stream) if row]
@@ -94,7 +94,7 @@ def _sleap(
     """One row a frame, keypoints in the table's order, head first, in pixels."""
     wanted = [column["frame_idx"], *(column[f"{k}.{axis}"] for k in keypoints for axis in "xy")]
     table = _numbers(file, rows, wanted)
-    marks = [column[f"{k}.score"] for k in keypoints if f"{k}.score" in column]
-    scores = _numbers(file, rows, marks) if len(marks) == len(keypoints) else None
+    score_columns = [column[f"{k}.score"] for k in keypoints if f"{k}.score" in column]
+    scores = _numbers(file, rows, score_columns) if len(score_columns) == len(keypoints) else None
     xy = table[:, 1:].reshape(len(table), len(keypoints), 2)
     return load_table(file, table[:, 0], xy, scores, rate_hz, least_score)

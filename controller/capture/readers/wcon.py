@@ -20,7 +20,7 @@ from snakewalk.controller.capture.track import Track, track_from_points
 
 
 def load_wcon(file: Path, text: str, rate_hz: float | None) -> Track:
-    """Load the text of a WCON file; see ``formats.load_file``."""
+    """Load the text of a WCON file; see ``load.load_file``."""
     try:
         held = json.loads(text)
     except (json.JSONDecodeError, RecursionError) as error:

@@ -11,7 +11,7 @@ import pytest
 from scipy.io import savemat
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.readers.formats import load_file
+from snakewalk.controller.capture.readers.load import load_file
 from snakewalk.controller.capture.readers.wcon import si_value
 from tests.helpers.travelling import FRAMES, RATE_HZ, ends, wave_angles
 
