@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.sim.servo.bench import BenchPlant
-from snakewalk.sim.servo.gearbox import GEARBOXES, Gearbox
-from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
+from snakewalk.sim.servo.motor import GEARBOXES, MOTORS, Gearbox, make_drive, p_gain_per_rad
 
 Floats = NDArray[np.float64]
 MASS_KG, ARM_M = 0.49, 0.10  # SOURCE.txt of the recordings

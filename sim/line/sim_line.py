@@ -40,7 +40,7 @@ class SimLine(Wire):
         usb_latency_s: float = 0.0,
     ) -> None:
         super().__init__(clock if clock is not None else SimClock(plant.time_s), usb_latency_s)
-        self.firmware = self._firmware(bank, plant, supply_and_ambient)
+        self.firmware = Firmware(bank, plant, supply_and_ambient)
         self.bank = bank
         self.tamper = tamper
         self._handler = InstructionHandler(self.firmware, baud)
@@ -90,11 +90,6 @@ class SimLine(Wire):
         return self.bank[register].copy()
 
     # the wire
-
-    def _firmware(
-        self, bank: ServoBank, plant: Plant, supply_and_ambient: SupplyAndAmbient | None
-    ) -> Firmware:
-        return Firmware(bank, plant, supply_and_ambient)
 
     def _advance(self, until_s: float) -> None:
         self.firmware.advance(until_s)

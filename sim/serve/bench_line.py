@@ -1,19 +1,16 @@
 """Servos of a chain, as named on a command line, on a bench behind one line."""
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.errors import InputError
 from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.line import BAUD_CLOCK, Ax12Line
 from snakewalk.sim.ax12.table import MODEL
-from snakewalk.sim.line.mixed_line import MixedLine
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.serve.chain_spec import ChainSpec
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
-from snakewalk.sim.servo.gearbox import GEARBOXES
-from snakewalk.sim.servo.mixed_bank import MixedBank
+from snakewalk.sim.servo.motor import GEARBOXES
 
 
 def bench_line(
@@ -28,17 +25,10 @@ def bench_line(
     """
     if MODEL in chain.models:
         return _ax12_line(chain, baud, start_rad)
-    if len(chain.kinds) == 1:
-        bank = ServoBank(chain.ids, chain.model, baud)
-        gear = GEARBOXES.get(bank.model)
-        return SimLine(bank, BenchPlant(len(bank), gear=gear, start_rad=start_rad), baud=baud)
-    mixed = MixedBank(chain.ids, chain.models, baud)
-    starts_rad = np.split(np.broadcast_to(start_rad, len(mixed)), mixed.starts[1:])
-    benches = [
-        BenchPlant(len(part), gear=GEARBOXES.get(part.model), start_rad=begin_rad)
-        for part, begin_rad in zip(mixed.parts, starts_rad, strict=True)
-    ]
-    return MixedLine(mixed, benches, baud=baud)
+    bank = ServoBank(chain.ids, chain.models, baud)
+    gears = [GEARBOXES.get(model) for model in bank.models]
+    plant = BenchPlant(len(bank), gear=gears, start_rad=start_rad)
+    return SimLine(bank, plant, baud=baud)
 
 
 def _ax12_line(chain: ChainSpec, baud: int, start_rad: ArrayLike) -> Ax12Line:

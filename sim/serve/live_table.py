@@ -9,10 +9,20 @@ from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.decode import Decoder1
 from snakewalk.sim.ax12.table import CELLS
 from snakewalk.sim.line.sim_line import SimLine
-from snakewalk.sim.servo.bank import ServoBank
-from snakewalk.sim.servo.mixed_bank import MixedBank
 from snakewalk.sim.sniff.decode import DecodedPacket, Decoder
 
+COLUMNS = {
+    "id": "ID",
+    "mode": "Operating Mode",
+    "torque": "Torque Enable",
+    "goal": "Goal Position",
+    "position": "Present Position",
+    "velocity": "Present Velocity",
+    "volts": "Present Input Voltage",
+    "celsius": "Present Temperature",
+    "error": "Hardware Error Status",
+}
+"""Registers shown of each servo, by key."""
 Rows = list[dict[str, object]]
 SHOWN = 8
 """Packets kept."""
@@ -38,36 +48,18 @@ class LiveTable:
 def servo_rows(line: SimLine) -> Rows:
     """One row a servo of Protocol 2.0: what it is, where it is, how it fares."""
     line.firmware.refresh()
-    if not isinstance(line.bank, MixedBank):
-        rows = _look_at(line.bank)
-    else:
-        rows = [row for part in line.bank.parts for row in _look_at(part)]
-        for row in rows:  # a table has the same columns for all
-            row["current"], row["load"] = row.pop("current", "-"), row.pop("load", "-")
-    powered = line.firmware.powered
-    return [row | {"power": bool(on)} for row, on in zip(rows, powered, strict=True)]
-
-
-def _look_at(bank: ServoBank) -> Rows:
-    drawn = "Present Current" if bank.measures_current else "Present Load"
-    names = {
-        "id": "ID",
-        "mode": "Operating Mode",
-        "torque": "Torque Enable",
-        "goal": "Goal Position",
-        "position": "Present Position",
-        "velocity": "Present Velocity",
-        drawn.split()[1].lower(): drawn,
-        "volts": "Present Input Voltage",
-        "celsius": "Present Temperature",
-        "error": "Hardware Error Status",
-    }
-    columns = {key: np.asarray(bank[name]) for key, name in names.items()}
+    bank, measured = line.bank, line.bank.measures_current
+    columns = {key: np.asarray(bank[name]) for key, name in COLUMNS.items()}
+    current = bank["Present Current" if measured.any() else "Present Load"]  # at one address
     rows: Rows = []
     for row in range(len(bank)):
         shown: dict[str, object] = {key: int(values[row]) for key, values in columns.items()}
+        if measured.any():
+            shown["current"] = int(current[row]) if measured[row] else "-"
+        if not measured.all():
+            shown["load"] = "-" if measured[row] else int(current[row])
         shown["volts"] = columns["volts"][row] / 10.0
-        rows.append(shown)
+        rows.append(shown | {"power": bool(line.firmware.powered[row])})
     return rows
 
 

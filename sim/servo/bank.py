@@ -7,9 +7,8 @@ What registers *do* (drive the motor, show the shaft, run the watchdog) is ``sim
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Indices, SignedInts
+from snakewalk.config.arrays import Bytes, Indices, SignedInts
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.control_table import Register
 from snakewalk.drivers.protocol.packet import ALERT, ResultError
@@ -26,7 +25,7 @@ from snakewalk.sim.servo.register_rules import (
     EEPROM_END,
     GOALS,
     MODE_RESETS,
-    indirect_blocks,
+    ModelRegisters,
     registers_of,
 )
 
@@ -34,45 +33,62 @@ TABLE_BYTES = 1024
 
 
 class ServoBank:
-    """S servos of one model, factory new but for ID and baud rate.
+    """S servos, factory new but for ID and baud rate, of one model or of one each.
 
-    ``clashing`` allows two servos to share an ID, as an unlucky chain does. ``table`` is (S, bytes)
-    of a greater array that they are a part of (``sim.bus.mixed``).
+    Most registers lie at the same address throughout the X series, so that a register is one column
+    over all servos; what a model has of its own, and its rules, are asked for by row.
+
+    Args:
+        ids: in the order of the chain.
+        model: of all servos, or (S,) of each.
+        baud: of all servos.
+        clashing: two servos may share an ID, as they do in an unlucky chain.
 
     Raises:
-        ControlTableError: the model cannot be simulated, an ID is out of range or used twice, or
-            the baud rate is not one of the model's.
+        ControlTableError: a model cannot be simulated, an ID is out of range or used twice, or the
+            baud rate is not one of a model's.
 
     """
 
     def __init__(
         self,
         ids: Sequence[int],
-        model: str = "XM430-W350",
+        model: str | Sequence[str] = "XM430-W350",
         baud: int = 1_000_000,
         *,
         clashing: bool = False,
-        table: NDArray[np.uint8] | None = None,
     ) -> None:
         self.ids = tuple(ids)
-        self.layout, self._registers, self._rules = registers_of(model.upper().replace("_", "-"))
-        self.model = self.layout.model
-        known = BAUDS[: (self._rules["Baud Rate"].high or 0) + 1]
+        names = [model] * len(self.ids) if isinstance(model, str) else model
+        self._of_row = [registers_of(each.upper().replace("_", "-")) for each in names]
+        kinds = list({each.layout.model: each for each in self._of_row}.values())
         faults = [f"ID {each}: a servo has 0 to 252" for each in self.ids if not 0 <= each <= 252]
         if len(set(self.ids)) != len(self.ids) and not clashing:
             faults.append(f"two servos share an ID: {', '.join(map(str, sorted(self.ids)))}")
-        if baud not in known:
-            faults.append(f"{baud} baud: {self.model} has {', '.join(map(str, known))}")
+        faults += [
+            f"{baud} baud: {kind.layout.model} has {', '.join(map(str, kind.bauds))}"
+            for kind in kinds
+            if baud not in kind.bauds
+        ]
         if faults:
             raise ControlTableError(faults)
-        self.table = table if table is not None else np.zeros((len(ids), TABLE_BYTES), np.uint8)
-        self._views = {name: self._view(name) for name in self._rules}
-        self._spans = {
-            register.address: (register, self._rules[name])
-            for name, register in self._registers.items()
+        self.models = tuple(each.layout.model for each in self._of_row)
+        """(S,) names as printed on the servos."""
+        self.measures_current = np.array([each.measures_current for each in self._of_row], bool)
+        """(S,) False where a servo has no current sensor."""
+        self.table: Bytes = np.zeros((len(self.ids), TABLE_BYTES), np.uint8)
+        rows = [self._rows_of(kind) for kind in kinds]
+        self._kinds = tuple(zip(kinds, rows, strict=True))
+        self._registers = _in_one_place(kinds)
+        self._columns = {name: self._column(each) for name, each in self._registers.items()}
+        self._starts = {
+            kind.layout.model: {each.address: each for each in kind.registers.values()}
+            for kind in kinds
         }
-        self.indirect = Indirect(self.table, indirect_blocks(self.layout))
-        self.measures_current = "Present Current" in self._rules
+        self.indirect = Indirect(
+            self.table,
+            [(slice(None) if len(kinds) == 1 else own, kind.indirect) for kind, own in self._kinds],
+        )
         self._registered: dict[int, tuple[int, bytes]] = {}
         self._backup: dict[int, bytes] = {}
         self.reset(np.arange(len(self.ids)), keep=())
@@ -83,29 +99,30 @@ class ServoBank:
         return len(self.ids)
 
     def __getitem__(self, name: str) -> SignedInts:
-        """(S,) live view of a register of all servos, by the SDK's name."""
-        return self._views[name]
+        """(S,) live view of a register of all servos, by the SDK's name; 0 where one lacks it."""
+        return self._columns[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._views
+        """Whether a servo has the register, and all that have it at the same address."""
+        return name in self._columns
 
     def register(self, name: str) -> Register:
         """Address, size and sign of a register, also of those that the SDK's table lacks."""
         return self._registers[name]
 
-    def names(self) -> tuple[str, ...]:
-        """All registers of the model."""
-        return tuple(self._registers)
+    def has(self, row: int, name: str) -> bool:
+        """Whether a servo has a register."""
+        return name in self._of_row[row].registers
 
     def tuned_to(self, baud: int) -> Indices:
         """Rows of the servos that are tuned to ``baud``."""
         index = BAUDS.index(baud) if baud in BAUDS else -1
         return np.flatnonzero(self["Baud Rate"] == index)
 
-    def alert(self, rows: Indices | slice | int) -> NDArray[np.uint8]:
+    def alert(self, rows: Indices | slice | int) -> Bytes:
         """Bit 7 of the error field: set while Hardware Error Status(70) is not 0."""
         wrong = self["Hardware Error Status"][rows] != 0
-        alert: NDArray[np.uint8] = np.multiply(wrong, ALERT, dtype=np.uint8)
+        alert: Bytes = np.multiply(wrong, ALERT, dtype=np.uint8)
         return alert
 
     def shut_down(self, row: int) -> bool:
@@ -123,13 +140,15 @@ class ServoBank:
         """
         if not data:
             return ResultError.DATA_LENGTH
-        for start, run in self.indirect.runs(row, address, data):
+        own = self._of_row[row]
+        starts = self._starts[own.layout.model]
+        for start, run in self.indirect.resolve(row, address, data, own.indirect):
             at = start
             while at < start + len(run):
-                span = self._spans.get(at)
-                if span is None:
+                register = starts.get(at)
+                if register is None:
                     return ResultError.ACCESS
-                register, rule = span
+                rule = own.rules[register.name]
                 end = at + register.size
                 if end > start + len(run):
                     return ResultError.DATA_LENGTH
@@ -148,9 +167,9 @@ class ServoBank:
         """Write a block to one servo, all of it or, with an error, none of it."""
         error = self.check(row, address, data, ram_only=ram_only)
         if not error:
-            for at, run in self.indirect.runs(row, address, data):
+            for at, run in self.indirect.resolve(row, address, data, self._of_row[row].indirect):
                 self.table[row, at : at + len(run)] = np.frombuffer(run, np.uint8)
-            self.indirect.written(address, len(data))
+            self.indirect.on_write(address, len(data))
         return error
 
     def register_write(
@@ -170,17 +189,20 @@ class ServoBank:
 
     def reset(self, rows: Indices, keep: Sequence[str], ram_only: bool = False) -> None:
         """Set initial values, in the RAM area alone (reboot) or in both (factory reset)."""
-        for name, rule in self._rules.items():
-            if name not in keep and not (ram_only and self.register(name).address < EEPROM_END):
-                self[name][rows] = rule.initial
-        for goal in GOALS[:3]:
-            if goal in self:
-                self[goal][rows] = self[_limit_of(goal)][rows]
-        self._stand_still(rows)
+        for kind, own in self._kinds:
+            some = np.intersect1d(rows, own)
+            for name, rule in kind.rules.items():
+                register = kind.registers[name]
+                if name not in keep and not (ram_only and register.address < EEPROM_END):
+                    self._column(register)[some] = rule.initial
+            for goal in GOALS[:3]:
+                if goal in kind.registers:
+                    self[goal][some] = self[_limit_of(goal)][some]
+        self._zero_goal_velocity(rows)
         for row in rows:
             self._registered.pop(int(row), None)
             self["Backup Ready"][row] = int(row) in self._backup
-        self.indirect.look()
+        self.indirect.refresh()
 
     def back_up(self, row: int) -> ResultError:
         """Store the EEPROM and the saved part of the RAM; only with torque off (e-manual)."""
@@ -203,32 +225,34 @@ class ServoBank:
         if kept is None:
             return
         stored = np.frombuffer(kept, np.uint8)
-        names = [*MODE_RESETS, *(n for n in self._rules if n.startswith("Indirect Address"))]
-        for name in names:
-            register = self.register(name)
-            block = slice(register.address, register.address + register.size)
-            self.table[row, block] = stored[block]
-        self.indirect.look()
+        registers = self._of_row[row].registers
+        for name, register in registers.items():
+            if name in MODE_RESETS or name.startswith("Indirect Address"):
+                block = slice(register.address, register.address + register.size)
+                self.table[row, block] = stored[block]
+        self.indirect.refresh()
 
     def switch_mode(self, rows: Indices) -> None:
         """Set back what a new Operating Mode(11) does: gains, profile, and limits of the output."""
-        for name in MODE_RESETS:
-            self[name][rows] = self._rules[name].initial
-        for goal in ("Goal PWM", "Goal Current"):
-            if goal in self:
-                self[goal][rows] = self[_limit_of(goal)][rows]
-        self._stand_still(rows)
+        for kind, own in self._kinds:
+            some = np.intersect1d(rows, own)
+            for name in MODE_RESETS:
+                self[name][some] = kind.rules[name].initial
+            for goal in ("Goal PWM", "Goal Current"):
+                if goal in kind.registers:
+                    self[goal][some] = self[_limit_of(goal)][some]
+        self._zero_goal_velocity(rows)
 
-    def _stand_still(self, rows: Indices) -> None:
+    def _zero_goal_velocity(self, rows: Indices) -> None:
         """Torque on alone turns nothing (e-manual, Bus Watchdog(98), example, steps 1 and 2)."""
         turning = rows[self["Operating Mode"][rows] == VELOCITY_MODE]
         self["Goal Velocity"][turning] = 0
 
     def _check_value(self, row: int, name: str, value: int) -> ResultError:
-        rule = self._rules[name]
+        rule = self._of_row[row].rules[name]
         if rule.low is not None and rule.high is not None and not rule.low <= value <= rule.high:
             return ResultError.DATA_RANGE
-        if name == "Operating Mode" and not self._has_mode(value):
+        if name == "Operating Mode" and not self._has_mode(row, value):
             return ResultError.DATA_RANGE
         if name == "Torque Enable" and value and self.shut_down(row):
             return ResultError.RESULT_FAIL
@@ -245,19 +269,32 @@ class ServoBank:
         if name == "Goal Position":
             if self["Operating Mode"][row] == POSITION_MODE:
                 return int(self["Min Position Limit"][row]), int(self["Max Position Limit"][row])
-            rule = self._rules[name]
+            rule = self._of_row[row].rules[name]
             return int(rule.low or 0), int(rule.high or 0)
         limit = int(self[_limit_of(name)][row])
         return -limit, limit
 
-    def _has_mode(self, mode: int) -> bool:
-        return mode in MODES and (self.measures_current or mode not in CURRENT_MODES)
+    def _has_mode(self, row: int, mode: int) -> bool:
+        return mode in MODES and (self.measures_current[row] or mode not in CURRENT_MODES)
 
-    def _view(self, name: str) -> SignedInts:
-        field = self.register(name)
-        kind = f"<{'i' if field.signed else 'u'}{field.size}"
-        block = self.table[:, field.address : field.address + field.size]
-        return block.view(kind)[:, 0]
+    def _rows_of(self, kind: ModelRegisters) -> Indices:
+        return np.flatnonzero([each is kind for each in self._of_row])
+
+    def _column(self, register: Register) -> SignedInts:
+        number = f"<{'i' if register.signed else 'u'}{register.size}"
+        block = self.table[:, register.address : register.address + register.size]
+        return block.view(number)[:, 0]
+
+
+def _in_one_place(kinds: Sequence[ModelRegisters]) -> dict[str, Register]:
+    """Registers that lie at the same place in all models that have them."""
+    found: dict[str, Register] = {}
+    apart: set[str] = set()
+    for kind in kinds:
+        for name, register in kind.registers.items():
+            if found.setdefault(name, register) != register:
+                apart.add(name)
+    return {name: register for name, register in found.items() if name not in apart}
 
 
 def _limit_of(goal: str) -> str:

@@ -1,21 +1,22 @@
 """A bench of independent shafts: enough mechanics to serve and test the bus without MuJoCo."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
 from snakewalk.sim.plant import ServoDrive
-from snakewalk.sim.servo.gearbox import Gearbox
+from snakewalk.sim.servo.motor import Gearbox
 
 
 class BenchPlant:
     """J shafts with inertia and friction, semi-implicit Euler; a ``sim.plant.Plant``.
 
     Viscous damping and back-EMF are taken implicitly, and dry friction never reverses a shaft, so
-    that any step size is stable and a shaft without drive comes to rest exactly. A ``gear`` brings
-    its own inertia, added, and its own friction, in place of ``viscous_n_m_s`` and ``dry_n_m``.
+    that any step size is stable and a shaft without drive comes to rest exactly. A ``gear`` (of all
+    shafts, or one or none each) brings its own inertia, added, and its own friction, in place of
+    ``viscous_n_m_s`` and ``dry_n_m``.
     """
 
     def __init__(
@@ -28,14 +29,17 @@ class BenchPlant:
         step_s: float = 1e-3,
         load_n_m: Callable[[Floats], Floats] | None = None,
         start_rad: ArrayLike = 0.0,
-        gear: Gearbox | None = None,
+        gear: Gearbox | Sequence[Gearbox | None] | None = None,
     ) -> None:
         self._step_s = step_s
         self._steps = 0
-        self._gear = gear
-        self._inertia = inertia_kg_m2 + (gear.armature_kg_m2 if gear is not None else 0.0)
-        self._viscous = gear.viscous_n_m_s if gear is not None else viscous_n_m_s
-        self._dry = dry_n_m
+        bare = Gearbox(0.0, dry_n_m, viscous_n_m_s, 0.0, 1.0, 0.0, 0.0)
+        if isinstance(gear, Sequence):
+            gear = Gearbox.columns([each or bare for each in gear]) if any(gear) else None
+        self._gear = gear or bare
+        self._inertia = inertia_kg_m2 + self._gear.armature_kg_m2
+        self._viscous = self._gear.viscous_n_m_s
+        self._is_bare = gear is None
         self._load = load_n_m
         self._position = np.full(joints, start_rad, dtype=np.float64)
         self._velocity = np.zeros(joints)
@@ -87,8 +91,8 @@ class BenchPlant:
         drive.torque_n_m[:] = drive.current_a * drive.torque_constant_n_m_a
 
     def _friction(self, motor_n_m: Floats, load_n_m: ArrayLike) -> Floats | float:
-        if self._gear is None:
-            return self._dry
+        if self._is_bare:
+            return self._gear.dry_n_m
         return self._gear.friction_n_m(self._velocity, motor_n_m, np.asarray(load_n_m))
 
 

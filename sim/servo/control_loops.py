@@ -20,7 +20,7 @@ from snakewalk.drivers.protocol.registers import (
 )
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
-from snakewalk.sim.servo.motor import PWM_FULL, TICKS_PER_RAD, MotorModel, p_gain_per_rad
+from snakewalk.sim.servo.motor import PWM_FULL, TICKS_PER_RAD, MotorColumns, p_gain_per_rad
 from snakewalk.sim.servo.profile import Trajectory
 
 CONTROL_S = 1e-3
@@ -34,7 +34,7 @@ _FORWARD = ("Feedforward 1st Gain", "Feedforward 2nd Gain")
 class ControlLoops:
     """Control loops of all servos of a bank; idle, and free of cost, in the plain case."""
 
-    def __init__(self, bank: ServoBank, drive: ServoDrive, motor: MotorModel) -> None:
+    def __init__(self, bank: ServoBank, drive: ServoDrive, motor: MotorColumns) -> None:
         self._bank, self._drive, self._motor = bank, drive, motor
         servos = len(bank)
         self.trajectory = Trajectory(servos)

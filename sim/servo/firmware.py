@@ -19,7 +19,14 @@ from snakewalk.sim.servo.bank import TABLE_BYTES, ServoBank
 from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 from snakewalk.sim.servo.control_loops import CONTROL_S, ControlLoops
 from snakewalk.sim.servo.event_queue import EventQueue
-from snakewalk.sim.servo.motor import MOTORS, PWM_FULL, TICKS_PER_RAD, TICKS_PER_REV, make_drive
+from snakewalk.sim.servo.motor import (
+    MOTORS,
+    PWM_FULL,
+    TICKS_PER_RAD,
+    TICKS_PER_REV,
+    MotorColumns,
+    make_drive,
+)
 from snakewalk.sim.servo.motor_output import MotorOutput
 from snakewalk.sim.servo.present_values import PRESENT, SUPPLY, PresentValues
 from snakewalk.sim.servo.protection import SLICE_S, Protection, SupplyAndAmbient
@@ -48,12 +55,14 @@ class Firmware:
         joints = len(bank)
         self.bank = bank
         self.plant = plant
-        self.motor = MOTORS[bank.model]
-        around = supply_and_ambient or SupplyAndAmbient(supply_v=self.motor.nominal_v)
-        self.drive = make_drive([self.motor] * joints, around.supply_v)
+        motors = [MOTORS[model] for model in bank.models]
+        self._motor = motor = MotorColumns(motors)
+        around = supply_and_ambient or SupplyAndAmbient()
+        usual_v = motor.nominal_v if around.supply_v is None else around.supply_v
+        self.drive = make_drive(motors, usual_v)
         self.blocked_shaft = BlockedShaft(self.drive)
         self._motor_output = MotorOutput(self.drive, self.blocked_shaft)
-        self.protection = Protection(bank, self.drive, self.motor, around, self._motor_output)
+        self.protection = Protection(bank, self.drive, motor, around, self._motor_output)
         self._time_s = plant.time_s
         self._slice_s = self._time_s + SLICE_S
         self._watchdog = Watchdog(bank, self._time_s)
@@ -65,7 +74,7 @@ class Firmware:
         """(S,) False while a servo has no supply: it hears nothing and lets go."""
         self.events = EventQueue()
         """What happens to the servos at a time of its own, whoever talks."""
-        self.control_loops = ControlLoops(bank, self.drive, self.motor)
+        self.control_loops = ControlLoops(bank, self.drive, motor)
         self._goal = self.drive.goal_rad.copy()
         self._control_s = self._time_s + CONTROL_S
         self._goal_address = bank.register("Goal Position").address
@@ -74,7 +83,7 @@ class Firmware:
                 bank,
                 plant,
                 self.drive,
-                self.motor,
+                motor,
                 self._motor_output,
                 self.control_loops,
                 self.protection,
@@ -106,7 +115,7 @@ class Firmware:
             if stop_s >= dog.due_s:
                 self._stop(dog.trip(stop_s))
             if stop_s >= self._slice_s:
-                if protection.look(plant):
+                if protection.check(plant):
                     self.apply_registers()
                 self._slice_s += SLICE_S
 
@@ -154,8 +163,8 @@ class Firmware:
         self._push[tripped] = 0.0
         self._pushed = bool(np.isin(mode, (PWM_MODE, CURRENT_MODE)).any())
         limited = (mode == CURRENT_POSITION_MODE) | (mode == CURRENT_MODE)
-        if bank.measures_current:
-            goal_a = np.abs(bank["Goal Current"].astype(float)) * self.motor.current_unit_a
+        if "Goal Current" in bank:
+            goal_a = np.abs(bank["Goal Current"].astype(float)) * self._motor.current_unit_a
             drive.current_limit_a[:] = np.where(limited, goal_a, np.inf)
             self._motor_output.limited = bool(limited.any())
         single = mode == POSITION_MODE
@@ -230,7 +239,7 @@ class Firmware:
         """Clear instruction: forget hardware errors whose cause is gone; False if one is not."""
         self.bank["Hardware Error Status"][row] = 0
         self.protection.restart(np.array([row]))
-        self.protection.look(self.plant)
+        self.protection.check(self.plant)
         self.apply_registers()
         return not self.bank["Hardware Error Status"][row]
 
@@ -266,7 +275,7 @@ class Firmware:
     def refresh(self, address: int = 0, length: int = TABLE_BYTES) -> None:
         """Present values, those at least that a read of this block shows."""
         indirect = self.bank.indirect
-        gather = indirect.shown(address, length)
+        gather = indirect.covers(address, length)
         stop = address + length
         if gather or (address < SUPPLY.start and stop > PRESENT.start):
             self.refresh_motion()

@@ -1,4 +1,4 @@
-"""Motor constants by servo model, and what the registers make of them.
+"""Constants of motors and gearboxes by servo model, and the drive that they make.
 
 Torque, current and speed figures are those of the e-manual's specification tables at the voltage
 that ROBOTIS recommends (``sim.servo.models``); everything else is derived from them here. Thermal
@@ -7,10 +7,11 @@ moves.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import AnyInts, Floats
 from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A
@@ -85,27 +86,85 @@ def _motor(model: str, facts: ModelFacts) -> MotorModel:
 MOTORS: Mapping[str, MotorModel] = {model: _motor(model, facts) for model, facts in MODELS.items()}
 
 
-def p_gain_per_rad(register: int | AnyInts, motor: MotorModel) -> Floats:
+class MotorColumns:
+    """Constants of the motors of S servos, (S,) each; as in ``MotorModel``."""
+
+    def __init__(self, motors: Sequence[MotorModel]) -> None:
+        def column(name: str) -> Floats:
+            return np.array([getattr(motor, name) for motor in motors], dtype=np.float64)
+
+        self.nominal_v = column("nominal_v")
+        self.stall_current_a = column("stall_current_a")
+        self.no_load_rad_s = column("no_load_rad_s")
+        self.current_unit_a = column("current_unit_a")
+        self.p_gain_divisor = column("p_gain_divisor")
+        self.standby_a = column("standby_a")
+        self.winding_k_per_w = column("winding_k_per_w")
+        self.thermal_time_s = column("thermal_time_s")
+        self.resistance_ohm = column("resistance_ohm")
+        self.torque_constant_n_m_a = column("torque_constant_n_m_a")
+        self.back_emf_v_s = column("back_emf_v_s")
+
+
+def p_gain_per_rad(register: int | AnyInts, motor: MotorModel | MotorColumns) -> Floats:
     """PWM fraction per radian of position error for Position P Gain(84)."""
     gain = np.asarray(register, dtype=np.float64)
     return np.asarray(gain / motor.p_gain_divisor * TICKS_PER_RAD / PWM_FULL)
 
 
-def make_drive(motors: list[MotorModel], supply_v: float) -> ServoDrive:
+def make_drive(motors: Sequence[MotorModel], supply_v: ArrayLike) -> ServoDrive:
     """Make a drive of J servos at rest: torque off, goals 0, gains 0; registers set the rest."""
-
-    def column(name: str) -> Floats:
-        return np.array([getattr(motor, name) for motor in motors], dtype=np.float64)
-
-    joints = len(motors)
+    joints, columns = len(motors), MotorColumns(motors)
     return ServoDrive(
         torque_on=np.zeros(joints),
         goal_rad=np.zeros(joints),
         p_gain_per_rad=np.zeros(joints),
         pwm_limit=np.ones(joints),
-        supply_v=np.full(joints, supply_v),
-        resistance_ohm=column("resistance_ohm"),
-        torque_constant_n_m_a=column("torque_constant_n_m_a"),
-        back_emf_v_s=column("back_emf_v_s"),
+        supply_v=np.full(joints, supply_v, dtype=np.float64),
+        resistance_ohm=columns.resistance_ohm,
+        torque_constant_n_m_a=columns.torque_constant_n_m_a,
+        back_emf_v_s=columns.back_emf_v_s,
         current_limit_a=np.full(joints, np.inf),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Gearbox:
+    """Friction and inertia of a gearbox at the output shaft; numbers, or (J,) of J servos.
+
+    The greatest friction torque is ``dry + stribeck exp(-(w / stribeck_speed)^2) + by_motor
+    |t_motor| + by_load |t_load|``: teeth press harder the more they carry, whoever drives
+    (Duclusaud et al., "Extended Friction Models for the Physics Simulation of Servo Actuators",
+    ICRA 2025). It never reverses a shaft; a shaft that it can hold rests.
+    """
+
+    armature_kg_m2: Floats | float
+    """The rotor, seen through the gears."""
+    dry_n_m: Floats | float
+    viscous_n_m_s: Floats | float
+    stribeck_n_m: Floats | float
+    stribeck_rad_s: Floats | float
+    by_motor: Floats | float
+    """Share of the motor's torque that friction takes."""
+    by_load: Floats | float
+    """Share of the load's torque that friction takes."""
+
+    @staticmethod
+    def columns(gears: "Sequence[Gearbox]") -> "Gearbox":
+        """Gearboxes of J servos as one of (J,) columns."""
+        names = [each.name for each in fields(Gearbox)]
+        return Gearbox(*(np.array([getattr(gear, name) for gear in gears]) for name in names))
+
+    def friction_n_m(self, speed_rad_s: Floats, motor_n_m: Floats, load_n_m: Floats) -> Floats:
+        """Greatest friction torque (J,) but for the viscous part, which grows with the speed."""
+        slow = np.exp(-((speed_rad_s / self.stribeck_rad_s) ** 2))
+        carried = self.by_motor * np.abs(motor_n_m) + self.by_load * np.abs(load_n_m)
+        return np.asarray(self.dry_n_m + self.stribeck_n_m * slow + carried)
+
+
+GEARBOXES: Mapping[str, Gearbox] = {
+    # Fitted to recordings of a real one with a pendulum (Rhoban, bam; five logs, three P gains),
+    # torque and back-EMF constants as in the data sheet; docs/bus.md has the terms one by one.
+    "XL330-M288": Gearbox(1.6e-3, 0.0079, 0.0024, 0.0479, 0.35, 0.25, 0.29),
+}
+"""Models whose friction somebody has measured."""

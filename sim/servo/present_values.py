@@ -15,7 +15,7 @@ from snakewalk.drivers.protocol.registers import (
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.control_loops import ControlLoops
-from snakewalk.sim.servo.motor import PWM_FULL, TICKS_PER_RAD, MotorModel
+from snakewalk.sim.servo.motor import PWM_FULL, TICKS_PER_RAD, MotorColumns
 from snakewalk.sim.servo.motor_output import MotorOutput
 from snakewalk.sim.servo.protection import Protection
 from snakewalk.sim.servo.servo_loops import write_motion
@@ -38,7 +38,7 @@ class PresentValues:
         bank: ServoBank,
         plant: Plant,
         drive: ServoDrive,
-        motor: MotorModel,
+        motor: MotorColumns,
         motor_output: MotorOutput,
         control_loops: ControlLoops,
         protection: Protection,
@@ -51,25 +51,26 @@ class PresentValues:
             protection,
         )
         # Without a sensor load is "inferred from the internal output": in tenths of a per cent
-        shown = "Present Current" if bank.measures_current else "Present Load"
-        names = (shown, "Present Velocity", "Present Position")
-        self._shown_at = np.array([bank.register(name).address for name in names])
-        ampere, most = motor.current_unit_a, math.inf
-        if not bank.measures_current:
-            ampere, most = motor.stall_current_a / 1e3, 1e3
-        self._shown_units = np.array([ampere, most, VELOCITY_UNIT_RAD_S, TICKS_PER_RAD])
+        first = "Present Current" if "Present Current" in bank else "Present Load"  # one place
+        names = (first, "Present Velocity", "Present Position")
+        self._addresses = np.array([bank.register(name).address for name in names])
+        measured = bank.measures_current
+        ampere = np.where(measured, motor.current_unit_a, motor.stall_current_a / 1e3)
+        self._current_units = np.stack([ampere, np.where(measured, math.inf, 1e3)])
+        self._units = np.array([VELOCITY_UNIT_RAD_S, TICKS_PER_RAD])
 
     def motion(self, frame: Floats) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
         plant = self._plant
         write_motion(
             self._bank.table,
-            self._shown_at,
+            self._addresses,
             self._motor_output.current_a(),
             plant.velocity_rad_s,
             plant.position_rad,
             frame,
-            self._shown_units,
+            self._current_units,
+            self._units,
         )
 
     def path(self, frame: Floats, time_s: float) -> None:

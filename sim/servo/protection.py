@@ -5,6 +5,7 @@ off until a reboot (e-manual, Shutdown).
 """
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V, Alarm
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
-from snakewalk.sim.servo.motor import MotorModel
+from snakewalk.sim.servo.motor import MotorColumns
 from snakewalk.sim.servo.motor_output import MotorOutput
 from snakewalk.sim.servo.servo_loops import (
     add_loss,
@@ -28,6 +29,8 @@ from snakewalk.sim.servo.supply import Supply
 
 SLICE_S = 0.05
 """How often this is looked at; the shafts are seen far more often."""
+SLOW = 0.05
+"""Share of the no-load speed below which a motor is taken to be held (ours)."""
 STARVED = 0.6
 """Share of Min Voltage Limit(34) below which a powered motor is "insufficient power" (ours)."""
 OVERLOAD_S = 1.0
@@ -50,9 +53,13 @@ ALARMS_330: Mapping[str, int] = {kind: bit for kind, bit in ALARMS.items() if ki
 class SupplyAndAmbient:
     """Supply and air."""
 
-    supply_v: float
+    supply_v: float | None = None
+    """None: the nominal voltage of each servo's model."""
     supply_ohm: float = 0.02
-    """Of battery and cable together: the voltage sags with the current of all servos."""
+    """Of battery and cable together: the voltage sags with the current of all servos on it.
+
+    Servos of one voltage share a cable.
+    """
     ambient_c: float = 25.0
 
 
@@ -63,29 +70,37 @@ class Protection:
         self,
         bank: ServoBank,
         drive: ServoDrive,
-        motor: MotorModel,
+        motor: MotorColumns,
         around: SupplyAndAmbient,
         motor_output: MotorOutput,
     ) -> None:
-        self._bank, self._drive, self._motor, self._around = bank, drive, motor, around
+        self._bank, self._drive, self._around = bank, drive, around
         self._motor_output = motor_output
-        self._supply = Supply(len(bank), around.supply_v)
+        self._supply = Supply(
+            len(bank), motor.nominal_v if around.supply_v is None else around.supply_v
+        )
         self.temperature_c = np.full(len(bank), around.ambient_c)
         """(S,) at the sensor: first order in the winding's loss."""
         self.full = np.ones(len(bank))
         """(S,) output beyond which a motor cannot go, fraction of the supply."""
-        self._ohm = motor.resistance_ohm
         self._heat_j = np.zeros(len(bank))
         self._blocked_s = np.zeros(len(bank))
         names = "Min Voltage Limit", "Max Voltage Limit", "Temperature Limit"
         self._limits = bank[names[0]], bank[names[1]], bank[names[2]]
-        share = 1.0 - math.exp(-SLICE_S / motor.thermal_time_s)
-        self._thermal = np.array([around.ambient_c, motor.winding_k_per_w, share])
+        shares = [1.0 - math.exp(-SLICE_S / seconds) for seconds in motor.thermal_time_s]
+        self._thermal = np.stack([motor.winding_k_per_w, shares])
+        self._slow_rad_s = SLOW * motor.no_load_rad_s
+        self._drop_v = np.zeros(len(bank))
+        volts = self._supply.usual_v
+        self._cables = [
+            (rows, sum(amps * count for amps, count in Counter(motor.standby_a[rows]).items()))
+            for rows in (np.flatnonzero(volts == each) for each in np.unique(volts))
+        ]
+        """Rows of the servos on a cable, and what they draw at rest, A."""
 
     def alarms(self, row: int) -> Mapping[str, int]:
         """What a servo can detect."""
-        del row
-        return ALARMS_330 if "PWM Slope" in self._bank else ALARMS
+        return ALARMS_330 if self._bank.has(row, "PWM Slope") else ALARMS
 
     def supply(self, volts: float | None, rows: NDArray[np.intp] | None = None) -> None:
         """Change the supply of all, or of ``rows``; None: as it was."""
@@ -97,7 +112,7 @@ class Protection:
 
     def detect(self, rows: NDArray[np.intp], error: int) -> None:
         """Let servos find an error: shown, and off with the torque if Shutdown(63) says so."""
-        self._note(np.isin(np.arange(len(self._bank)), rows) * error)
+        self._set_errors(np.isin(np.arange(len(self._bank)), rows) * error)
 
     def restart(self, rows: NDArray[np.intp]) -> None:
         """Forget what led up to an overload; heat stays."""
@@ -105,15 +120,14 @@ class Protection:
 
     def pass_time(self, seconds: float) -> None:
         """Add up the windings' loss at the present currents."""
-        add_loss(self._heat_j, self._motor_output.current_a(), seconds * self._ohm)
+        add_loss(self._heat_j, self._motor_output.current_a(), self._drive.resistance_ohm, seconds)
 
-    def look(self, plant: Plant) -> bool:
-        """Judge one slice of ``SLICE_S``; whether registers have changed."""
-        self._warm_up()
+    def check(self, plant: Plant) -> bool:
+        """Check all servos at the end of a slice of ``SLICE_S``; True if registers have changed."""
+        warm_up(self.temperature_c, self._heat_j, SLICE_S, self._around.ambient_c, self._thermal)
         drive = self._drive
         pwm = self._motor_output.pwm(plant.velocity_rad_s)
-        volts = self._sag(pwm)
-        apart = self._supply.apart
+        self._sag(pwm)
         longest_s = count_blocked(
             self._blocked_s,
             SLICE_S,
@@ -121,18 +135,18 @@ class Protection:
             self.full,
             drive.torque_on,
             plant.velocity_rad_s,
-            0.05 * self._motor.no_load_rad_s,
+            self._slow_rad_s,
         )
         low, high, hottest = self._limits
-        wrong = out_of_range(self.temperature_c, hottest, round(volts * 10.0), low, high)
-        if longest_s < OVERLOAD_S and not (wrong or apart):  # starved is outside, too
+        wrong = out_of_range(self.temperature_c, hottest, drive.supply_v, low, high)
+        if longest_s < OVERLOAD_S and not wrong:  # starved is outside, too
             return False
         tenths = np.rint(drive.supply_v * 10.0)
         outside = (tenths < low) | (tenths > high)
         hot = np.rint(self.temperature_c) > hottest
         overload = self._blocked_s >= OVERLOAD_S
         starved = (drive.supply_v < STARVED * low * VOLTAGE_UNIT_V) & (drive.torque_on > 0)
-        self._note(
+        self._set_errors(
             Alarm.INPUT_VOLTAGE * outside
             | Alarm.OVERHEATING * hot
             | Alarm.OVERLOAD * overload
@@ -140,22 +154,14 @@ class Protection:
         )
         return True
 
-    def _note(self, errors: NDArray[np.integer]) -> None:
+    def _set_errors(self, errors: NDArray[np.integer]) -> None:
         bank = self._bank
         bank["Hardware Error Status"][:] |= errors.astype(np.uint8)
         bank["Torque Enable"][(bank["Hardware Error Status"] & bank["Shutdown"]) != 0] = 0
 
-    def _warm_up(self) -> None:
-        self._thermal[0] = self._around.ambient_c
-        warm_up(self.temperature_c, self._heat_j, SLICE_S, self._thermal)
-
-    def _sag(self, pwm: Floats) -> float:
-        drive = self._drive
-        servos_a = float(supply_current_a(pwm, self._motor_output.current_a()))
-        drawn_a = servos_a + self._motor.standby_a * len(self._bank)
-        drop_v = self._around.supply_ohm * drawn_a
-        volts = self._supply.volts - drop_v
-        drive.supply_v[:] = volts
-        if self._supply.apart:
-            self._supply.feed(drive.supply_v, drop_v)
-        return volts
+    def _sag(self, pwm: Floats) -> None:
+        current_a = self._motor_output.current_a()
+        for rows, standby_a in self._cables:
+            drawn_a = float(supply_current_a(pwm[rows], current_a[rows])) + standby_a
+            self._drop_v[rows] = self._around.supply_ohm * drawn_a
+        self._supply.feed(self._drive.supply_v, self._drop_v)

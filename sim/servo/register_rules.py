@@ -7,6 +7,7 @@ model: what the whole X series shares stands here, what differs in ``sim.servo.m
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 from snakewalk.drivers.protocol.control_table import ControlTable, Register, load_control_table
 from snakewalk.drivers.protocol.registers import bauds_of
@@ -116,8 +117,30 @@ class IndirectBlock:
     count: int
 
 
-def registers_of(model: str) -> tuple[ControlTable, dict[str, Register], dict[str, Rule]]:
-    """Control table, all registers (indirect ones numbered), and their rules, of a model.
+@dataclass(frozen=True, slots=True)
+class ModelRegisters:
+    """All registers of one model and their rules, by the SDK's names."""
+
+    layout: ControlTable
+    registers: Mapping[str, Register]
+    """With the indirect ones numbered, and those that the SDK's table lacks."""
+    rules: Mapping[str, Rule]
+    indirect: tuple[IndirectBlock, ...]
+
+    @property
+    def measures_current(self) -> bool:
+        """Whether the servo has a current sensor; without one it shows a load."""
+        return "Present Current" in self.rules
+
+    @property
+    def bauds(self) -> tuple[int, ...]:
+        """Baud rates, by value of the register."""
+        return bauds_of(self.layout.model)
+
+
+@cache
+def registers_of(model: str) -> ModelRegisters:
+    """Registers and rules of a model.
 
     Raises:
         ControlTableError: the model cannot be simulated.
@@ -128,8 +151,8 @@ def registers_of(model: str) -> tuple[ControlTable, dict[str, Register], dict[st
     listed = {name: layout[name] for name in layout if name in shared}
     listed |= {register.name: register for register in _UNLISTED}
     rules = {name: shared[name] for name in listed}
-    first = 1
-    for block in indirect_blocks(layout):
+    blocks, first = indirect_blocks(layout), 1
+    for block in blocks:
         for k in range(block.count):
             address, data = f"Indirect Address {first + k}", f"Indirect Data {first + k}"
             listed[address] = Register(address, block.addresses + 2 * k, 2, signed=False)
@@ -137,7 +160,7 @@ def registers_of(model: str) -> tuple[ControlTable, dict[str, Register], dict[st
             rules[address] = Rule(block.data + k, INDIRECT_FROM, INDIRECT_TO)
             rules[data] = Rule(0, 0, 255)
         first += block.count
-    return layout, listed, rules
+    return ModelRegisters(layout, listed, rules, blocks)
 
 
 def indirect_blocks(layout: ControlTable) -> tuple[IndirectBlock, ...]:

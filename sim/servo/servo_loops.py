@@ -1,7 +1,7 @@
-"""What every control cycle asks of the servos, as loops over servos and bytes.
+"""What every control cycle asks of the servos, as compiled loops over servos and bytes.
 
-Compiled; as ``py_func`` they give the same bytes. Arguments are arrays
-and plain numbers: numba takes five times longer to look at a tuple than at an array.
+Arguments are arrays and plain numbers: numba takes five times longer to unpack a tuple than an
+array.
 """
 
 import numpy as np
@@ -34,7 +34,7 @@ def write_le(data: Bytes, at: int, value: int, size: int) -> None:
         data[at + k] = (value >> (8 * k)) & 0xFF
 
 
-@compiled(f"void({_TABLE}, {_PLACES}, {_SEEN}, {_SEEN}, {_SEEN}, {_FRAME}, {_SEEN})")
+@compiled(f"void({_TABLE}, {_PLACES}, {_SEEN}, {_SEEN}, {_SEEN}, {_FRAME}, {_FRAME}, {_SEEN})")
 def write_motion(
     table: Bytes,
     places: Ints,
@@ -42,9 +42,10 @@ def write_motion(
     velocity_rad_s: Floats,
     position_rad: Floats,
     frame: Floats,
+    current_units: Floats,
     units: Floats,
 ) -> None:
-    """Present Current (or Load), Velocity and Position of all servos into their ``table``.
+    """Write Present Current (or Load), Velocity and Position of all servos into their ``table``.
 
     Args:
         table: (S, bytes) control tables.
@@ -53,13 +54,15 @@ def write_motion(
         velocity_rad_s: (S,)
         position_rad: (S,)
         frame: (2, S) sign of a servo's direction, and ticks at the shaft's zero.
-        units: (4,) ampere, and its greatest reading; rad/s; ticks per rad.
+        current_units: (2, S) ampere of one unit of the first register, and its greatest reading.
+        units: (2,) rad/s of one unit of velocity; ticks per rad.
 
     """
     at_current, at_velocity, at_position = places[0], places[1], places[2]
-    ampere, limit, rad_s, ticks_per_rad = units[0], units[1], units[2], units[3]
+    rad_s, ticks_per_rad = units[0], units[1]
     for row in range(len(table)):
         sign, zero = frame[0, row], frame[1, row]
+        ampere, limit = current_units[0, row], current_units[1, row]
         shown = np.rint(current_a[row] * (sign / ampere))
         write_le(table[row], at_current, int(min(max(shown, -limit), limit)), 2)
         write_le(table[row], at_velocity, int(np.rint(velocity_rad_s[row] * (sign / rad_s))), 4)
@@ -148,46 +151,50 @@ def accept_goals(
             taken[row] = True
 
 
-@compiled(f"void(float64[::1], {_SEEN}, float64)")
-def add_loss(heat_j: Floats, current_a: Floats, ohm_s: float) -> None:
-    """Add what the windings turned into heat."""
+@compiled(f"void(float64[::1], {_SEEN}, {_SEEN}, float64)")
+def add_loss(heat_j: Floats, current_a: Floats, ohm: Floats, seconds: float) -> None:
+    """Add what the windings (S,) turned into heat."""
     for row in range(len(heat_j)):
-        heat_j[row] += current_a[row] * current_a[row] * ohm_s
+        heat_j[row] += current_a[row] * current_a[row] * (seconds * ohm[row])
 
 
-@compiled(f"void(float64[::1], float64[::1], float64, {_SEEN})")
-def warm_up(temperature_c: Floats, heat_j: Floats, slice_s: float, thermal: Floats) -> None:
+@compiled(f"void(float64[::1], float64[::1], float64, float64, {_FRAME})")
+def warm_up(
+    temperature_c: Floats, heat_j: Floats, slice_s: float, ambient_c: float, thermal: Floats
+) -> None:
     """Move each sensor towards where its heat would take it in the long run; heat is used up.
 
     Args:
         temperature_c: (S,)
         heat_j: (S,) since the last call.
         slice_s: time since then.
-        thermal: (3,) of the air, C; kelvin per watt; share of the way made in a slice.
+        ambient_c: of the air.
+        thermal: (2, S) kelvin per watt; share of the difference that a slice makes up for.
 
     """
     for row in range(len(heat_j)):
-        target_c = thermal[0] + thermal[1] * (heat_j[row] / slice_s)
-        temperature_c[row] += (target_c - temperature_c[row]) * thermal[2]
+        target_c = ambient_c + thermal[0, row] * (heat_j[row] / slice_s)
+        temperature_c[row] += (target_c - temperature_c[row]) * thermal[1, row]
         heat_j[row] = 0.0
 
 
 @compiled(
-    f"boolean({_SEEN}, {readonly_array('uint8')}, int64, {readonly_array('uint16')},"
+    f"boolean({_SEEN}, {readonly_array('uint8')}, {_SEEN}, {readonly_array('uint16')},"
     f" {readonly_array('uint16')})"
 )
 def out_of_range(
     temperature_c: Floats,
-    hottest_c: AnyInts,
-    tenths: int,
-    least: AnyInts,
-    most: AnyInts,
+    temperature_max_c: AnyInts,
+    supply_v: Floats,
+    min_tenths: AnyInts,
+    max_tenths: AnyInts,
 ) -> bool:
-    """Whether a sensor is too hot, or the supply outside a servo's limits (tenths of a volt)."""
+    """Whether a sensor is too hot, or a servo's supply outside its limits (tenths of a volt)."""
     for row in range(len(temperature_c)):
-        if tenths < least[row] or tenths > most[row]:
+        tenths = np.rint(supply_v[row] * 10.0)
+        if tenths < min_tenths[row] or tenths > max_tenths[row]:
             return True
-        if np.rint(temperature_c[row]) > hottest_c[row]:
+        if np.rint(temperature_c[row]) > temperature_max_c[row]:
             return True
     return False
 
@@ -201,7 +208,7 @@ def supply_current_a(pwm: Floats, current_a: Floats) -> float:
     return sum_a
 
 
-@compiled(f"float64(float64[::1], float64, {_SEEN}, {_SEEN}, {_SEEN}, {_SEEN}, float64)")
+@compiled(f"float64(float64[::1], float64, {_SEEN}, {_SEEN}, {_SEEN}, {_SEEN}, {_SEEN})")
 def count_blocked(
     blocked_s: Floats,
     slice_s: float,
@@ -209,7 +216,7 @@ def count_blocked(
     pwm_limit: Floats,
     torque_on: Floats,
     velocity_rad_s: Floats,
-    slow_rad_s: float,
+    slow_rad_s: Floats,
 ) -> float:
     """Add a slice to the time of each motor that pushes with all it may and does not turn.
 
@@ -221,7 +228,7 @@ def count_blocked(
     for row in range(len(blocked_s)):
         full = abs(pwm[row]) >= 0.98 * min(pwm_limit[row], 1.0)
         along_rad_s = np.sign(pwm[row]) * velocity_rad_s[row]
-        held = full and along_rad_s < slow_rad_s and torque_on[row] > 0.0
+        held = full and along_rad_s < slow_rad_s[row] and torque_on[row] > 0.0
         blocked_s[row] = blocked_s[row] + slice_s if held else 0.0
         longest_s = max(longest_s, blocked_s[row])
     return longest_s

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from snakewalk.drivers.protocol.control_table import load_control_table
 from snakewalk.drivers.protocol.packet import Instruction, ResultError
 from snakewalk.drivers.protocol.registers import ACCELERATION_UNIT_RAD_S2, VELOCITY_UNIT_RAD_S
 from snakewalk.sim.line.sim_line import SimLine
@@ -30,7 +31,7 @@ def wait(line: SimLine, seconds: float) -> None:
 @pytest.mark.parametrize("model", MODELS)
 def test_every_model_of_the_x_series_moves_where_it_is_told(model: str) -> None:
     line = SimLine(ServoBank([1], model), BenchPlant(1, inertia_kg_m2=5e-4, dry_n_m=0.0))
-    assert read(line, 1, 0, 2) == line.bank.layout.model_number
+    assert read(line, 1, 0, 2) == load_control_table(line.bank.models[0]).model_number
     setup(line, *RUN, (116, 2500, 4))
     wait(line, 2.0)
     assert read(line, 1, 132, 4) == pytest.approx(2500, abs=15)

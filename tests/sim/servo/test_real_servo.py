@@ -8,8 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from snakewalk.sim.servo.gearbox import GEARBOXES
-from snakewalk.sim.servo.motor import MOTORS, PWM_FULL, p_gain_per_rad
+from snakewalk.sim.servo.motor import GEARBOXES, MOTORS, PWM_FULL, p_gain_per_rad
 
 XL330 = MOTORS["XL330-M288"]
 GEAR = GEARBOXES["XL330-M288"]

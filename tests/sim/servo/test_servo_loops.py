@@ -51,8 +51,9 @@ def test_motion_is_shown_in_the_registers_units_little_endian(how: Any) -> None:
     table = np.zeros((2, 20), np.uint8)
     shafts = (np.array([1.0, -9.0]), np.array([-0.5, 0.25]), np.array([0.5, -2.0]))
     frame = np.array([[1.0, -1.0], [2048.0, 100.0]])
-    places, units = np.array([0, 4, 8]), np.array([0.01, 500.0, 0.25, 1000.0])
-    how(servo_loops.write_motion)(table, places, *shafts, frame, units)
+    places, units = np.array([0, 4, 8]), np.array([0.25, 1000.0])
+    current_units = np.array([[0.01, 0.01], [500.0, 500.0]])
+    how(servo_loops.write_motion)(table, places, *shafts, frame, current_units, units)
     assert table[:, 0:2].copy().view("<i2")[:, 0].tolist() == [100, 500]  # the second at its limit
     assert table[:, 4:8].copy().view("<i4")[:, 0].tolist() == [-2, -1]
     assert table[:, 8:12].copy().view("<i4")[:, 0].tolist() == [2548, 2100]
@@ -91,14 +92,14 @@ def test_goals_within_limits_are_taken_and_others_leave_no_trace(how: Any) -> No
 @pytest.mark.parametrize("how", BOTH)
 def test_loss_grows_with_the_square_of_the_current(how: Any) -> None:
     heat_j = np.array([1.0, 1.0])
-    how(servo_loops.add_loss)(heat_j, np.array([2.0, -3.0]), 0.5)
+    how(servo_loops.add_loss)(heat_j, np.array([2.0, -3.0]), np.array([1.0, 1.0]), 0.5)
     assert heat_j.tolist() == [3.0, 5.5]
 
 
 @pytest.mark.parametrize("how", BOTH)
 def test_a_sensor_goes_its_share_of_the_way_and_the_heat_is_used_up(how: Any) -> None:
     celsius, heat_j = np.array([25.0, 40.0]), np.array([0.5, 0.0])
-    how(servo_loops.warm_up)(celsius, heat_j, 0.05, np.array([25.0, 6.0, 0.1]))
+    how(servo_loops.warm_up)(celsius, heat_j, 0.05, 25.0, np.array([[6.0, 6.0], [0.1, 0.1]]))
     assert celsius.tolist() == pytest.approx([25.0 + 0.1 * 60.0, 40.0 - 0.1 * 15.0])
     assert not heat_j.any()
 
@@ -111,7 +112,9 @@ def test_only_full_output_without_motion_counts_as_blocked(how: Any) -> None:
     limit = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.5])
     on = np.array([1.0, 1.0, 1.0, 1.0, 0.0, 1.0])
     velocity = np.array([0.0, 2.0, 2.0, 0.0, 0.0, 0.0])
-    longest_s = how(servo_loops.count_blocked)(blocked_s, 0.05, pwm, limit, on, velocity, 0.2)
+    longest_s = how(servo_loops.count_blocked)(
+        blocked_s, 0.05, pwm, limit, on, velocity, np.full(6, 0.2)
+    )
     assert blocked_s.tolist() == pytest.approx([0.35, 0.0, 0.35, 0.0, 0.0, 0.35])
     assert longest_s == pytest.approx(0.35)
 
@@ -130,5 +133,6 @@ def test_heat_and_supply_are_judged_in_the_registers_units(
     how: Any, celsius: float, tenths: int, wrong: bool
 ) -> None:
     sensors, hottest = np.array([20.0, celsius]), np.array([80, 80], np.uint8)
+    supply_v = np.full(2, tenths / 10.0)
     least, most = np.array([95, 95], np.uint16), np.array([160, 160], np.uint16)
-    assert how(servo_loops.out_of_range)(sensors, hottest, tenths, least, most) == wrong
+    assert how(servo_loops.out_of_range)(sensors, hottest, supply_v, least, most) == wrong

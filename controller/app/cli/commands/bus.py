@@ -137,7 +137,7 @@ def _simulated(
         line = bench_line(spec, baud or 1_000_000)
     else:
         line = _robot_line(robot, baud)
-        spec = ChainSpec(line.bank.ids, (line.bank.model,) * len(line.bank))
+        spec = ChainSpec(line.bank.ids, line.bank.models)
     if faults is not None:
         FaultPlayer(line, load(faults, FaultPlan), str(faults))
     if isinstance(line, Ax12Line):
