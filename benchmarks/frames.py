@@ -39,7 +39,7 @@ def run() -> list[Row]:
     ground = GroundStep(world())
 
     def usable(body_rad: NDArray[np.float64]) -> bool:
-        return not any(refuse(body_rad[None])[0] for refuse in prepared.refusals.values())
+        return not any(is_bad(body_rad[None])[0] for is_bad in prepared.shape_filters.values())
 
     def synthesis() -> object:
         walker = Walker(shapes, prepared.run.walk, usable)

@@ -19,7 +19,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.motion.cpg_motion import CpgMotion
-from snakewalk.controller.motion.gait_cycle import Cycle
+from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.gait_motion import GaitMotion
 
 TITLE = "Joins inside a control cycle: every gait of alternating16 to every other"
@@ -74,6 +74,6 @@ def _gone(motion: Motion, time_s: float) -> Motion:
 
 
 def _oscillators(gait: Gait, robot: RobotConfig) -> CpgMotion:
-    motion = CpgMotion(robot, Cycle(gait, robot).goal_rad())
+    motion = CpgMotion(robot, GaitCycle(gait, robot).goal_rad())
     motion.become(gait)
     return motion

@@ -14,9 +14,8 @@ import numpy as np
 from benchmarks.rows import Row, cpu_s
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.app.studies.repertoire_physics import FRAME_S, PhysicsBody
-from snakewalk.controller.app.studies.repertoire_planning import plan_route
+from snakewalk.controller.app.studies.repertoire_planning import plan_route, search_cost
 from snakewalk.controller.app.studies.repertoire_recording import ACTIONS, record
-from snakewalk.controller.app.studies.repertoire_timing import search_cost
 from snakewalk.controller.repertoire.crowd import Crowd
 from snakewalk.controller.repertoire.repertoire import Repertoire
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from snakewalk.controller.app.runs.execute import execute
     from snakewalk.controller.app.runs.factory import prepare_gait, prepare_walk
     from snakewalk.controller.app.studies.sweep_measure import measure
-    from snakewalk.controller.app.studies.sweep_plan import plan_sweep
+    from snakewalk.controller.app.studies.sweep_points import plan_sweep
     from snakewalk.controller.gaits.gait import Gait, Needs
     from snakewalk.controller.gaits.registry import GAITS, make_gait
     from snakewalk.controller.kinematics.links import BodyView, body_in_world
@@ -95,7 +95,7 @@ _NAMES = {
     "controller.app.runs.execute": ("execute",),
     "controller.app.runs.factory": ("prepare_gait", "prepare_walk"),
     "controller.app.studies.sweep_measure": ("measure",),
-    "controller.app.studies.sweep_plan": ("plan_sweep",),
+    "controller.app.studies.sweep_points": ("plan_sweep",),
     "controller.gaits.gait": ("Gait", "Needs"),
     "controller.gaits.registry": ("GAITS", "make_gait"),
     "controller.kinematics.links": ("BodyView", "body_in_world"),

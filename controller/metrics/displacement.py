@@ -8,7 +8,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.virtual_chassis import virtual_chassis
-from snakewalk.controller.motion.gait_cycle import Cycle
+from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.stop_profile import STOP_S
 from snakewalk.controller.runlog.record import RunRecord
 
@@ -43,7 +43,7 @@ def gait_way(record: RunRecord) -> GaitWay:
     config, robot, pose = record.header.run.gait, record.header.robot, record.pose
     if config is None:
         raise InputError("the log is of no gait")
-    hz = Cycle(make_gait(config.name, config.parameters), robot).frequency_hz
+    hz = GaitCycle(make_gait(config.name, config.parameters), robot).frequency_hz
     nothing = GaitWay(0, hz, *(float("nan"),) * 4)
     known = np.isfinite(pose.links_m).all(axis=(1, 2))
     if not known.any() or hz <= 0.0:

@@ -1,1 +1,1 @@
-"""From states to joints: angle track, velocity, points, ground step, retargeting, retiming."""
+"""Motion sources: everything that moves joints, and the joins from one source to another."""

@@ -12,7 +12,7 @@ from snakewalk.controller.gaits.cpg.oscillators import Cpg, CpgState
 from snakewalk.controller.gaits.cpg.pattern import Pattern
 from snakewalk.controller.gaits.gait import Gait, Needs
 from snakewalk.controller.kinematics.links import BodyView
-from snakewalk.controller.motion.gait_cycle import Cycle
+from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.source import Pace
 
 GAINS = np.geomspace(10.0, 0.5, 10)
@@ -178,7 +178,7 @@ class CpgMotion:
             pattern, needs = Pattern.rest(self.cpg.pattern.offset_rad), self.needs
             settled = Pace.still(self.robot.joint_count)
         else:
-            cycle = Cycle(gait, self.robot)
+            cycle = GaitCycle(gait, self.robot)
             pattern, needs = Pattern.of(gait, self.robot, cycle.rate_rad_s), gait.needs
             settled = cycle.pace()
         parts, under_way = quickest_change(self.cpg, pattern, self._limit)

@@ -10,7 +10,7 @@ from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.source import HEADROOM, Pace
 
 
-class Cycle:
+class GaitCycle:
     """One gait with fixed parameters, running; slowed down where its joints would be too fast."""
 
     done = False

@@ -1,15 +1,16 @@
-"""A gait that runs, changes live and stops, within the robot's limits."""
+"""A gait that runs, changes live and stops, within the robot's limits; and a sequence of gaits."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, Needs
 from snakewalk.controller.kinematics.links import BodyView
-from snakewalk.controller.motion.gait_cycle import Cycle
+from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.source import Pace
-from snakewalk.controller.motion.source_switch import Relay
-from snakewalk.controller.motion.stop_profile import ComingToRest
+from snakewalk.controller.motion.source_switch import SourceSwitch
+from snakewalk.controller.motion.stop_profile import StopProfile
 
 
 class GaitMotion:
@@ -30,10 +31,10 @@ class GaitMotion:
 
         """
         self._robot = robot
-        self._cycle = Cycle(gait, robot, phase_rad)
-        self._relay = Relay(robot, self._cycle)
-        self._left_s = duration_s
-        self._rest = ComingToRest()
+        self._cycle = GaitCycle(gait, robot, phase_rad)
+        self._switch = SourceSwitch(robot, self._cycle)
+        self._remaining_s = duration_s
+        self._stop_profile = StopProfile()
         self.cycles = 0.0
         """Gone through so far."""
 
@@ -50,7 +51,7 @@ class GaitMotion:
     @property
     def frequency_hz(self) -> float:
         """Cycles a second now."""
-        return self._cycle.frequency_hz * self._rest.rate
+        return self._cycle.frequency_hz * self._stop_profile.rate
 
     @property
     def needs(self) -> Needs:
@@ -60,12 +61,12 @@ class GaitMotion:
     @property
     def done(self) -> bool:
         """Whether it has come to rest after ``stop`` or its duration."""
-        return self._rest.over
+        return self._stop_profile.over
 
     @property
     def stopping(self) -> bool:
         """Whether it is coming to rest, or has."""
-        return self._rest.begun
+        return self._stop_profile.begun
 
     def change(self, **values: Any) -> float:
         """Give parameters new values, at the phase now; returns the time until they are in force.
@@ -84,33 +85,72 @@ class GaitMotion:
             InputError: joints are missing, or do not bend so far; nothing changes then.
 
         """
-        cycle = Cycle(gait, self._robot, self.phase_rad)
-        duration_s = self._relay.join(cycle)
+        cycle = GaitCycle(gait, self._robot, self.phase_rad)
+        duration_s = self._switch.join(cycle)
         self._cycle = cycle
         return duration_s
 
     def stop(self) -> None:
-        """Come to rest as ``ComingToRest`` does."""
-        self._rest.stop()
+        """Come to rest along a ``StopProfile``."""
+        self._stop_profile.stop()
 
     def goal_rad(self) -> Floats:
         """(J,) joint targets now."""
-        return self._relay.goal_rad()
+        return self._switch.goal_rad()
 
     def velocity_rad_s(self) -> Floats:
         """(J,) how fast they move now."""
-        return self._rest.rate * self._relay.velocity_rad_s()
+        return self._stop_profile.rate * self._switch.velocity_rad_s()
 
     def pace(self) -> Pace:
         """That of the gait, or the robot's limits while it changes."""
-        return self._relay.pace()
+        return self._switch.pace()
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""
-        if self._left_s is not None:
-            self._left_s -= dt_s
-            if self._left_s <= 0.0:
+        if self._remaining_s is not None:
+            self._remaining_s -= dt_s
+            if self._remaining_s <= 0.0:
                 self.stop()
-        part_s = self._rest.step(dt_s)
+        part_s = self._stop_profile.step(dt_s)
         self.cycles += part_s * self._cycle.frequency_hz
-        return self._relay.step(part_s, view)
+        return self._switch.step(part_s, view)
+
+
+class GaitSequence:
+    """Runs a ``GaitMotion`` through gaits."""
+
+    def __init__(self, motion: GaitMotion, changes: Sequence[tuple[float, Gait]]) -> None:
+        """Take gaits at rising times on the motion's own time; all suit its robot."""
+        self.motion = motion
+        self._due = list(changes)
+        self._now_s = 0.0
+
+    @property
+    def needs(self) -> Needs:
+        """Those of the gait that runs."""
+        return self.motion.needs
+
+    @property
+    def done(self) -> bool:
+        """Whether the motion is."""
+        return self.motion.done
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return self.motion.goal_rad()
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        return self.motion.velocity_rad_s()
+
+    def pace(self) -> Pace:
+        """That of the motion."""
+        return self.motion.pace()
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Change gait if it is time to, then go on by ``dt_s``."""
+        while self._due and self._now_s >= self._due[0][0] - 1e-9:
+            self.motion.become(self._due.pop(0)[1])
+        self._now_s += dt_s
+        return self.motion.step(dt_s, view)

@@ -9,11 +9,11 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.rotations import wrap
-from snakewalk.controller.motion.rate_limiter import Follower
+from snakewalk.controller.motion.rate_limiter import RateLimiter
 from snakewalk.controller.motion.source import MotionSource, Pace
 
 LEAD_S = 0.12
-"""How far the swing of the body is foreseen: the servos' lag and the follower's."""
+"""How far the swing of the body is foreseen: the lag of the servos and of the rate limiter."""
 RANGE_SHARE = 0.9
 """Of the neck joints' range."""
 
@@ -51,7 +51,7 @@ class HeadSteering:
         self._neck = np.array(robot.yaw_joints[:neck_joints])
         self._robot = robot
         self._reach = RANGE_SHARE * robot.yaw_limit_rad
-        self._follower = Follower(
+        self._limiter = RateLimiter(
             source.goal_rad()[self._neck],
             robot.joint_speed_limit_rad_s,
             robot.joint_acceleration_limit_rad_s2,
@@ -66,11 +66,11 @@ class HeadSteering:
 
     def goal_rad(self) -> Floats:
         """(J,) joint targets now."""
-        return self._with_neck(self.source.goal_rad(), self._follower.angle_rad)
+        return self._with_neck(self.source.goal_rad(), self._limiter.angle_rad)
 
     def velocity_rad_s(self) -> Floats:
         """(J,) how fast they move now."""
-        return self._with_neck(self.source.velocity_rad_s(), self._follower.speed_rad_s)
+        return self._with_neck(self.source.velocity_rad_s(), self._limiter.speed_rad_s)
 
     def pace(self) -> Pace:
         """The source's, and all that the robot allows in the neck."""
@@ -92,7 +92,7 @@ class HeadSteering:
         wanted = float(wrap(self.target.heading_from(view.link_m[0]) - shoulders))
         each = (wanted - LEAD_S * self._swing_rad_s) / len(self._neck)
         each = min(max(each, -self._reach), self._reach)
-        angles = self._follower.step(dt_s, np.full(len(self._neck), each))
+        angles = self._limiter.step(dt_s, np.full(len(self._neck), each))
         return self._with_neck(goal, angles)
 
     def _with_neck(self, joints: Floats, neck: Floats) -> Floats:

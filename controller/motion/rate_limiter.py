@@ -1,12 +1,12 @@
-"""Joints that follow a wish as fast as they may: speed and acceleration are limited by making."""
+"""Rate limiter: joints follow a target within limits of speed and acceleration."""
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 
 
-class Follower:
-    """A second-order follower; call ``step`` with the angles wished for."""
+class RateLimiter:
+    """A second-order follower of target angles."""
 
     def __init__(
         self,
@@ -20,14 +20,14 @@ class Follower:
         self._speed, self._acceleration = speed_limit_rad_s, acceleration_limit_rad_s2
         self._gain = gain_per_s
 
-    def step(self, dt_s: float, wish_rad: Floats) -> Floats:
-        """Go on by ``dt_s`` towards ``wish_rad`` (n,); returns the angles (n,).
+    def step(self, dt_s: float, target_rad: Floats) -> Floats:
+        """Go on by ``dt_s`` towards ``target_rad`` (n,); returns the angles (n,).
 
-        The speed wanted is never one from which it could not stop at the wish.
+        The speed asked is never one from which the joint could not stop at the target.
         """
         if dt_s <= 0.0:
             return self.angle_rad
-        error = wish_rad - self.angle_rad
+        error = target_rad - self.angle_rad
         stoppable = np.sqrt(self._acceleration * np.abs(error))
         most = np.minimum(np.minimum(self._gain * np.abs(error), stoppable), self._speed)
         change = np.sign(error) * most - self.speed_rad_s

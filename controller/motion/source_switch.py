@@ -1,4 +1,4 @@
-"""A motion source that can be handed from one source to another while it runs."""
+"""Source switch: a motion source that changes from one source to another while it runs."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from snakewalk.controller.motion.blend import Blend
 from snakewalk.controller.motion.source import MotionSource, Pace
 
 
-class Relay:
+class SourceSwitch:
     """Begins at rest where its first source begins; ``join`` changes the source, C1."""
 
     def __init__(self, robot: RobotConfig, first: MotionSource) -> None:

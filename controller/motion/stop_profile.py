@@ -1,41 +1,45 @@
-"""How a motion comes to rest where it is: its time slows down to a stop."""
+"""Stop profile: a motion comes to rest where it is, because its own time slows down to a stop."""
 
 from snakewalk.controller.kinematics.smoothstep import cubic
 
 STOP_S = 1.0
 
 
-class ComingToRest:
+class StopProfile:
     """The rate of a motion's own time: 1 until ``stop``, and 0 from ``STOP_S`` after it."""
 
     def __init__(self) -> None:
-        self._gone_s: float | None = None
-        """Since ``stop``."""
+        self._since_stop_s: float | None = None
+        """Time since ``stop``."""
 
     @property
     def begun(self) -> bool:
-        """Whether it has been told to stop."""
-        return self._gone_s is not None
+        """Whether ``stop`` has been called."""
+        return self._since_stop_s is not None
 
     @property
     def over(self) -> bool:
         """Whether it rests."""
-        return self._gone_s is not None and self._gone_s >= STOP_S
+        return self._since_stop_s is not None and self._since_stop_s >= STOP_S
 
     @property
     def rate(self) -> float:
         """1 at full rate, 0 at rest."""
-        return 1.0 if self._gone_s is None else 1.0 - cubic(min(self._gone_s / STOP_S, 1.0))
+        return (
+            1.0
+            if self._since_stop_s is None
+            else 1.0 - cubic(min(self._since_stop_s / STOP_S, 1.0))
+        )
 
     def stop(self) -> None:
         """Slow down from now on."""
-        if self._gone_s is None:
-            self._gone_s = 0.0
+        if self._since_stop_s is None:
+            self._since_stop_s = 0.0
 
     def step(self, dt_s: float) -> float:
         """Go on by ``dt_s``; returns by how much the motion goes on."""
-        if self._gone_s is None:
+        if self._since_stop_s is None:
             return dt_s
         before = self.rate
-        self._gone_s += dt_s
+        self._since_stop_s += dt_s
         return 0.5 * (before + self.rate) * dt_s

@@ -10,8 +10,8 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.source import Pace
-from snakewalk.controller.motion.source_switch import Relay
-from snakewalk.controller.motion.stop_profile import ComingToRest
+from snakewalk.controller.motion.source_switch import SourceSwitch
+from snakewalk.controller.motion.stop_profile import StopProfile
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.segment import Segment
 
@@ -80,9 +80,9 @@ class RepertoireMotion:
         self._repertoire, self._robot, self._choose = repertoire, robot, choose
         self.action = first
         self._cycle = SegmentCycle(repertoire.segments[first], robot)
-        self._relay = Relay(robot, self._cycle)
+        self._switch = SourceSwitch(robot, self._cycle)
         self._ends = 1
-        self._rest = ComingToRest()
+        self._stop_profile = StopProfile()
 
     @property
     def needs(self) -> Needs:
@@ -92,24 +92,24 @@ class RepertoireMotion:
     @property
     def done(self) -> bool:
         """Whether it has come to rest."""
-        return self._rest.over
+        return self._stop_profile.over
 
     @property
     def stopping(self) -> bool:
         """Whether it is coming to rest, or has."""
-        return self._rest.begun
+        return self._stop_profile.begun
 
     def stop(self) -> None:
-        """Come to rest as ``ComingToRest`` does."""
-        self._rest.stop()
+        """Come to rest along a ``StopProfile``."""
+        self._stop_profile.stop()
 
     def goal_rad(self) -> Floats:
         """(J,) joint targets now."""
-        return self._relay.goal_rad()
+        return self._switch.goal_rad()
 
     def velocity_rad_s(self) -> Floats:
         """(J,) how fast they move now."""
-        return self._rest.rate * self._relay.velocity_rad_s()
+        return self._stop_profile.rate * self._switch.velocity_rad_s()
 
     def pace(self) -> Pace:
         """The robot's limits: actions follow each other."""
@@ -117,9 +117,9 @@ class RepertoireMotion:
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""
-        if not self._rest.begun and self._cycle.cycles >= self._ends - 1e-6:
+        if not self._stop_profile.begun and self._cycle.cycles >= self._ends - 1e-6:
             self._next(view)
-        return self._relay.step(self._rest.step(dt_s), view)
+        return self._switch.step(self._stop_profile.step(dt_s), view)
 
     def _next(self, view: BodyView) -> None:
         chosen = self._choose(view)
@@ -130,4 +130,4 @@ class RepertoireMotion:
         else:
             self.action, self._ends = chosen, 1
             self._cycle = SegmentCycle(self._repertoire.segments[chosen], self._robot)
-            self._relay.join(self._cycle)
+            self._switch.join(self._cycle)

@@ -1,1 +1,1 @@
-"""The loop: steering by the measured pose, absolute deadlines, ramps, alarms."""
+"""The running robot: forecast, control loop, drive, derating and slip monitor."""

@@ -5,6 +5,7 @@ motion goes on slower, cooler and with less current instead of stopping. It fall
 back slowly. Safety below stays as it is: what gets worse all the same still trips.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.types import JointState
 
 LEAST = 0.25
-"""Of the rate; a motion that stood still could not be told from one that hangs."""
+"""Of the rate; a motion that stands still looks like one that hangs."""
 HEAT_BAND_C = 10.0
 """From so far below the limit on, down to ``HEAT_EDGE_C`` below it."""
 HEAT_EDGE_C = 2.0
@@ -28,7 +29,7 @@ FALL_S, RISE_S = 0.4, 6.0
 """Time constants of the rate."""
 CURRENT_S = 0.2
 """Over which current is averaged: a peak is no load."""
-SAY_BELOW, SAY_ABOVE = 0.95, 0.99
+REPORT_BELOW, REPORT_ABOVE = 0.95, 0.99
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +42,11 @@ class Allowed:
     """What limits it, one line; empty at 1."""
 
 
-PLENTY = Allowed(1.0, "")
+UNLIMITED = Allowed(1.0, "")
 
 
 def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allowed:
-    """Judge a state; temperatures and voltages that were not read yet (NaN) limit nothing.
+    """Return what a state allows; what was not read yet (NaN) limits nothing.
 
     Args:
         state: of the servos.
@@ -59,7 +60,7 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
         safety.current_limit_a,
         safety.voltage_min_v,
     )
-    judged = (
+    ratings = (
         (_falling(heat, limit_c - HEAT_BAND_C, limit_c - HEAT_EDGE_C), heat, "{:.0f} C", limit_c),
         (
             _falling(amps, CURRENT_START * limit_a, CURRENT_END * limit_a),
@@ -74,11 +75,11 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
             least_v,
         ),
     )
-    rates, values, unit, limit = min(judged, key=lambda each: float(each[0].min()))
+    rates, values, unit, limit = min(ratings, key=lambda each: float(each[0].min()))
     joint = int(np.argmin(rates))
     rate = LEAST + (1.0 - LEAST) * float(rates[joint])
     if rate >= 1.0:
-        return PLENTY
+        return UNLIMITED
     text = f"joint {joint + 1} at {unit.format(values[joint])}, limit {unit.format(limit)}"
     return Allowed(rate, text)
 
@@ -87,7 +88,7 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
     f"boolean(float64[::1], {readonly_array()}, float64, {readonly_array()}, {readonly_array()},"
     " float64, float64, float64)"
 )
-def _plenty(
+def _is_unlimited(
     mean_a: Floats,
     current_a: Floats,
     share: float,
@@ -118,21 +119,23 @@ def _falling(values: Floats, start: float, end: float) -> Floats:
 class Derating:
     """Call ``update`` in every cycle; multiplies the rate of whatever moves."""
 
-    def __init__(self, safety: SafetyConfig) -> None:
+    def __init__(
+        self, safety: SafetyConfig, on_event: Callable[[str, str], None] = lambda kind, text: None
+    ) -> None:
         self.rate = 1.0
         self.least = 1.0
         """Lowest rate so far."""
         self._safety = safety
+        self._on_event = on_event
         self._current_a = np.zeros(0)
-        self._said = False
-        self._news: list[str] = []
+        self._is_reported = False
 
     def update(self, state: JointState, dt_s: float) -> float:
-        """Take in a state and return the rate, LEAST to 1."""
+        """Take in a state and return the rate, LEAST to 1; ``on_event`` takes large changes."""
         safety = self._safety
         if len(self._current_a) != len(state.current_a):
             self._current_a = np.zeros(len(state.current_a))
-        plenty = _plenty(
+        unlimited = _is_unlimited(
             self._current_a,
             state.current_a,
             min(1.0, dt_s / CURRENT_S),
@@ -142,7 +145,7 @@ class Derating:
             safety.temperature_limit_c - HEAT_BAND_C,
             safety.voltage_min_v + VOLTAGE_BAND_V,
         )
-        now = PLENTY if plenty else allowed(state, self._current_a, safety)
+        now = UNLIMITED if unlimited else allowed(state, self._current_a, safety)
         if now.rate == self.rate:
             return self.rate
         time_s = FALL_S if now.rate < self.rate else RISE_S
@@ -150,15 +153,10 @@ class Derating:
         if now.rate == 1.0 and self.rate > 0.999:
             self.rate = 1.0
         self.least = min(self.least, self.rate)
-        if not self._said and self.rate < SAY_BELOW:
-            self._said = True
-            self._news.append(f"slowing down: {now.reason}")
-        elif self._said and self.rate > SAY_ABOVE:
-            self._said = False
-            self._news.append("at full rate again")
+        if not self._is_reported and self.rate < REPORT_BELOW:
+            self._is_reported = True
+            self._on_event("derating", f"slowing down: {now.reason}")
+        elif self._is_reported and self.rate > REPORT_ABOVE:
+            self._is_reported = False
+            self._on_event("derating", "at full rate again")
         return self.rate
-
-    def news(self) -> list[str]:
-        """Lines for the operator since the last call."""
-        news, self._news = self._news, []
-        return news

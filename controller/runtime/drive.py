@@ -4,21 +4,43 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
+import numpy as np
+
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
+from snakewalk.controller.kinematics.smoothstep import QUINTIC_BEND_MAX, QUINTIC_SLOPE_MAX, quintic
 from snakewalk.controller.motion.path_progress import path_progress
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.derating import Derating
 from snakewalk.controller.runtime.loop import Tick, ticks
-from snakewalk.controller.runtime.ramp import Ramp
-from snakewalk.controller.runtime.slip_monitor import AdvanceWatch
+from snakewalk.controller.runtime.slip_monitor import SlipMonitor
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import SafetyTrippedError
 from snakewalk.drivers.link import VettedLink
 from snakewalk.drivers.types import BodyPose, JointCommand, JointState
+
+
+class Ramp:
+    """Quintic blend: speed and acceleration are zero at both ends."""
+
+    def __init__(
+        self, start_rad: Floats, goal_rad: Floats, speed_rad_s: float, acceleration_rad_s2: float
+    ) -> None:
+        self._start, self._goal = np.array(start_rad), np.array(goal_rad)
+        reach_rad = float(np.abs(self._goal - self._start).max(initial=0.0))
+        self.duration_s = max(
+            reach_rad * QUINTIC_SLOPE_MAX / speed_rad_s,
+            float(np.sqrt(reach_rad * QUINTIC_BEND_MAX / acceleration_rad_s2)),
+        )
+
+    def at(self, time_s: float) -> Floats:
+        """Joint angles (J,) after ``time_s``; the goal from ``duration_s`` on."""
+        t = 1.0 if self.duration_s == 0.0 else min(max(time_s / self.duration_s, 0.0), 1.0)
+        return np.asarray(self._start + quintic(t) * (self._goal - self._start))
+
 
 PoseSource = Callable[[JointState], BodyPose]
 _SETTLE_S = 0.3
@@ -84,26 +106,26 @@ class Drive:
         self._motion, self._path = motion, path_progress(motion)
         self._log, self._robot, self._run = log, robot, run
         self._gain = gain
-        self._watch = AdvanceWatch(robot.length_m, gain, run.safety.advance_fraction)
-        self._derating = Derating(run.safety)
+        self._slip_monitor = SlipMonitor(robot.length_m, gain, run.safety.advance_fraction)
+        self._derating = Derating(run.safety, self._on_derating)
         self._on_progress, self._on_event = on_progress, on_event
         self._wire_busy_s = wire_busy_s
         self._wire_s = wire_busy_s()
         self._alarms = 0
         self._speed_m_s = 0.0
         self._last: BodyView | None = None
-        self._way_m = 0.0
+        self._displacement_m = 0.0
 
     def run(self) -> Outcome:
         """Enable, ramp to the first shape, follow the path, settle, disable."""
         clock, log, motion, path = self._clock, self._log, self._motion, self._path
         period_s = 1.0 / self._run.cycle_hz
         with self._link:
-            found = self._link.enable()
+            state = self._link.enable()
             self._wire_s = self._wire_busy_s()
-            view = body_in_world(self._robot, self._pose(found), found.position_rad)
+            view = body_in_world(self._robot, self._pose(state), state.position_rad)
             ramp = Ramp(
-                found.position_rad,
+                state.position_rad,
                 path.begin(view),
                 self._robot.joint_speed_limit_rad_s,
                 self._robot.joint_acceleration_limit_rad_s2,
@@ -119,11 +141,13 @@ class Drive:
                     break
                 pose = self._pose(state)
                 view = body_in_world(self._robot, pose, state.position_rad)
-                self._way_m = view.advance_since_m(self._last) if self._last is not None else 0.0
+                self._displacement_m = (
+                    view.advance_since_m(self._last) if self._last is not None else 0.0
+                )
                 if clock.now_s() < walk_s:
                     goal = ramp.at(clock.now_s() - start_s)
                 else:
-                    goal = self._steer(period_s * self._rate(state, period_s), view)
+                    goal = self._steer(period_s * self._derating.update(state, period_s), view)
                 self._send(tick, state, pose, view, goal)
                 if self._link.tripped or motion.done:
                     break
@@ -141,13 +165,9 @@ class Drive:
         least = self._derating.least
         return Outcome(path.reached, path.missed, duration_s, self._alarms, tripped, least)
 
-    def _rate(self, state: JointState, period_s: float) -> float:
-        """How fast the motion may run, so that no servo trips."""
-        rate = self._derating.update(state, period_s)
-        for text in self._derating.news():
-            self._log.event(self._clock.now_s(), "derating", text, "warning")
-            self._on_event("derating", text)
-        return rate
+    def _on_derating(self, kind: str, text: str) -> None:
+        self._log.event(self._clock.now_s(), kind, text, "warning")
+        self._on_event(kind, text)
 
     def _steer(self, period_s: float, view: BodyView) -> Floats:
         path, log, now_s = self._path, self._log, self._clock.now_s()
@@ -168,9 +188,9 @@ class Drive:
                 ramp_rad=d.ramp_rad,
                 candidates=d.candidates,
             )
-        if self._watch.update(path.pulse_m_s * period_s, self._way_m):
+        if self._slip_monitor.update(path.pulse_m_s * period_s, self._displacement_m):
             self._alarms += 1
-            share = self._watch.window.share if self._watch.window else float("nan")
+            share = self._slip_monitor.window.share if self._slip_monitor.window else float("nan")
             text = f"the body makes {share:.0%} of its predicted way: is the ground too slippery?"
             log.event(now_s, "alarm", text, "warning")
         return goal
@@ -220,4 +240,4 @@ class Drive:
     def _measure_speed(self) -> None:
         """Forward speed of the links along themselves, mean over the body, smoothed over 0.5 s."""
         hz = self._run.cycle_hz
-        self._speed_m_s += min(2.0 / hz, 1.0) * (self._way_m * hz - self._speed_m_s)
+        self._speed_m_s += min(2.0 / hz, 1.0) * (self._displacement_m * hz - self._speed_m_s)

@@ -1,4 +1,4 @@
-"""The angle track: tangent angles along the way that the head goes, grown piece by piece.
+"""The angle track: tangent angles along the path of the head, extended piece by piece.
 
 [PT] 2.6.4 looks the angles up again and again, a fraction of a point at a time, which blurs them.
 Here the samples stay untouched and one accumulated shift says where the head is on them, so with
@@ -52,7 +52,7 @@ class AngleTrack:
         """Angles at places on the track, between samples linearly; clamped to its ends."""
         return np.asarray(np.interp(sample, np.arange(self.end), self._samples))
 
-    def way(self, start: int, stop: int, rotation_rad: float = 0.0) -> Floats:
+    def displacement(self, start: int, stop: int, rotation_rad: float = 0.0) -> Floats:
         """Displacement (2,), in segments, of a head that follows the samples without slip."""
         angles = self._samples[start:stop] + rotation_rad
         return np.array([np.cos(angles).sum(), np.sin(angles).sum()])

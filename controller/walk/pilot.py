@@ -13,6 +13,7 @@ from contextlib import suppress
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -23,26 +24,65 @@ from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.walk.angle_track import AngleTrack
-from snakewalk.controller.walk.steering import Path, aim_rad
-from snakewalk.controller.walk.time_law import Pulse
+from snakewalk.controller.walk.time_law import TimeLaw
 
-_ASTRAY_BODIES = 0.5
+
+class Path(Protocol):
+    """A path over the ground, by arc length from its start."""
+
+    @property
+    def length_m(self) -> float:
+        """Arc length of the whole path."""
+        ...
+
+    def position(self, s_m: ArrayLike) -> Floats:
+        """(..., 2) points at arc lengths, clamped to the ends."""
+        ...
+
+    def follow(self, points_m: Floats, s_m: Floats, gap_m: Floats) -> None:
+        """Move (n,) arc lengths on to where (n, 2) points are nearest; write them and the gaps."""
+        ...
+
+    def nearest(self, point_m: ArrayLike, from_s_m: float = 0.0, window_m: float = 1.5) -> float:
+        """Arc length of the closest point in ``[from_s_m, from_s_m + window_m]``."""
+        ...
+
+    def first_pass(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
+        """Arc length at which the path first comes nearest to a point that it leads through."""
+        ...
+
+
+def aim_rad(path: Path, from_m: Floats, along_m: float, carrot_m: float) -> float:
+    """Direction from a point to the carrot ``carrot_m`` beyond ``along_m`` on the path.
+
+    The path is taken to go on straight past its end, or the last carrot would turn the body around.
+    """
+    at = along_m + carrot_m
+    carrot = path.position(min(at, path.length_m))
+    if at > path.length_m:
+        before = path.position(path.length_m - 0.05)
+        step = carrot - before
+        carrot = carrot + step / max(float(np.hypot(*step)), 1e-9) * (at - path.length_m)
+    return float(np.arctan2(carrot[1] - from_m[1], carrot[0] - from_m[0]))
+
+
+_OFF_PATH_BODIES = 0.5
 
 # Segments of track left when the next piece is decided: the time law must see beyond the head.
-_FORESIGHT = 6.0
+_LOOKAHEAD_SEGMENTS = 6.0
 _LIFT_S = 0.1
 
-# Shorter steps are saved up: no speed could be told from them.
+# Shorter steps are saved up: they are too short to measure a speed.
 _SHORTEST_STEP_S = 1e-5
 
-# Body lengths of track before another path may be laid: turning back takes about as much.
-_PATIENCE_BODIES = 2.0
+# Body lengths of track before another path may be planned: turning back takes about as much.
+_REPLAN_AFTER_BODIES = 2.0
 Planner = Callable[[Floats], Path]
-"""Lays a path through (n, 2) points in order."""
+"""Plans a path through (n, 2) points in order."""
 
 
-class TrackSource(Protocol):
-    """What grows the angle track."""
+class ShapeChooser(Protocol):
+    """Chooses shapes and appends them to the angle track."""
 
     track: AngleTrack
 
@@ -52,7 +92,7 @@ class TrackSource(Protocol):
 
 
 class Pilot:
-    """Steers a track source along a path through waypoints.
+    """Steers a chooser of shapes along a path through waypoints.
 
     The time law keeps the joints within the robot's limits.
     """
@@ -61,13 +101,13 @@ class Pilot:
 
     def __init__(
         self,
-        source: TrackSource,
-        pulse: Pulse,
+        chooser: ShapeChooser,
+        time_law: TimeLaw,
         *,
         pace: Pace,
         plan: Planner,
         pitch_fitter: PitchFitter | None = None,
-        fall_back: Callable[[bool], None] = lambda lost: None,
+        fall_back: Callable[[bool], None] | None = None,
         start_m: Floats,
         waypoints_m: Sequence[tuple[float, float]],
         length_m: float,
@@ -76,32 +116,32 @@ class Pilot:
         feedback: bool = True,
         aim_at_waypoint: bool = False,
     ) -> None:
-        self._source = source
-        self._pulse = pulse
+        self._chooser = chooser
+        self._time_law = time_law
         self._pace = pace
-        self._goal_rad = pulse.goal_rad()
+        self._goal_rad = time_law.goal_rad()
         self._speed_rad_s = np.zeros(len(self._goal_rad))
         self._gain_rad_s2 = np.zeros(len(self._goal_rad))
         self._last_s = self._saved_s = 0.0
         self._plan = plan
         self._pitch_fitter = pitch_fitter
-        self._fall_back = fall_back
+        self._fall_back = fall_back or (lambda lost: None)
         self._pitch_rad: Floats | None = None
         self._waypoints_m = np.asarray(waypoints_m, float)
         self._goals_m: list[list[float]] = self._waypoints_m.tolist()  # to numbers once, for speed
         self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
         self._length_m = length_m
-        self._lay_path(np.asarray(start_m, float), 0)
-        self._segment_m = length_m / source.track.points
+        self._plan_path(np.asarray(start_m, float), 0)
+        self._segment_m = length_m / chooser.track.points
         self._carrot_m = carrot_m
         self._radius_m = waypoint_radius_m
         self._feedback = feedback
         self._aim_at_waypoint = aim_at_waypoint
         self._start: tuple[Floats, float] | None = None
         self.reached = 0
-        self._patience = 0.0
+        self._replan_after = 0.0
         self.missed = 0
-        """How often a waypoint was passed outside its radius, and a new path laid to it."""
+        """How often a waypoint was passed outside its radius, and a new path was planned to it."""
         self.decision: Decision | None = None
         """Made in the last step, if one was."""
 
@@ -113,12 +153,12 @@ class Pilot:
     @property
     def done(self) -> bool:
         """Whether every waypoint has been reached and the shape has come to rest."""
-        return self.complete and self._pulse.speed_segments_s == 0.0
+        return self.complete and self._time_law.speed_segments_s == 0.0
 
     @property
     def head(self) -> float:
         """Segments that the head has travelled along the track."""
-        return self._pulse.head
+        return self._time_law.head
 
     @property
     def along_m(self) -> float:
@@ -127,8 +167,8 @@ class Pilot:
 
     @property
     def pulse_m_s(self) -> float:
-        """Pulse speed u: how fast the shape travels along the body."""
-        return self._pulse.speed_segments_s * self._segment_m
+        """TimeLaw speed u: how fast the shape travels along the body."""
+        return self._time_law.speed_segments_s * self._segment_m
 
     def path_m(self, count: int) -> Floats:
         """(count, 2) points along the path in force."""
@@ -148,7 +188,7 @@ class Pilot:
 
     def begin(self, view: BodyView) -> Floats:
         """Fit the first shape to the ground under the body; returns the first targets (J,)."""
-        self._goal_rad = self._on_ground(self._pulse.goal_rad(), 0.0, view)
+        self._goal_rad = self._on_ground(self._time_law.goal_rad(), 0.0, view)
         return self._goal_rad
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
@@ -170,12 +210,12 @@ class Pilot:
         self.path.follow(followers_m, self._along_m, self._gap_m)
         self._count(followers_m[0], followers_m[1])
         self.decision = None
-        if self.head >= self._source.track.end - _FORESIGHT:
-            self.decision = self._source.decide(*self._aim(view))
+        if self.head >= self._chooser.track.end - _LOOKAHEAD_SEGMENTS:
+            self.decision = self._chooser.decide(*self._aim(view))
         if self.complete:
-            self._pulse.stop()
-        self._pulse.advance(dt_s)
-        return self._on_ground(self._pulse.goal_rad(), dt_s, view)
+            self._time_law.stop()
+        self._time_law.advance(dt_s)
+        return self._on_ground(self._time_law.goal_rad(), dt_s, view)
 
     def _on_ground(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:
         """Add to yaw goals (J,) the pitch that fits the body to the ground under it.
@@ -198,14 +238,14 @@ class Pilot:
         if math.hypot(x_m - centre_m[0], y_m - centre_m[1]) <= self._radius_m:
             self.reached += 1
             self._fall_back(False)
-        elif self._feedback and self.head >= self._patience and self._astray(centre_m):
+        elif self._feedback and self.head >= self._replan_after and self._is_off_path(centre_m):
             self.missed += 1
             self._fall_back(True)
-            self._patience = self.head + _PATIENCE_BODIES * self._source.track.points
+            self._replan_after = self.head + _REPLAN_AFTER_BODIES * self._chooser.track.points
             with suppress(InputError):  # from here no safe way leads back: the old path stays
-                self._lay_path(head_m, self.reached)
+                self._plan_path(head_m, self.reached)
 
-    def _astray(self, centre_m: Floats) -> bool:
+    def _is_off_path(self, centre_m: Floats) -> bool:
         """Whether the next waypoint has been passed by, or the path been left by half a body."""
         path, end_m = self.path, self.path.length_m
         along_m, gap_m = float(self._along_m[0]), float(self._gap_m[0])
@@ -215,10 +255,10 @@ class Pilot:
             along_m += float((centre_m - last[1]) @ ahead)
         return bool(
             along_m > self._passed_m[self.reached] + self._radius_m
-            or gap_m > _ASTRAY_BODIES * self._length_m
+            or gap_m > _OFF_PATH_BODIES * self._length_m
         )
 
-    def _lay_path(self, from_m: Floats, first: int) -> None:
+    def _plan_path(self, from_m: Floats, first: int) -> None:
         """Plan from a point through the waypoints from ``first`` on."""
         self.path = self._plan(np.vstack([from_m, self._waypoints_m[first:]]))
         self._along_m = np.zeros(2)  # of the body's centre, and of its head
@@ -241,19 +281,21 @@ class Pilot:
             along_m = self.path.nearest(head_m, self.along_m)
             return offset, aim_rad(self.path, head_m, along_m, self._carrot_m)
         # The piece begins where the track ends now: aim from where the head will be by then.
-        lead_m = (self._source.track.end - self.head) * self._segment_m
+        lead_m = (self._chooser.track.end - self.head) * self._segment_m
         heading = view.headings_rad.mean()
         ahead_m = head_m + lead_m * np.array([np.cos(heading), np.sin(heading)])
         return offset, aim_rad(self.path, ahead_m, float(self._along_m[1]) + lead_m, self._carrot_m)
 
     def _measured(self, view: BodyView) -> tuple[float, Floats, Floats]:
-        body = self._source.track.body_rad(self.head)
+        body = self._chooser.track.body_rad(self.head)
         links = len(view.link_m)
-        at = (np.arange(links) + 0.5) * self._source.track.points / links - 0.5
+        at = (np.arange(links) + 0.5) * self._chooser.track.points / links - 0.5
         believed = np.interp(at, np.arange(len(body)), body)
         return offset_rad(view.headings_rad, believed), view.link_m[0, :2], view.centre_m[:2]
 
     def _believed(self, start_m: Floats, offset: float) -> Floats:
         """Head of a body that never slipped since the first decision."""
-        track = self._source.track
-        return start_m + self._segment_m * track.way(track.points, round(self.head), offset)
+        track = self._chooser.track
+        return start_m + self._segment_m * track.displacement(
+            track.points, round(self.head), offset
+        )

@@ -1,16 +1,20 @@
-"""A serpenoid on the angle track: the baseline and fallback, steered by bending its mean line."""
+"""A serpenoid on the angle track: the baseline, steered by bending its mean line, and the fallback.
 
-from dataclasses import dataclass
+The fallback takes over from a walk while it is lost: variety first, then arriving.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.controller.walk.walker import Walker
 
 
 @dataclass(frozen=True, slots=True)
-class SerpentineParameters:
+class SerpenoidParameters:
     """Hirose's serpenoid, ``theta = base + A sin(2 pi k s / L)``, over a body of length L."""
 
     amplitude_rad: float = 0.7
@@ -22,16 +26,16 @@ class SerpentineParameters:
     """Decisions per body length."""
 
 
-class Serpentine:
+class Serpenoid:
     """Appends short pieces of a travelling sine whose mean line turns towards the aim."""
 
     def __init__(
         self,
         points: int,
-        parameters: SerpentineParameters | None = None,
+        parameters: SerpenoidParameters | None = None,
         track: AngleTrack | None = None,
     ) -> None:
-        self._p = parameters or SerpentineParameters()
+        self._p = parameters or SerpenoidParameters()
         self._base_rad = 0.0
         self._at = float(points)  # of the wave's next sample
         self._points = points
@@ -63,3 +67,30 @@ class Serpentine:
     def _wave(self, sample: np.ndarray) -> np.ndarray:
         p = self._p
         return np.asarray(p.amplitude_rad * np.sin(2.0 * np.pi * p.waves * sample / self._points))
+
+
+SERPENOID = -1
+"""State of a decision that the fallback made."""
+
+
+class SerpenoidFallback:
+    """Grows the walker's track, as the serpenoid between ``fall_back(True)`` and ``(False)``."""
+
+    def __init__(self, walker: Walker) -> None:
+        self._walker = walker
+        self.track = walker.track
+        self._serpentine = Serpenoid(walker.track.points, track=walker.track)
+        self._lost = False
+
+    def fall_back(self, lost: bool) -> None:
+        """Say whether the body has lost its way."""
+        if lost and not self._lost:
+            self._serpentine.take_over()
+        self._lost = lost
+
+    def decide(self, offset_rad: float, aim_rad: float) -> Decision:
+        """Append the next piece of whichever is in force."""
+        if not self._lost:
+            return self._walker.decide(offset_rad, aim_rad)
+        made = self._serpentine.decide(offset_rad, aim_rad)
+        return replace(made, state=SERPENOID, visited=self._walker.visited)

@@ -1,4 +1,7 @@
-"""Which shapes this robot can use on this ground: the tests of the library and of every piece."""
+"""Shape filters: which shapes this robot can use on this ground.
+
+The library and every piece of a walk are tested by them.
+"""
 
 import numpy as np
 
@@ -12,7 +15,7 @@ from snakewalk.controller.shape.crossing import self_touches
 from snakewalk.controller.shape.library import Refuse
 
 
-def refusals(
+def shape_filters(
     robot: RobotConfig, friction: FrictionConfig, states: StatesConfig, points: int = 100
 ) -> dict[str, Refuse]:
     """Tests by reason, cheapest first: each takes shapes (S, points) to a mask (S,) of bad ones.

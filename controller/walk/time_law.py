@@ -15,7 +15,7 @@ from snakewalk.drivers.compiling import compiled
 _TINY = 1e-9
 
 
-class Pulse:
+class TimeLaw:
     """Time law of a head on a joint track."""
 
     def __init__(

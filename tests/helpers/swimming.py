@@ -11,7 +11,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.kinematics.smoothstep import quintic
-from snakewalk.controller.motion.gait_cycle import Cycle
+from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.plant import ServoDrive
 from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
@@ -50,7 +50,7 @@ def follow(
 ) -> Followed:
     """Run a gait; joints are held for ``hold_s`` first, or grow from straight in ``grow_s``."""
     robot = load_robot(robot_name)
-    cycle = Cycle(gait, robot)
+    cycle = GaitCycle(gait, robot)
     place = load_world(world) if isinstance(world, str) else world
     plant = make_plant(robot, place)
     plant.reset((0.0, 0.0), 0.0, cycle.goal_rad() * float(grow_s <= 0.0))

@@ -14,7 +14,7 @@ from snakewalk.controller.capture.track import Track
 from snakewalk.controller.capture.wave import measure_wave
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.shape.states import energy_kept, to_angles, to_states
-from snakewalk.controller.walk.shape_filters import refusals
+from snakewalk.controller.walk.shape_filters import shape_filters
 from snakewalk.sim.servo.motor import MOTORS
 
 
@@ -44,7 +44,7 @@ def examine(
     shapes = to_angles(to_states(track.angles_rad, states.coefficients))
     refused: dict[str, int] = {}
     kept = shapes
-    for reason, refuse in refusals(robot, friction, states).items():
+    for reason, refuse in shape_filters(robot, friction, states).items():
         bad = refuse(kept)
         refused[reason], kept = int(bad.sum()), kept[~bad]
     length_mm = None if track.length_m is None else round(1e3 * track.length_m, 1)

@@ -15,9 +15,8 @@ from snakewalk.controller.app.runs.prepared_run import plan_without_path, pose_w
 from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.motion.cpg_motion import CpgMotion
-from snakewalk.controller.motion.gait_cycle import Cycle
-from snakewalk.controller.motion.gait_motion import GaitMotion
-from snakewalk.controller.motion.gait_sequence import GaitSequence
+from snakewalk.controller.motion.gait_cycle import GaitCycle
+from snakewalk.controller.motion.gait_motion import GaitMotion, GaitSequence
 from snakewalk.controller.motion.head_steering import HeadSteering, HeadTarget
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
@@ -66,7 +65,7 @@ class GaitRun:
 
     def initial_pose(self) -> InitialPose:
         """Return the shape that the gait begins with; the first joint angles are held meanwhile."""
-        first_rad = Cycle(self.gait, self.robot).goal_rad()
+        first_rad = GaitCycle(self.gait, self.robot).goal_rad()
         return pose_with(self.robot, self.start_heading_rad, first_rad)
 
     def check_plan(self) -> PlanSummary:
@@ -86,7 +85,7 @@ class GaitRun:
         if self.make_operator is not None:
             source = self.make_operator(gait, self.robot, on_event)
         elif self.config.by == "cpg":
-            source = CpgMotion(self.robot, Cycle(self.gait, self.robot).goal_rad())
+            source = CpgMotion(self.robot, GaitCycle(self.gait, self.robot).goal_rad())
             source.schedule([(0.0, self.gait), *self.changes, (self.config.duration_s, None)])
         elif self.changes:
             source = GaitSequence(gait, self.changes)

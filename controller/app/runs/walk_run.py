@@ -20,17 +20,15 @@ from snakewalk.controller.mechanics.traction import quasi_static_gain
 from snakewalk.controller.motion.source import MotionSource, Pace
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
-from snakewalk.controller.runtime.forecast import Forecast, forecast
-from snakewalk.controller.runtime.margins import margin_faults
+from snakewalk.controller.runtime.forecast import Forecast, forecast, margin_faults
 from snakewalk.controller.shape.library import Refuse, StateLibrary, build_library
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
-from snakewalk.controller.walk.fallback import Fallback
 from snakewalk.controller.walk.joint_track import JointTrack
-from snakewalk.controller.walk.pilot import Pilot, TrackSource
-from snakewalk.controller.walk.serpenoid import Serpentine
-from snakewalk.controller.walk.shape_filters import refusals
-from snakewalk.controller.walk.time_law import Pulse
+from snakewalk.controller.walk.pilot import Pilot, ShapeChooser
+from snakewalk.controller.walk.serpenoid import Serpenoid, SerpenoidFallback
+from snakewalk.controller.walk.shape_filters import shape_filters
+from snakewalk.controller.walk.time_law import TimeLaw
 from snakewalk.controller.walk.walker import Walker
 
 POINTS = 100
@@ -55,9 +53,9 @@ class WalkRun:
         return Retarget(self.robot, POINTS)
 
     @cached_property
-    def refusals(self) -> dict[str, Refuse]:
-        """What a shape must pass: turn, joints in range, no self-contact, traction."""
-        return refusals(self.robot, self.world.friction, self.run.states, POINTS)
+    def shape_filters(self) -> dict[str, Refuse]:
+        """Tests of a shape: turn, joints in range, no self-contact, traction."""
+        return shape_filters(self.robot, self.world.friction, self.run.states, POINTS)
 
     @cached_property
     def library(self) -> StateLibrary:
@@ -65,7 +63,7 @@ class WalkRun:
         states = self.run.states
         return build_library(
             load_track(self.run.track).angles_rad,
-            self.refusals,
+            self.shape_filters,
             coefficients=states.coefficients,
             random_count=states.random_count,
             curvature=self.run.behaviour.curvature,
@@ -74,7 +72,7 @@ class WalkRun:
 
     @cached_property
     def planner(self) -> TerrainPlanner:
-        """Lays paths over safe ground."""
+        """Plans paths over safe ground."""
         return TerrainPlanner(self.ground, self.world.planner)
 
     @cached_property
@@ -84,14 +82,14 @@ class WalkRun:
 
     @cached_property
     def pitch_fitter(self) -> PitchFitter:
-        """Fits the pitch joints to the ground; on a level floor it bends none."""
+        """Fits the pitch joints to the ground; on a level floor they stay at 0."""
         return PitchFitter(self.robot, self.ground)
 
     @cached_property
     def gain(self) -> float:
         """Predicted speed over pulse speed, 0.93 eta_q: mean over the shapes used."""
         if self.run.motion == "serpenoid":
-            shape = self._source().track.body_rad(float(POINTS))
+            shape = self._chooser().track.body_rad(float(POINTS))
             return 0.93 * float(quasi_static_gain(shape, self.world.friction)[0])
         some = self.library.shapes_rad[:: max(1, len(self.library.shapes_rad) // 50)]
         return 0.93 * float(quasi_static_gain(some, self.world.friction).mean())
@@ -118,20 +116,22 @@ class WalkRun:
         ``level`` leaves the pitch joints at 0, whatever the ground.
         """
         run, robot = self.run, self.robot
-        wanted = run.behaviour.pulse_body_lengths_s * (1.0 - run.behaviour.sliding) * POINTS
-        source = self._source()
+        pulse_segments_s = (
+            run.behaviour.pulse_body_lengths_s * (1.0 - run.behaviour.sliding) * POINTS
+        )
+        chooser = self._chooser()
         return Pilot(
-            source,
-            Pulse(
-                JointTrack(source.track, self.retarget.joints_rad, robot.limit_rad),
-                wanted,
+            chooser,
+            TimeLaw(
+                JointTrack(chooser.track, self.retarget.joints_rad, robot.limit_rad),
+                pulse_segments_s,
                 speed_limit_rad_s=robot.joint_speed_limit_rad_s,
                 acceleration_limit_rad_s2=robot.joint_acceleration_limit_rad_s2,
             ),
             pace=Pace.limit(robot),
             plan=self.planner,
             pitch_fitter=None if level or self.ground is None else self.pitch_fitter,
-            fall_back=source.fall_back if isinstance(source, Fallback) else lambda lost: None,
+            fall_back=chooser.fall_back if isinstance(chooser, SerpenoidFallback) else None,
             start_m=np.array(run.start_m),
             waypoints_m=run.waypoints_m,
             length_m=robot.length_m,
@@ -182,9 +182,9 @@ class WalkRun:
         """Return a fresh pilot; it has no events beside those that the drive logs."""
         return self.pilot()
 
-    def _source(self) -> TrackSource:
+    def _chooser(self) -> ShapeChooser:
         if self.run.motion == "serpenoid":
-            return Serpentine(POINTS)
+            return Serpenoid(POINTS)
         walk = self.run.walk
         if self.run.motion == "walk-printed":
             walk = WalkConfig(
@@ -194,9 +194,9 @@ class WalkRun:
                 nearest_count=walk.nearest_count,
             )
         order = np.random.default_rng(self.run.seed).permutation(len(self.library.shapes_rad))
-        walker = Walker(self.library.shapes_rad[order], walk, self._usable)
-        return Fallback(walker) if self.run.motion == "walk" and walk.fallback else walker
+        walker = Walker(self.library.shapes_rad[order], walk, self._passes_filters)
+        return SerpenoidFallback(walker) if self.run.motion == "walk" and walk.fallback else walker
 
-    def _usable(self, body_rad: Floats) -> bool:
+    def _passes_filters(self, body_rad: Floats) -> bool:
         """Whether a body between two shapes can be made, does not touch itself, and pushes."""
-        return not any(refuse(body_rad[None])[0] for refuse in self.refusals.values())
+        return not any(is_bad(body_rad[None])[0] for is_bad in self.shape_filters.values())

@@ -1,5 +1,7 @@
-"""Gaits measured on the physics over many parameters, and the best of them looked for.
+"""Studies: many runs measured, tuned, replayed and compared, on one pool of spawned processes.
 
-``points`` and ``plan`` say what to try, ``measure`` tries one point, ``pool`` tries many at once,
-``table`` keeps every finished point, ``digest`` and ``picture`` sum it up, ``tune`` searches.
+``sweep_points`` chooses what to try, ``sweep_measure`` tries one point, ``pool`` tries many at
+once, ``sweep_table`` keeps every finished point, ``tune`` searches, ``trials`` repeats a run over
+seeds, ``replay`` runs a log again, ``graph_study`` compares walks on graphs, and ``repertoire_*``
+records actions and plans with them.
 """

@@ -1,6 +1,5 @@
 """A simulated robot driven frame by frame by a motion source: servos, bus, safety, MuJoCo."""
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
@@ -14,7 +13,6 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.runs.backend import simulated
 from snakewalk.controller.app.runs.prepared_run import pose_with
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
-from snakewalk.controller.motion.source import MotionSource
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.types import JointCommand
@@ -99,11 +97,3 @@ class PhysicsBody:
         pose = self._backend.pose
         assert pose is not None, "a simulated robot has a pose"
         return body_in_world(self.robot, pose(), self.joint_rad)
-
-    def play(self, source: MotionSource, told: Callable[[int], None] = lambda _: None) -> None:
-        """Send what ``source`` yields until it is done; ``told`` counts the frames."""
-        count = 0
-        while not source.done:
-            self.frame(source.step(FRAME_S, self.view()))
-            count += 1
-            told(count)

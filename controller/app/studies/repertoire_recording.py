@@ -12,7 +12,7 @@ from snakewalk.controller.app.studies.repertoire_physics import FRAME_S, Physics
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.gaits.wave import TURN
 from snakewalk.controller.kinematics.frame import body_frame
-from snakewalk.controller.motion.gait_cycle import Cycle
+from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.segment import Kind, Segment, cut
@@ -48,16 +48,16 @@ def record(
     robot: RobotConfig,
     world: WorldConfig,
     actions: tuple[Action, ...] = ACTIONS,
-    told: Callable[[str, float], None] = lambda name, share: None,
+    on_progress: Callable[[str, float], None] = lambda name, share: None,
 ) -> Repertoire:
-    """Record every action; ``told`` gets the name and how far it is, 0 to 1.
+    """Record every action; ``on_progress`` takes the name and its share, 0 to 1.
 
     Raises:
         InputError: joints are missing, or do not bend so far.
         SafetyTrippedError: the simulated servos were asked too much.
 
     """
-    segments = tuple(record_action(robot, world, action, told) for action in actions)
+    segments = tuple(record_action(robot, world, action, on_progress) for action in actions)
     return Repertoire(robot.name, robot.joint_axes, world.name, robot.length_m, segments)
 
 
@@ -65,19 +65,19 @@ def record_action(
     robot: RobotConfig,
     world: WorldConfig,
     action: Action,
-    told: Callable[[str, float], None] = lambda name, share: None,
+    on_progress: Callable[[str, float], None] = lambda name, share: None,
 ) -> Segment:
     """Run one action from rest, and keep the cycle after ``SETTLING`` others."""
-    wanted: dict[str, Any] = {"turn_rad": action.turn_rad, "frequency_hz": action.frequency_hz}
-    asked = Cycle(make_gait("lateral-undulation", wanted), robot)
+    parameters: dict[str, Any] = {"turn_rad": action.turn_rad, "frequency_hz": action.frequency_hz}
+    asked = GaitCycle(make_gait("lateral-undulation", parameters), robot)
     count = int(np.ceil(1.0 / (asked.frequency_hz * FRAME_S) - 1e-9))
-    wanted["frequency_hz"] = 1.0 / (count * FRAME_S)
-    motion = GaitMotion(make_gait("lateral-undulation", wanted), robot)
+    parameters["frequency_hz"] = 1.0 / (count * FRAME_S)
+    motion = GaitMotion(make_gait("lateral-undulation", parameters), robot)
     frames, links, rotations, goals, joints = [], [], [], [], []
     with PhysicsBody(robot, world, motion.goal_rad()) as body:
         while motion.cycles < SETTLING:
             body.frame(motion.step(FRAME_S, body.view()))
-            told(action.name, motion.cycles / (SETTLING + 1))
+            on_progress(action.name, motion.cycles / (SETTLING + 1))
         # from phase 0 on, so that all actions begin alike
         while min(motion.phase_rad, TURN - motion.phase_rad) > 0.51 * TURN / count:
             body.frame(motion.step(FRAME_S, body.view()))
@@ -90,7 +90,7 @@ def record_action(
             if k < count:
                 goals.append(motion.goal_rad())
                 body.frame(motion.step(FRAME_S, view))
-                told(action.name, (SETTLING + k / count) / (SETTLING + 1))
+                on_progress(action.name, (SETTLING + k / count) / (SETTLING + 1))
     return cut(
         action.name,
         action.kind,

@@ -24,7 +24,7 @@ from snakewalk.drivers.types import BodyPose, JointCommand
 
 
 def replay(
-    record: RunRecord, log: Path, on_cycle: Callable[[int, int], None] | None = None
+    record: RunRecord, log: Path, on_progress: Callable[[int, int], None] | None = None
 ) -> Path:
     """Run a record's commands on the simulator and write what the servos then answer to ``log``.
 
@@ -34,7 +34,7 @@ def replay(
     Args:
         record: a run, on metal or simulated; may be cut short.
         log: to be written.
-        on_cycle: told (cycles done, of).
+        on_progress: takes cycles done, and of how many.
 
     Raises:
         InputError: the simulator is not installed, or the record holds no cycle.
@@ -91,8 +91,8 @@ def replay(
                 links_m=view.link_m,
                 centre_m=view.centre_m,
             )
-            if on_cycle is not None:
-                on_cycle(k + 1, total)
+            if on_progress is not None:
+                on_progress(k + 1, total)
             if cycle.verdict[k] == "veto":
                 break
         chain.disable()
@@ -104,15 +104,15 @@ def differences(
 ) -> Comparison:
     """Compare a run with its replay; joints and, where it was measured, the head decide.
 
-    Velocities and currents are told but not held against the replay, and neither is the head of a
-    run whose pose was reckoned from the joints or seen by a camera. Angles that the original failed
-    to read are left out.
+    Velocities and currents are reported but do not decide, nor does the head of a run whose pose was
+    reckoned from the joints or seen by a camera. Angles that the original failed to read are left
+    out.
     """
     valid = original.cycle.valid
     header = original.header
     measured = header.backend == "sim" and header.run.pose in (None, "simulator")
-    told = dict.fromkeys(("velocity_rad_s", "current_a"), float("inf"))
-    limits = told | {
+    reported_only = dict.fromkeys(("velocity_rad_s", "current_a"), float("inf"))
+    limits = reported_only | {
         "measured_rad": tolerance_rad,
         "head_m": tolerance_m if measured else float("inf"),
     }

@@ -126,7 +126,7 @@ def tune(
     seconds: float,
     seed: int,
     workers: int,
-    told: Callable[[int], None] = lambda done: None,
+    on_progress: Callable[[int], None] = lambda done: None,
 ) -> Tuned:
     """Search with about ``budget`` runs, then compare with the defaults on ``seeds`` other grounds.
 
@@ -152,7 +152,7 @@ def tune(
             found = []
             for value in pool.map(work, units):
                 done += 1
-                told(done)
+                on_progress(done)
                 found.append(value)
             return found
 

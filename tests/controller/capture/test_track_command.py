@@ -10,7 +10,7 @@ import pytest
 
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.run import StatesConfig
-from snakewalk.controller.walk.shape_filters import refusals
+from snakewalk.controller.walk.shape_filters import shape_filters
 from tests.helpers.travelling import S, ends, wave_angles
 
 
@@ -59,7 +59,7 @@ def test_bad_input_is_one_line_and_exit_code_2(tmp_path: Path) -> None:
 
 def test_each_reason_refuses_the_shape_that_is_made_for_it() -> None:
     robot = load_robot("yaw16")
-    tests = refusals(robot, load_world("flat").friction, StatesConfig())
+    tests = shape_filters(robot, load_world("flat").friction, StatesConfig())
     good = 0.6 * np.sin(2 * np.pi * 1.5 * S)
     made = {
         "turn": good + 4.0 * S,

@@ -13,7 +13,7 @@ from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.gaits.lateral_undulation import LateralUndulation
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.motion.cpg_motion import CpgMotion
-from snakewalk.controller.motion.gait_cycle import Cycle
+from snakewalk.controller.motion.gait_cycle import GaitCycle
 
 Floats = NDArray[np.float64]
 ROBOT = load_robot("alternating16")
@@ -127,5 +127,5 @@ def test_a_gait_runs_at_the_frequency_that_its_joints_can_follow() -> None:
     gait = GAITS["anguilliform"]()
     motion = CpgMotion(ROBOT, np.zeros(16))
     motion.become(gait)
-    assert motion.cpg.pattern.omega_rad_s == pytest.approx(Cycle(gait, ROBOT).rate_rad_s)
+    assert motion.cpg.pattern.omega_rad_s == pytest.approx(GaitCycle(gait, ROBOT).rate_rad_s)
     assert motion.needs == gait.needs

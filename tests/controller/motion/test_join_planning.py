@@ -9,8 +9,8 @@ from snakewalk.controller.gaits.cpg.oscillators import Cpg
 from snakewalk.controller.gaits.cpg.pattern import Pattern
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.gaits.spine import SpineParameters, offset, spine_bends_rad
+from snakewalk.controller.motion.blend import DURATIONS_S, shortest_join_s
 from snakewalk.controller.motion.cpg_motion import TOLERANCE, WIDER, CpgMotion, quickest_change
-from snakewalk.controller.motion.join_time import DURATIONS_S, shortest_join_s
 from snakewalk.controller.motion.source import Pace
 
 ROBOT = load_robot("alternating16")

@@ -23,14 +23,13 @@ from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.motion.cpg_motion import CpgMotion
-from snakewalk.controller.motion.gait_cycle import Cycle
-from snakewalk.controller.motion.gait_motion import GaitMotion
-from snakewalk.controller.motion.gait_sequence import GaitSequence
+from snakewalk.controller.motion.gait_cycle import GaitCycle
+from snakewalk.controller.motion.gait_motion import GaitMotion, GaitSequence
 from snakewalk.controller.motion.head_steering import HeadSteering, HeadTarget
 from snakewalk.controller.motion.operator import KEYS, Operator
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import Hold, MotionSource, Pace
-from snakewalk.controller.motion.source_switch import Relay
+from snakewalk.controller.motion.source_switch import SourceSwitch
 from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.segment import Segment
@@ -80,7 +79,7 @@ def actions(name: str) -> Repertoire:
             Segment(
                 f"{winding}",
                 "forward",
-                1.0 / (frames * Cycle(gait, robot).frequency_hz),
+                1.0 / (frames * GaitCycle(gait, robot).frequency_hz),
                 turn=np.tile(np.eye(3), (frames, 1, 1)),
                 move_m=np.zeros((frames, 3)),
                 link_m=np.zeros((frames, links, 3)),
@@ -193,7 +192,7 @@ def test_all_pairs_of_sources_join_within_the_limits(name: str) -> None:
     robot = ROBOTS[name]
     rng = np.random.default_rng(5)
     for first, second in PAIRS[name]:
-        relay = Relay(robot, make(first, robot))
+        relay = SourceSwitch(robot, make(first, robot))
         seen = [relay.goal_rad()] * 2
         looking = not LOOKING.isdisjoint({first, second})
         run(relay, robot, int(rng.integers(1, 50)), seen, looking=looking)
@@ -212,7 +211,7 @@ def test_chains_of_joins_at_any_time_stay_within_the_limits(data: st.DataObject)
     robot = ROBOTS[name]
     first, second = data.draw(st.sampled_from(PAIRS[name]))
     third = data.draw(st.sampled_from([b for a, b in PAIRS[name] if a == second]))
-    relay = Relay(robot, make(first, robot))
+    relay = SourceSwitch(robot, make(first, robot))
     seen = [relay.goal_rad()] * 2
     run(relay, robot, data.draw(st.integers(0, 90)), seen)
     relay.join(make(second, robot))
@@ -257,7 +256,7 @@ def test_jumps_of_a_gaits_parameters_become_smooth(data: st.DataObject) -> None:
 @pytest.mark.parametrize("kind", ["sidewinding", "recording", "pilot"])
 def test_after_a_join_only_the_new_source_is_left(kind: str) -> None:
     robot = ROBOTS["alternating16"]
-    relay = Relay(robot, Hold(np.zeros(robot.joint_count)))
+    relay = SourceSwitch(robot, Hold(np.zeros(robot.joint_count)))
     relay.join(make(kind, robot))
     seen = [relay.goal_rad()]
     while relay.blending:
@@ -269,12 +268,12 @@ def test_after_a_join_only_the_new_source_is_left(kind: str) -> None:
 def test_a_motion_that_already_fits_is_joined_at_once() -> None:
     robot = ROBOTS["yaw16"]
     start = np.full(robot.joint_count, 0.2)
-    assert Relay(robot, Hold(start)).join(Hold(start)) == 0.0
+    assert SourceSwitch(robot, Hold(start)).join(Hold(start)) == 0.0
 
 
 def test_a_gait_too_fast_for_the_joints_is_slowed_to_what_they_can_follow() -> None:
     robot = ROBOTS["alternating16"]
-    cycle = Cycle(make_gait("sidewinding", {"frequency_hz": 2.0}), robot)
+    cycle = GaitCycle(make_gait("sidewinding", {"frequency_hz": 2.0}), robot)
     assert cycle.frequency_hz < 0.6
     assert cycle.pace().speed_rad_s.max() == pytest.approx(0.9 * robot.joint_speed_limit_rad_s)
 
@@ -286,7 +285,7 @@ def test_a_source_that_asks_for_more_than_the_limits_is_refused() -> None:
         def pace(self) -> Pace:
             return Pace(np.full(16, 9.0), np.full(16, 9.0))
 
-    relay = Relay(robot, Hold(np.zeros(16)))
+    relay = SourceSwitch(robot, Hold(np.zeros(16)))
     with pytest.raises(ValueError, match="more than the robot's limits"):
         relay.join(Wild(np.ones(16)))
     assert isinstance(relay.source, Hold)
@@ -294,7 +293,7 @@ def test_a_source_that_asks_for_more_than_the_limits_is_refused() -> None:
 
 def test_a_robot_without_the_joints_refuses_the_join() -> None:
     robot, other = ROBOTS["yaw16"], ROBOTS["alternating16"]
-    relay = Relay(robot, Hold(np.zeros(16)))
+    relay = SourceSwitch(robot, Hold(np.zeros(16)))
     with pytest.raises(InputError, match="needs pitch joints"):
         relay.join(GaitMotion(make_gait("rolling"), other))
 

@@ -13,8 +13,13 @@ from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_run
 from snakewalk.controller.app.runs.repertoire_run import RouteMotion
 from snakewalk.controller.app.studies.repertoire_physics import FRAME_S
-from snakewalk.controller.app.studies.repertoire_planning import load_plan, plan_route, save_plan
-from snakewalk.controller.app.studies.repertoire_timing import physics_route, search_cost
+from snakewalk.controller.app.studies.repertoire_planning import (
+    load_plan,
+    physics_route,
+    plan_route,
+    save_plan,
+    search_cost,
+)
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.repertoire.motion import RepertoireMotion

@@ -78,16 +78,15 @@ def test_before_every_limit_the_least_rate_is_reached() -> None:
 
 
 def test_it_says_once_that_it_slows_and_once_that_it_is_back() -> None:
-    derating = Derating(SAFETY)
+    said: list[str] = []
+    derating = Derating(SAFETY, lambda kind, text: said.append(text))
     hot, cool = state(celsius=67.0), state()
-    said = []
     for found, seconds in ((hot, 3.0), (cool, 60.0)):
         before = derating.rate
         for _ in range(int(seconds / 0.02)):
             now = derating.update(found, 0.02)
             assert abs(now - before) < 0.05, "the rate itself has no step"
             before = now
-        said += derating.news()
     assert said == ["slowing down: joint 2 at 67 C, limit 70 C", "at full rate again"]
     assert derating.rate == 1.0
     assert derating.least < 0.5

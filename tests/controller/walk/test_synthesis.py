@@ -13,8 +13,13 @@ from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
 from snakewalk.controller.shape.states import to_states
 from snakewalk.controller.walk.angle_track import AngleTrack
-from snakewalk.controller.walk.behaviour import Behaviour, varied_pulse, waves_mask
-from snakewalk.controller.walk.synthesis import Locomotion, synthesise
+from snakewalk.controller.walk.synthesis import (
+    Behaviour,
+    Locomotion,
+    synthesise,
+    varied_pulse,
+    waves_mask,
+)
 from snakewalk.controller.walk.walker import Walker
 
 N = 100

@@ -9,8 +9,8 @@ from snakewalk.controller.capture.readers.generated import embedded
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.joint_track import JointTrack
-from snakewalk.controller.walk.serpenoid import Serpentine
-from snakewalk.controller.walk.time_law import Pulse
+from snakewalk.controller.walk.serpenoid import Serpenoid
+from snakewalk.controller.walk.time_law import TimeLaw
 from snakewalk.controller.walk.walker import Walker
 
 SPEED, ACCELERATION, DT = 2.0, 25.0, 0.02
@@ -21,8 +21,8 @@ def straight(joints: int = 3) -> JointTrack:
     return JointTrack(track, lambda body: body[..., :joints] - body[..., 1 : joints + 1])
 
 
-def timed(joints: JointTrack, wanted: float = 25.0, ramp_s: float = 1.0) -> Pulse:
-    return Pulse(
+def timed(joints: JointTrack, wanted: float = 25.0, ramp_s: float = 1.0) -> TimeLaw:
+    return TimeLaw(
         joints,
         wanted,
         speed_limit_rad_s=SPEED,
@@ -31,9 +31,9 @@ def timed(joints: JointTrack, wanted: float = 25.0, ramp_s: float = 1.0) -> Puls
     )
 
 
-def source(name: str, seed: int) -> Walker | Serpentine:
+def source(name: str, seed: int) -> Walker | Serpenoid:
     if name == "serpenoid":
-        return Serpentine(100)
+        return Serpenoid(100)
     shapes = embedded("worm-like").angles_rad
     shapes = shapes - shapes.mean(axis=1, keepdims=True)
     order = np.random.default_rng(seed).permutation(len(shapes))
@@ -111,7 +111,7 @@ def test_without_the_acceleration_limit_the_same_walk_breaks_it() -> None:
     """The printed retiming, by speed alone: what the limit is for."""
     maker = source("walk", 0)
     joints = JointTrack(maker.track, Retarget(load_robot("yaw16")).joints_rad)
-    pulse = Pulse(joints, 40.0, speed_limit_rad_s=SPEED, acceleration_limit_rad_s2=1e6)
+    pulse = TimeLaw(joints, 40.0, speed_limit_rad_s=SPEED, acceleration_limit_rad_s2=1e6)
     goals = []
     for step in range(800):
         if pulse.head >= maker.track.end - 6.0:

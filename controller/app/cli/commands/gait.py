@@ -62,12 +62,12 @@ def show_gait(
     from snakewalk.controller.app.report.plots.gait import draw_gait  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_gait  # noqa: PLC0415
     from snakewalk.controller.gaits.gait import ranges  # noqa: PLC0415
-    from snakewalk.controller.motion.gait_cycle import Cycle  # noqa: PLC0415
+    from snakewalk.controller.motion.gait_cycle import GaitCycle  # noqa: PLC0415
 
     check_picture(picture)
     prepared = prepare_gait(name, robot=robot, parameters=parameters(param))
     gait, body = prepared.gait, prepared.robot
-    cycle = Cycle(gait, body)
+    cycle = GaitCycle(gait, body)
     spans = ranges(gait.model)
     found: dict[str, object] = {
         "gait": gait.name,

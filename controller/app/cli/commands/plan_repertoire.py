@@ -26,8 +26,8 @@ def plan_with_repertoire(
         plan_facts,
         plan_route,
         save_plan,
+        search_cost,
     )
-    from snakewalk.controller.app.studies.repertoire_timing import search_cost  # noqa: PLC0415
 
     refuse_to_overwrite([out], force)
     if physics or carry:
@@ -40,7 +40,10 @@ def plan_with_repertoire(
         with bar() as progress:
             task = progress.add_task("candidates on the physics", total=physics)
             cost = search_cost(
-                job, physics, beam=beam, told=lambda done: progress.update(task, completed=done)
+                job,
+                physics,
+                beam=beam,
+                on_progress=lambda done: progress.update(task, completed=done),
             )
         found |= cost.facts()
     if out is not None:

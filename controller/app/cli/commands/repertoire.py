@@ -54,12 +54,12 @@ def record(
         task = progress.add_task("record", total=float(len(ACTIONS)))
         begun: list[str] = []
 
-        def told(name: str, share: float) -> None:
+        def on_progress(name: str, share: float) -> None:
             if name not in begun:
                 begun.append(name)
             progress.update(task, completed=len(begun) - 1 + share, description=name)
 
-        repertoire = record(body, ground, told=told)
+        repertoire = record(body, ground, on_progress=on_progress)
         progress.update(task, completed=float(len(ACTIONS)), description="recorded")
     with atomic_write(file) as part:
         repertoire.save(part)
@@ -117,7 +117,7 @@ def carry_out(
 ) -> tuple[dict[str, object], bool]:
     """Execute a job with a bar; what it did, and whether it reached every waypoint."""
     from snakewalk.controller.app.cli.progress import TimeBar  # noqa: PLC0415
-    from snakewalk.controller.app.studies.repertoire_run import default_folder, run_route  # noqa: PLC0415
+    from snakewalk.controller.app.runs.repertoire_run import default_folder, run_route  # noqa: PLC0415
 
     check_picture(picture)
     folder = default_folder(job) if out is None else out

@@ -51,11 +51,10 @@ def sweep(
 ) -> None:
     """Measure gaits over their parameters: speed, cost of transport, torque, heat, slip."""
     from snakewalk.controller.app.studies.pool import each  # noqa: PLC0415
-    from snakewalk.controller.app.studies.sweep_digest import digest  # noqa: PLC0415
     from snakewalk.controller.app.studies.sweep_measure import measure  # noqa: PLC0415
-    from snakewalk.controller.app.studies.sweep_plan import plan_sweep  # noqa: PLC0415
+    from snakewalk.controller.app.studies.sweep_points import plan_sweep  # noqa: PLC0415
     from snakewalk.controller.app.studies.sweep_table import Table as Sweep  # noqa: PLC0415
-    from snakewalk.controller.app.studies.sweep_table import read_table  # noqa: PLC0415
+    from snakewalk.controller.app.studies.sweep_table import digest, read_table  # noqa: PLC0415
 
     check_picture(picture)
     require_extra("a sweep needs", "mujoco" if dask is None else "distributed")

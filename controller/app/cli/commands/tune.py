@@ -52,7 +52,7 @@ def tune(
             seconds=seconds,
             seed=seed,
             workers=workers,
-            told=lambda done: bar.update(task, completed=done),
+            on_progress=lambda done: bar.update(task, completed=done),
         )
         bar.update(task, completed=budget)
     facts: dict[str, object] = {

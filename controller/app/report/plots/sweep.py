@@ -8,8 +8,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from snakewalk.controller.app.report.figures.style import save_picture
-from snakewalk.controller.app.studies.sweep_digest import UNITS, pace
-from snakewalk.controller.app.studies.sweep_table import number
+from snakewalk.controller.app.studies.sweep_table import UNITS, number, pace
 from snakewalk.controller.gaits.registry import GAITS
 
 matplotlib.use("Agg")

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from snakewalk.config.run import WalkConfig
-from snakewalk.controller.walk.fallback import SERPENOID, Fallback
+from snakewalk.controller.walk.serpenoid import SERPENOID, SerpenoidFallback
 from snakewalk.controller.walk.walker import Walker
 
 POINTS = 100
@@ -25,7 +25,7 @@ def walker(seed: int) -> Walker:
 def test_the_track_never_jumps_when_the_serpenoid_takes_over(
     seed: int, before: int, aim: float
 ) -> None:
-    source = Fallback(walker(seed))
+    source = SerpenoidFallback(walker(seed))
     for _ in range(before):
         source.decide(0.0, aim)
     end = source.track.end
@@ -38,7 +38,7 @@ def test_the_track_never_jumps_when_the_serpenoid_takes_over(
 
 
 def test_it_turns_towards_the_aim_and_hands_back() -> None:
-    source = Fallback(walker(1))
+    source = SerpenoidFallback(walker(1))
     source.decide(0.0, 0.0)
     visited = source.decide(0.0, 0.0).visited
     source.fall_back(True)
@@ -54,7 +54,7 @@ def test_it_turns_towards_the_aim_and_hands_back() -> None:
 
 
 def test_a_walk_that_is_not_lost_is_the_walk() -> None:
-    alone, with_fallback = walker(3), Fallback(walker(3))
+    alone, with_fallback = walker(3), SerpenoidFallback(walker(3))
     for k in range(12):
         assert alone.decide(0.0, 0.1 * k) == with_fallback.decide(0.0, 0.1 * k)
     assert np.array_equal(

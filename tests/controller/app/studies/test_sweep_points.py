@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.app.studies.sweep_plan import plan_sweep
-from snakewalk.controller.app.studies.sweep_points import SLOWEST_HZ, Space, points_of
+from snakewalk.controller.app.studies.sweep_points import SLOWEST_HZ, Space, plan_sweep, points_of
 from snakewalk.controller.gaits.gait import ranges
 from snakewalk.controller.gaits.registry import GAITS
 

@@ -7,10 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.studies.sweep_digest import digest
 from snakewalk.controller.app.studies.sweep_measure import MEASURED, Row
 from snakewalk.controller.app.studies.sweep_points import Point
-from snakewalk.controller.app.studies.sweep_table import COLUMNS, Table, read_table
+from snakewalk.controller.app.studies.sweep_table import COLUMNS, Table, digest, read_table
 
 POINTS = [
     Point("lateral-undulation", "yaw16", "flat", n, 0, 10.0, {"waves": 1.0 + 0.1 * n})

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from snakewalk.controller.runtime.ramp import Ramp
-from snakewalk.controller.runtime.slip_monitor import AdvanceWatch
+from snakewalk.controller.runtime.drive import Ramp
+from snakewalk.controller.runtime.slip_monitor import SlipMonitor
 
 angles = st.lists(st.floats(-1.5, 1.5), min_size=4, max_size=4).map(np.array)
 
@@ -29,7 +29,7 @@ def test_a_ramp_meets_its_ends_and_its_limits(start, goal, speed, acceleration) 
     ("gain", "alarm"), [(0.7, False), (0.36, False), (0.34, True), (-0.2, True)]
 )
 def test_the_alarm_sounds_below_half_of_the_prediction(gain: float, alarm: bool) -> None:
-    watch = AdvanceWatch(length_m=1.2, gain=0.7, fraction=0.5)
+    watch = SlipMonitor(length_m=1.2, gain=0.7, fraction=0.5)
     pulse = 0.006
     sounded = [watch.update(pulse, gain * pulse) for _ in range(450)]
     assert any(sounded) is alarm
