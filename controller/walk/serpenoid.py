@@ -79,18 +79,18 @@ class SerpenoidFallback:
     def __init__(self, walker: Walker) -> None:
         self._walker = walker
         self.track = walker.track
-        self._serpentine = Serpenoid(walker.track.points, track=walker.track)
+        self._serpenoid = Serpenoid(walker.track.points, track=walker.track)
         self._lost = False
 
     def fall_back(self, lost: bool) -> None:
-        """Say whether the body has lost its way."""
+        """Set whether the body has lost its path."""
         if lost and not self._lost:
-            self._serpentine.take_over()
+            self._serpenoid.take_over()
         self._lost = lost
 
     def decide(self, offset_rad: float, aim_rad: float) -> Decision:
-        """Append the next piece of whichever is in force."""
+        """Append the next piece: of the walk, or of the serpenoid while the walk is lost."""
         if not self._lost:
             return self._walker.decide(offset_rad, aim_rad)
-        made = self._serpentine.decide(offset_rad, aim_rad)
+        made = self._serpenoid.decide(offset_rad, aim_rad)
         return replace(made, state=SERPENOID, visited=self._walker.visited)

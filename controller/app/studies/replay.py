@@ -104,9 +104,9 @@ def differences(
 ) -> Comparison:
     """Compare a run with its replay; joints and, where it was measured, the head decide.
 
-    Velocities and currents are reported but do not decide, nor does the head of a run whose pose was
-    reckoned from the joints or seen by a camera. Angles that the original failed to read are left
-    out.
+    Velocities and currents are reported but do not decide. Neither does the head of a run whose
+    pose was reckoned from the joints or measured by a camera. Angles that the original failed to
+    read are left out.
     """
     valid = original.cycle.valid
     header = original.header

@@ -25,32 +25,32 @@ def walker(seed: int) -> Walker:
 def test_the_track_never_jumps_when_the_serpenoid_takes_over(
     seed: int, before: int, aim: float
 ) -> None:
-    source = SerpenoidFallback(walker(seed))
+    chooser = SerpenoidFallback(walker(seed))
     for _ in range(before):
-        source.decide(0.0, aim)
-    end = source.track.end
-    largest = float(np.abs(np.diff(source.track.at_rad(np.arange(end, dtype=float)))).max())
-    source.fall_back(True)
-    assert source.decide(0.0, aim).state == SERPENOID
-    joined = source.track.at_rad(np.arange(end - 2, end + 3, dtype=float))
+        chooser.decide(0.0, aim)
+    end = chooser.track.end
+    largest = float(np.abs(np.diff(chooser.track.at_rad(np.arange(end, dtype=float)))).max())
+    chooser.fall_back(True)
+    assert chooser.decide(0.0, aim).state == SERPENOID
+    joined = chooser.track.at_rad(np.arange(end - 1, end + 3, dtype=float))
     # 0.7 rad, 1.2 waves: at most 0.053 rad a sample, and the turn of the mean line
     assert np.abs(np.diff(joined)).max() < max(largest, 0.053 + 0.02)
 
 
 def test_it_turns_towards_the_aim_and_hands_back() -> None:
-    source = SerpenoidFallback(walker(1))
-    source.decide(0.0, 0.0)
-    visited = source.decide(0.0, 0.0).visited
-    source.fall_back(True)
+    chooser = SerpenoidFallback(walker(1))
+    chooser.decide(0.0, 0.0)
+    visited = chooser.decide(0.0, 0.0).visited
+    chooser.fall_back(True)
     for _ in range(60):
-        made = source.decide(0.0, 1.0)
+        made = chooser.decide(0.0, 1.0)
     assert made.visited == visited
-    body = source.track.body_rad(float(source.track.end))
-    whole = source.track.at_rad(np.arange(source.track.end - 250, source.track.end, dtype=float))
+    body = chooser.track.body_rad(float(chooser.track.end))
+    whole = chooser.track.at_rad(np.arange(chooser.track.end - 250, chooser.track.end, dtype=float))
     assert whole.mean() == pytest.approx(1.0, abs=0.1)
     assert np.ptp(body) == pytest.approx(1.4, abs=0.05)
-    source.fall_back(False)
-    assert source.decide(0.0, 1.0).state != SERPENOID
+    chooser.fall_back(False)
+    assert chooser.decide(0.0, 1.0).state != SERPENOID
 
 
 def test_a_walk_that_is_not_lost_is_the_walk() -> None:
