@@ -24,7 +24,6 @@ from snakewalk.sim.servo.firmware import Firmware
 
 LONGEST = 0xFFFF
 """What the length field of a packet ends at."""
-"""Return Delay Time(9), e-manual."""
 
 
 class Reply(NamedTuple):
