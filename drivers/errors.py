@@ -1,11 +1,11 @@
-"""What can go wrong between radians and bytes.
+"""Errors between radians and bytes.
 
 ::
 
     DriverError                    everything below
     ├── ProtocolError              bytes that are not a packet
     │   └── StuffingError          ``FF FF FD`` in a payload without its stuffed ``FD``
-    ├── BusError                   a servo did not do as told
+    ├── BusError                   a servo did not do what an instruction asked
     │   ├── NoAnswerError          no status packet before the deadline
     │   └── ServoError             a status packet that carries a result error
     ├── SafetyTrippedError         the safety layer has latched; an operator must reset it
@@ -14,9 +14,13 @@
     ├── ControlTableError (InputError)  unknown servo model, register or unit
     └── BudgetError (InputError)   the cycle does not fit the wire
 
-The last four say what a user gave that cannot be used, one line a fault; the command line prints
-the lines and ends with exit code 2.
+The last four say which input of the user cannot be used, one line a fault; the command line prints
+the lines and ends with exit code 2. A ``ChainFault`` also carries its ``FaultCause``: nobody
+has to search the text.
 """
+
+from dataclasses import dataclass
+from enum import Enum, auto
 
 from snakewalk.config.errors import InputError
 
@@ -34,7 +38,7 @@ class StuffingError(ProtocolError):
 
 
 class BusError(DriverError):
-    """A servo did not do as told."""
+    """A servo did not do what an instruction asked."""
 
 
 class NoAnswerError(BusError):
@@ -55,6 +59,28 @@ class SafetyTrippedError(DriverError):
 
 class PortError(InputError, DriverError):
     """The port is missing, denied, busy, or vanished."""
+
+
+class FaultCause(Enum):
+    """Kinds of faults that forbid a chain to start or to go on."""
+
+    NO_ANSWER = auto()
+    OTHER_MODEL = auto()
+    OTHER_FIRMWARE = auto()
+    ALARM = auto()
+    TURN_COUNT_LOST = auto()
+    MOVED = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class ChainFault:
+    """One fault of a chain; as a string, the line for the user."""
+
+    cause: FaultCause
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
 
 
 class ChainError(InputError, DriverError):

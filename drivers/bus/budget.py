@@ -17,6 +17,10 @@ FAST_HEAD_BYTES = 8
 """Common reply to a fast read, without the servos' parts: header 4, id, length 2, instruction."""
 FAST_PART_BYTES = 4
 """Each servo's part of it, without its data: error, id, CRC 2."""
+STATE_BYTES = 10
+"""State block, read in every cycle: Present Current, Velocity, Position."""
+SLOW_STATE_BYTES = 3
+"""Slow state block, read in every 16th cycle: Present Input Voltage, Present Temperature."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +84,7 @@ def wire_budget(
     baud: int,
     *,
     fast: bool,
-    read_bytes: int = 10,
+    read_bytes: int = STATE_BYTES,
     goal_bytes: int = 4,
     slow_read_bytes: int = 0,
     return_delay_s: float = 0.0,
@@ -93,8 +97,7 @@ def wire_budget(
         fast: fast sync read (one common reply) instead of sync read (one packet each).
         read_bytes: length of the block read from each servo.
         goal_bytes: length of the goal written to each; 0 for a cycle that only reads.
-        slow_read_bytes: length of the second block that some cycles read (the slow round); with it
-            the budget is that of such a cycle, the longest.
+        slow_read_bytes: length of the second block of the cycles that read the slow state.
         return_delay_s: register 9 of each servo, s. A fast read waits once, a sync read N times.
 
     """
@@ -108,6 +111,11 @@ def wire_budget(
             reply += _reply_bytes(servos, length, fast=fast)
             delays += 1 if fast else servos
     return WireBudget(servos, baud, fast, write, request, reply, delays * return_delay_s)
+
+
+def chain_budget(servos: int, baud: int, *, fast: bool) -> WireBudget:
+    """Budget of the longest cycle of a ``ServoChain``: one that also reads the slow state."""
+    return wire_budget(servos, baud, fast=fast, slow_read_bytes=SLOW_STATE_BYTES)
 
 
 def _reply_bytes(servos: int, length: int, *, fast: bool) -> int:

@@ -1,4 +1,4 @@
-"""After an interruption: whether this is the same chain, and where it was."""
+"""Recheck after an interruption: whether this is the same chain, in the same pose."""
 
 import math
 from dataclasses import dataclass
@@ -9,17 +9,18 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.start_up import Inspection, inspect
+from snakewalk.drivers.errors import ChainFault, FaultCause
 from snakewalk.drivers.protocol.registers import ServoUnits
 
 MOVED_RAD = 0.3
-"""A joint found farther from where it was last seen was bent, or has lost its turn count."""
+"""A joint found farther from its last position was bent, or has lost its turn count (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recheck:
-    """The chain as found; ``faults`` holds one line for each thing that forbids to go on."""
+    """The chain as found, and every fault that forbids going on."""
 
-    faults: tuple[str, ...]
+    faults: tuple[ChainFault, ...]
     torque_off: tuple[int, ...]
     """Joints whose torque is off: their servos have rebooted."""
     moved_rad: Floats
@@ -27,7 +28,7 @@ class Recheck:
 
     def __str__(self) -> str:
         if self.faults:
-            return "; ".join(self.faults)
+            return "; ".join(map(str, self.faults))
         off = f", torque off at joint {', '.join(map(str, self.torque_off))}"
         moved = float(np.abs(self.moved_rad).max())
         return f"the same servos, moved by at most {moved:.3f} rad{off if self.torque_off else ''}"
@@ -58,27 +59,25 @@ def recheck(
     moved = np.full(robot.joint_count, np.nan)
     if now.faults:
         return Recheck(now.faults, (), moved)
-    faults = []
+    faults: list[ChainFault] = []
     known = {s.servo_id: s for s in before.servos} if before is not None else {}
     for joint, servo in enumerate(now.servos):
         old = known.get(servo.servo_id, servo)
         if servo.firmware != old.firmware:
-            faults.append(
+            text = (
                 f"servo {servo.servo_id}: firmware {servo.firmware}, was {old.firmware}: another "
                 "servo?"
             )
+            faults.append(ChainFault(FaultCause.OTHER_FIRMWARE, text))
         raw = np.array([bus.read(servo.servo_id, "Present Position")])
         moved[joint] = units.position_rad(raw)[0] - position_rad[joint]
+        name = f"joint {joint} (servo {servo.servo_id})"
         turns = round(moved[joint] / math.tau) if np.isfinite(moved[joint]) else 0
         if turns:
-            faults.append(
-                f"joint {joint} (servo {servo.servo_id}): off by {turns:+d} turns: its "
-                "turn count is lost"
-            )
+            text = f"{name}: off by {turns:+d} turns: its turn count is lost"
+            faults.append(ChainFault(FaultCause.TURN_COUNT_LOST, text))
         elif not abs(moved[joint]) <= MOVED_RAD:
-            faults.append(
-                f"joint {joint} (servo {servo.servo_id}): moved by {moved[joint]:+.2f} rad since "
-                "it was last seen"
-            )
+            text = f"{name}: moved by {moved[joint]:+.2f} rad since it was last seen"
+            faults.append(ChainFault(FaultCause.MOVED, text))
     off = tuple(joint for joint, servo in enumerate(now.servos) if not servo.torque_on)
     return Recheck(tuple(faults), off, moved)

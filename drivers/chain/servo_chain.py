@@ -1,12 +1,13 @@
 """The chain of servos as a joint link: radians to raw goals, raw blocks to a ``JointState``."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats, Int32s
 from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.bus.control_cycle import ControlCycle, CycleCounters
+from snakewalk.drivers.bus.budget import WireBudget, chain_budget
+from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, ControlCycle, CycleCounters
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, Readings
 from snakewalk.drivers.chain.recheck import Recheck, recheck
@@ -23,8 +24,11 @@ from snakewalk.drivers.port.byte_port import BytePort, reopen
 from snakewalk.drivers.protocol.registers import WATCHDOG_TRIPPED, WATCHDOG_UNIT_S, ServoUnits
 from snakewalk.drivers.types import JointCommand, JointState
 
+SLOW_EVERY = 16
+"""Cycles from one reading of voltages and temperatures to the next (ours); torque and watchdog are
+checked as often, in other cycles."""
 _FIRST_READS = 5
-"""Tries to get one complete reply at the start."""
+"""Tries to get one complete reply at the start (ours)."""
 
 
 class ServoChain:
@@ -39,8 +43,7 @@ class ServoChain:
         robot: RobotConfig,
         *,
         watchdog_s: float = 0.2,
-        slow_every: int = 16,
-        fast: bool = True,
+        rate_hz: float | None = None,
     ) -> None:
         """Prepare; nothing is sent before ``enable``.
 
@@ -48,31 +51,25 @@ class ServoChain:
             bus: servos of the robot's model.
             robot: ids, limits, gains.
             watchdog_s: after so long without an instruction the servos stop by themselves.
-            slow_every: cycles from one reading of voltages and temperatures to the next, at least
-                3; torque and watchdog are looked at as often, in other cycles.
-            fast: use fast sync reads where every firmware has them.
+            rate_hz: control cycles a second, checked against what the wire allows; None: unchecked.
 
         Raises:
             ControlTableError: the model lacks a register or a unit that the cycle needs.
-            ValueError: ``slow_every`` is below 3.
 
         """
-        if slow_every < 3:
-            raise ValueError(f"slow_every must be at least 3, got {slow_every}")
         self.robot = robot
         self.inspection: Inspection | None = None
         """The servos as found by the last ``enable``."""
+        self.on_event: Callable[[str], None] = lambda line: None
+        """Gets one line when fast reads are given up."""
         self._bus = bus
         self._clock = bus.port.clock
         self._units = ServoUnits.of(bus.table)
         self._watchdog_s = watchdog_s
-        self._slow_every = slow_every
-        self._fast = fast
+        self._rate_hz = rate_hz
         self._goals = GoalEncoder(self._units, goal_limits_raw(robot, self._units))
         self._readings = Readings(robot.joint_count, bus.table, self._units)
-        self._cycle: ControlCycle = bus.cycle(robot.servo_ids, fast=fast)
-        self._slow: ControlCycle = bus.slow_cycle(robot.servo_ids, fast=fast)
-        self._liveness = LivenessCheck(bus, robot.servo_ids, fast=fast)
+        self._prepare_reads(fast=True)
         self._reads = 0
         self._armed = False
         self._sent_at_s = -np.inf
@@ -107,19 +104,18 @@ class ServoChain:
 
         Raises:
             ChainError: the servos are not the robot's, have an alarm, or stand beyond a limit.
-            BusError: a servo does not do as told; torque is off again then.
+            BudgetError: the wire cannot carry the rate with the reads that the firmwares have.
+            BusError: a servo does not do what an instruction asks; torque is off again then.
             PortError: the port is gone.
 
         """
-        bus, ids = self._bus, self.robot.servo_ids
-        self.inspection = inspect(bus, self.robot)
+        self.inspection = inspect(self._bus, self.robot)
         if self.inspection.faults:
-            raise ChainError(self.inspection.faults)
-        configure(bus, self.robot, self._units)
-        fast = self._fast and self.inspection.fast_reads
-        self._cycle = bus.cycle(ids, fast=fast)
-        self._slow = bus.slow_cycle(ids, fast=fast)
-        self._liveness = LivenessCheck(bus, ids, fast=fast)
+            raise ChainError([str(fault) for fault in self.inspection.faults])
+        if self._rate_hz is not None:
+            self._budget(fast=self.inspection.fast_reads).check(self._rate_hz)
+        configure(self._bus, self.robot, self._units)
+        self._prepare_reads(fast=self.inspection.fast_reads)
         self._reads = 0
         state = self._first_state()
         check_pose(self.robot, state.position_rad)
@@ -130,7 +126,7 @@ class ServoChain:
             raise
 
     def recheck(self) -> Recheck:
-        """Look at the chain after an interruption and compare it with what it was; moves nothing.
+        """Compare the chain after an interruption with what it was; moves nothing.
 
         Raises:
             BusError: a servo does not reply.
@@ -143,17 +139,17 @@ class ServoChain:
     def resume(self, found: Recheck) -> JointState:
         """Go on after an interruption: torque that is on stays on, nothing moves.
 
-        Servos that lost their torque (rebooted) are set up again. The others are freed from their
-        watchdog's stop and in the same breath told to stay where they are.
+        Servos that lost their torque (rebooted) are set up again. The others get their watchdog
+        cleared and, right behind it, goal = present.
 
         Raises:
             ChainError: ``found`` forbids it.
-            BusError: a servo does not do as told; torque is off again then.
+            BusError: a servo does not do what an instruction asks; torque is off again then.
             PortError: the port is gone.
 
         """
         if found.faults:
-            raise ChainError(found.faults)
+            raise ChainError([str(fault) for fault in found.faults])
         configure(self._bus, self.robot, self._units, found.torque_off)
         self._reads = 0
         state = self._first_state()
@@ -164,8 +160,17 @@ class ServoChain:
             self.disable()
             raise
 
+    def reopen(self) -> None:
+        """Close and open the port again.
+
+        Raises:
+            PortError: it is still not there.
+
+        """
+        reopen(self.port)
+
     def hold(self) -> None:
-        """Tell all servos to stay where they were last seen.
+        """Set all goals to the positions that were last read.
 
         Raises:
             PortError: the port is gone.
@@ -178,7 +183,7 @@ class ServoChain:
     def _hold_and_arm(self, state: JointState) -> JointState:
         """Goal = present, torque on, watchdog armed; every step read back."""
         bus, ids = self._bus, self.robot.servo_ids
-        bus.sync_write(ids, "Bus Watchdog", 0)  # no gap before the goals: an old one would count
+        bus.sync_write(ids, "Bus Watchdog", 0)  # goals follow at once, else an old goal counts
         goals = self._send_goals(state.position_rad)
         for servo_id, goal in zip(ids, goals.tolist(), strict=True):
             self._expect(servo_id, "Goal Position", goal)
@@ -193,7 +198,7 @@ class ServoChain:
         return self.read()
 
     def disable(self) -> None:
-        """Torque off, then the watchdog; every servo is asked, whatever the others do.
+        """Torque off, then the watchdog, on every servo, also where others fail.
 
         Raises:
             BusError: servos that did not confirm; their watchdog stays armed and stops them.
@@ -205,7 +210,7 @@ class ServoChain:
         try:
             bus.sync_write(ids, "Torque Enable", 0)
         except PortError:
-            reopen(bus.port)  # it may be back; if not, this says so
+            reopen(bus.port)  # it may be back
             bus.sync_write(ids, "Torque Enable", 0)
         silent = []
         for servo_id in ids:
@@ -218,7 +223,7 @@ class ServoChain:
             raise BusError(f"servo {', '.join(silent)}: torque off is not confirmed")
 
     def read(self) -> JointState:
-        """Read all joints once; in every ``slow_every``-th call voltages and temperatures too.
+        """Read all joints once; in every 16th call voltages and temperatures too.
 
         Raises:
             BusError: a servo has lost its torque (it has rebooted), or its watchdog has stopped it.
@@ -227,15 +232,17 @@ class ServoChain:
         """
         self._sent_at_s = self._clock.now_s()
         reply = self._cycle.read()
+        if self._fast_reads and not self._cycle.fast:
+            self._report_plain_reads()
         for joint in self._readings.update(reply, self._clock.now_s()):
             self._read_alarm(int(joint))
-        place = self._reads % self._slow_every
+        place = self._reads % SLOW_EVERY
         self._reads += 1
         if place == 0:
             self._readings.update_slow(self._slow.read())
-        elif self._armed and place == self._slow_every // 3:
+        elif self._armed and place == SLOW_EVERY // 3:
             self._liveness.torque()
-        elif self._armed and place == 2 * self._slow_every // 3:
+        elif self._armed and place == 2 * SLOW_EVERY // 3:
             self._liveness.watchdog()
         return self._readings.state(self._clock.now_s())
 
@@ -257,6 +264,30 @@ class ServoChain:
         self._send_goals(command.goal_rad)
         self._sent_at_s = self._clock.now_s()
 
+    def _prepare_reads(self, *, fast: bool) -> None:
+        bus, ids = self._bus, self.robot.servo_ids
+        self._cycle: ControlCycle = bus.cycle(ids, fast=fast)
+        self._slow: ControlCycle = bus.slow_cycle(ids, fast=fast)
+        self._liveness = LivenessCheck(bus, ids, fast=fast)
+        self._fast_reads = fast
+
+    def _budget(self, *, fast: bool) -> WireBudget:
+        return chain_budget(self.joint_count, self.port.getBaudRate(), fast=fast)
+
+    def _report_plain_reads(self) -> None:
+        """Tell that fast reads were given up, and whether the wire still carries the rate."""
+        self._fast_reads = False
+        line = (
+            f"fast sync reads given up after {FAST_FAILURES} failures in a row, plain from now on"
+        )
+        budget = self._budget(fast=False)
+        if self._rate_hz is not None and budget.share(self._rate_hz) > 1.0:
+            line += (
+                f": the wire carries at most {budget.limit_hz:.0f} Hz of plain reads, not "
+                f"{self._rate_hz:g} Hz: cycles will be late"
+            )
+        self.on_event(line)
+
     def _send_goals(self, goal_rad: Floats) -> Int32s:
         goals = self._goals.encode(goal_rad)
         self._cycle.write_goals(goals)
@@ -272,7 +303,7 @@ class ServoChain:
             state = self.read()
             if state.valid.all() and np.isfinite(state.voltage_v).all():
                 return state
-            self._reads = 0  # so that the slow block is read again, too
+            self._reads = 0  # so that the slow state is read again, too
         silent = [str(i) for i, v in zip(self.robot.servo_ids, state.valid, strict=True) if not v]
         raise BusError(f"servo {', '.join(silent) or 'group'}: group read fails, pings do not")
 
@@ -281,7 +312,7 @@ class ServoChain:
         try:
             self._readings.update_alarm(joint, self._bus.read(servo_id, "Hardware Error Status"))
         except BusError:
-            return  # the error byte carries the alert already; asked again in the next cycle
+            return  # the error byte carries the alert already; read again in the next cycle
 
 
 class LivenessCheck:

@@ -1,7 +1,7 @@
-"""From unknown servos to a chain that holds its pose: what is checked and set, in which order.
+"""Start-up: the checks and settings that turn unknown servos into a chain that holds its pose.
 
-The order replies what users of such buses report: goals not synced before torque-on, return delays
-of 500 us a servo, alarms that were there before, turn counts lost at a reboot.
+The order avoids what users of such buses report: goals not synced before torque-on, return delays
+of 500 us a servo, alarms from before, turn counts lost at a reboot.
 """
 
 import math
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.errors import ChainError
+from snakewalk.drivers.errors import ChainError, ChainFault, FaultCause
 from snakewalk.drivers.protocol.control_table import model_numbers
 from snakewalk.drivers.protocol.registers import (
     CURRENT_POSITION_MODE,
@@ -27,12 +27,12 @@ from snakewalk.drivers.protocol.registers import (
 FAST_READ_FIRMWARE = 45
 """First firmware with fast sync read (e-manual, DYNAMIXEL Protocol 2.0, Fast Sync Read)."""
 _SLACK_RAD = 0.2
-"""How far beyond its limit a joint may be found: it is let in, not refused, after a fall."""
+"""How far beyond its limit a joint may be found, for example after a fall."""
 
 
 @dataclass(frozen=True, slots=True)
 class ServoReport:
-    """What one servo says of itself before anything is changed."""
+    """Registers of one servo before anything is changed."""
 
     servo_id: int
     model: str
@@ -48,10 +48,10 @@ class ServoReport:
 
 @dataclass(frozen=True, slots=True)
 class Inspection:
-    """The chain as found; ``faults`` holds one line for each thing that forbids a start."""
+    """The chain as found, and every fault that forbids a start."""
 
     servos: tuple[ServoReport, ...]
-    faults: tuple[str, ...]
+    faults: tuple[ChainFault, ...]
 
     @property
     def fast_reads(self) -> bool:
@@ -60,29 +60,32 @@ class Inspection:
 
 
 def inspect(bus: DynamixelBus, robot: RobotConfig) -> Inspection:
-    """Look at every servo of the robot; changes nothing."""
+    """Read identity and state of every servo of the robot; changes nothing."""
     found = bus.find(robot.servo_ids)
-    faults = []
+    faults: list[ChainFault] = []
     missing = [str(servo_id) for servo_id in robot.servo_ids if servo_id not in found]
     if missing:
-        faults.append(
+        text = (
             f"{bus.port.name}: no answer from servo {', '.join(missing)} of "
             f"{robot.servo_ids[0]} to {robot.servo_ids[-1]} at {bus.port.getBaudRate()} baud: "
             "power, cable, id or baud rate"
         )
+        faults.append(ChainFault(FaultCause.NO_ANSWER, text))
     servos = []
     for servo_id, servo in found.items():
         name = model_numbers().get(servo.model_number, f"number {servo.model_number}")
         if servo.model_number != bus.table.model_number:
-            faults.append(f"servo {servo_id}: is a {name}, not a {bus.table.model}")
+            text = f"servo {servo_id}: is a {name}, not a {bus.table.model}"
+            faults.append(ChainFault(FaultCause.OTHER_MODEL, text))
             continue
         report = _report(bus, servo_id, name)
         servos.append(report)
         if report.hardware_error:
-            faults.append(
+            text = (
                 f"servo {servo_id}: alarm: {alarm_names(report.hardware_error)}; "
                 "remove the cause and reboot it"
             )
+            faults.append(ChainFault(FaultCause.ALARM, text))
     return Inspection(tuple(servos), tuple(faults))
 
 
@@ -107,20 +110,20 @@ def configure(
 
     Args:
         bus: where the servos are.
-        robot: what they shall be.
+        robot: the settings.
         units: of their model.
         joints: only these; None is all.
 
     Raises:
         ChainError: a setting of the robot is beyond what a servo allows.
-        BusError: a servo does not do as told.
+        BusError: a servo does not do what an instruction asks.
 
     """
     limits = goal_limits_raw(robot, units)
     for joint in range(robot.joint_count) if joints is None else joints:
         servo_id = robot.servo_ids[joint]
-        bus.write_verified(servo_id, "Torque Enable", 0)  # else the EEPROM is locked
-        # In its error state goals cannot be written; it ends with torque off, or an old goal counts
+        bus.write_verified(servo_id, "Torque Enable", 0)  # the EEPROM is locked while it is on
+        # in its error state goals are refused; if cleared with torque on, an old goal would count
         bus.write(servo_id, "Bus Watchdog", 0)
         bus.write_verified(servo_id, "Status Return Level", 2)
         bus.write_verified(servo_id, "Return Delay Time", 0)
@@ -149,7 +152,7 @@ def _limit_current(bus: DynamixelBus, servo_id: int, current_a: float, units: Se
 
 
 def goal_limits_raw(robot: RobotConfig, units: ServoUnits) -> NDArray[np.int32]:
-    """(J, 2) least and greatest raw goal of each joint; in position mode the servo keeps to it."""
+    """(J, 2) least and greatest raw goal of each joint; in position mode the servo checks them."""
     half = [math.floor(limit / units.rad_per_position) for limit in robot.limit_rad]
     return np.array([(units.zero_position - h, units.zero_position + h) for h in half], np.int32)
 

@@ -1,46 +1,64 @@
-"""What happens when the line or a servo goes away in the middle of a run.
+"""Recovery: what happens when the line or a servo goes away in the middle of a run.
 
-The servos hold by themselves: their watchdogs stop them where they are, torque on. Here the port is
-opened again, the chain is verified against what it was, and it goes on from where it stands; but
-only if the run's policy, or an operator, says so.
+The servos hold by themselves: their watchdogs stop them where they are, torque on. The recovery
+opens the port again, compares the chain with what it was, and goes on from its present pose; but
+only if the run's policy, or an operator, allows it.
 """
 
-from collections.abc import Callable
-from typing import Literal, Protocol
+from collections.abc import Callable, Sequence
+from typing import Generic, Literal, Protocol, TypeVar
 
-from snakewalk.drivers.chain.recheck import Recheck
 from snakewalk.drivers.clock import Clock
-from snakewalk.drivers.errors import DriverError, PortError
-from snakewalk.drivers.port.byte_port import BytePort, reopen
+from snakewalk.drivers.errors import ChainFault, DriverError, PortError
 from snakewalk.drivers.types import JointState
 
 Policy = Literal["stop", "confirm", "resume"]
 _RETRY_S = 0.1
 
 
-class RecoverableLink(Protocol):
-    """What of a chain this needs."""
+class Comparison(Protocol):
+    """The chain as found after an interruption; as a string, one line for the operator."""
 
-    def hold(self) -> None:
-        """Goal = last seen position."""
+    @property
+    def faults(self) -> Sequence[ChainFault]:
+        """Everything that forbids going on."""
         ...
 
-    def recheck(self) -> Recheck:
+
+C = TypeVar("C", bound=Comparison)
+
+
+class RecoverableLink(Protocol[C]):
+    """The methods of a chain that a recovery needs."""
+
+    @property
+    def clock(self) -> Clock:
+        """The port's clock."""
+        ...
+
+    def reopen(self) -> None:
+        """Open the port again; raises ``PortError`` while it is not there."""
+        ...
+
+    def hold(self) -> None:
+        """Set the goals to the positions that were last read."""
+        ...
+
+    def recheck(self) -> C:
         """Compare the chain with what it was."""
         ...
 
-    def resume(self, found: Recheck) -> JointState:
+    def resume(self, found: C) -> JointState:
         """Go on from where the joints are."""
         ...
 
 
-class Recovery:
+class Recovery(Generic[C]):
     """Brings an interrupted chain back, a few times; hand it to ``SafeLink(recovery=...)``."""
 
     def __init__(
         self,
-        chain: RecoverableLink,
-        port: BytePort,
+        chain: RecoverableLink[C],
         *,
         policy: Policy = "stop",
         patience_s: float = 10.0,
@@ -52,34 +70,33 @@ class Recovery:
 
         Args:
             chain: to be brought back.
-            port: that it is on.
-            policy: ``stop``: never go on; ``confirm``: ask; ``resume``: go on if all is as it was.
+            policy: ``stop``: never go on; ``confirm``: ask; ``resume``: go on if nothing changed.
             patience_s: how long to wait for port and servos.
-            limit: interruptions in one run after which none is mended any more.
+            limit: interruptions in one run after which no further one is recovered.
             confirm: asks an operator; gets what was found; without one ``confirm`` means no.
             on_event: gets every step as one line, for the log.
 
         """
-        self._chain, self._port, self._clock = chain, port, port.clock
-        self._policy, self._patience_s, self._left = policy, patience_s, limit
+        self._chain, self._clock = chain, chain.clock
+        self._policy, self._patience_s, self._remaining = policy, patience_s, limit
         self._confirm, self._on_event = confirm, on_event
 
     def recover(self, reason: str, stopped: Callable[[], str | None]) -> JointState | None:
-        """Hold, wait, verify, ask, go on; None if it must not or cannot go on.
+        """Hold, wait, compare, ask, go on; None if it must not or cannot go on.
 
         Args:
             reason: of the interruption.
-            stopped: asked while waiting; a reason to give up, or None.
+            stopped: called while waiting; returns a reason to give up, or None.
 
         Raises:
             DriverError: it broke again while going on.
 
         """
-        if self._policy == "stop" or self._left <= 0:
+        if self._policy == "stop" or self._remaining <= 0:
             return None
-        self._left -= 1
+        self._remaining -= 1
         self._on_event(f"interrupted: {reason}; the servos hold")
-        found = self._wait(self._clock, stopped)
+        found = self._wait(stopped)
         if found is None:
             return None
         self._on_event(f"verified: {found}")
@@ -90,9 +107,9 @@ class Recovery:
         self._on_event("going on from where it stands")
         return state
 
-    def _wait(self, clock: Clock, stopped: Callable[[], str | None]) -> Recheck | None:
+    def _wait(self, stopped: Callable[[], str | None]) -> C | None:
         """A chain that may go on; None if it does not come back in time."""
-        give_up_s = clock.now_s() + self._patience_s
+        give_up_s = self._clock.now_s() + self._patience_s
         held = False
         while True:
             try:
@@ -109,13 +126,13 @@ class Recovery:
             except DriverError as error:
                 last = str(error)
             why = stopped()
-            if why is not None or clock.now_s() >= give_up_s:
+            if why is not None or self._clock.now_s() >= give_up_s:
                 self._on_event(f"given up: {why or last}")
                 return None
-            clock.sleep_until_s(clock.now_s() + _RETRY_S)
+            self._clock.sleep_until_s(self._clock.now_s() + _RETRY_S)
 
     def _try_reopen(self) -> None:
         try:
-            reopen(self._port)
+            self._chain.reopen()
         except PortError:
-            return  # not yet back; the caller's patience decides
+            return  # not yet back; patience_s limits the wait

@@ -3,6 +3,7 @@
 import signal
 import threading
 from types import FrameType, TracebackType
+from typing import Any
 
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError, SafetyTrippedError
@@ -32,7 +33,7 @@ class SafeLink:
         link: JointLink,
         limits: SafetyLimits,
         clock: Clock,
-        recovery: Recovery | None = None,
+        recovery: Recovery[Any] | None = None,
     ) -> None:
         self.tripped: str | None = None
         """Why it has latched; None while it lets commands pass."""

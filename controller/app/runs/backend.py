@@ -67,7 +67,12 @@ def simulated(
         baud=servo.baud,
         supply_and_ambient=SupplyAndAmbient(supply_v=servo.supply_v),
     )
-    chain = ServoChain(DynamixelBus(line, servo.model), robot, watchdog_s=run.safety.watchdog_s)
+    chain = ServoChain(
+        DynamixelBus(line, servo.model),
+        robot,
+        watchdog_s=run.safety.watchdog_s,
+        rate_hz=run.cycle_hz,
+    )
     return Backend(
         "sim", chain, line.clock, plant.head_pose, lambda: plant.qpos, lambda: line.busy_s
     )
@@ -85,5 +90,6 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
         DynamixelBus(serial, robot.servo.model, latency_s=serial.latency_s),
         robot,
         watchdog_s=run.safety.watchdog_s,
+        rate_hz=run.cycle_hz,
     )
     return Backend(port, chain, serial.clock, None, None, lambda: float("nan"))

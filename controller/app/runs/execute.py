@@ -76,12 +76,13 @@ def execute(
         safety, clock = prepared.run.safety, backend.clock
         recovery = Recovery(
             backend.chain,
-            backend.chain.port,
             policy=safety.recovery,
             patience_s=safety.recovery_time_s,
             confirm=confirm,
             on_event=lambda text: log.event(clock.now_s(), "recovery", text, "warning"),
         )
+
+        backend.chain.on_event = lambda text: log.event(clock.now_s(), "bus", text, "warning")
 
         def log_event(kind: str, text: str) -> None:
             log.event(clock.now_s(), kind, text)

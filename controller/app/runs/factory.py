@@ -26,7 +26,7 @@ from snakewalk.controller.capture.readers.load import track_beside
 from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.motion.recorded import Recorded
-from snakewalk.drivers.bus.budget import wire_budget
+from snakewalk.drivers.bus.budget import chain_budget
 
 GAIT_PITCH_CURRENT_A = 1.5
 """Goal current of the pitch joints in a gait that lifts: soft ones would not carry the links."""
@@ -167,8 +167,7 @@ def _check_wire(run: RunConfig, robot: RobotConfig) -> None:
         InputError: with the highest rate that fits.
 
     """
-    budget = wire_budget(robot.joint_count, robot.servo.baud, fast=True, slow_read_bytes=7)
-    budget.check(run.cycle_hz)
+    chain_budget(robot.joint_count, robot.servo.baud, fast=True).check(run.cycle_hz)
 
 
 def _gait_by_name(

@@ -8,15 +8,13 @@ from snakewalk.controller.app.service import adapter
 from snakewalk.controller.app.service import servo_checks as servos
 from snakewalk.controller.app.service.finding import Finding
 from snakewalk.controller.app.service.scan import has_baud, scan
-from snakewalk.drivers.bus.budget import wire_budget
+from snakewalk.drivers.bus.budget import chain_budget
 from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.start_up import FAST_READ_FIRMWARE, ServoReport, inspect
-from snakewalk.drivers.errors import BusError
+from snakewalk.drivers.errors import BusError, FaultCause
 from snakewalk.drivers.port.byte_port import BytePort
 
-STATE_BYTES, SLOW_BYTES = 10, 7
-"""Blocks that a chain reads: in each cycle, and now and then."""
 _TEST_READS = 200
 
 
@@ -65,10 +63,7 @@ def examine(
         fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
         findings.append(line_quality(bus.cycle([s.servo_id for s in reports], fast=fast)))
     fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
-    budget = wire_budget(
-        robot.joint_count, baud, fast=fast, read_bytes=STATE_BYTES, slow_read_bytes=SLOW_BYTES
-    )
-    findings.append(adapter.wire(budget, rate_hz))
+    findings.append(adapter.wire(chain_budget(robot.joint_count, baud, fast=fast), rate_hz))
     return findings
 
 
@@ -92,7 +87,7 @@ def _reports(
     except BusError as error:
         findings.append(Finding("registers", "fail", str(error), "run it again; then the cables"))
         return ()
-    wrong = [fault for fault in inspection.faults if ": is a " in fault]
+    wrong = [str(f) for f in inspection.faults if f.cause is FaultCause.OTHER_MODEL]
     findings.append(servos.models(inspection.servos, wrong, bus.table.model))
     return inspection.servos
 

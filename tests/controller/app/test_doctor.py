@@ -9,7 +9,7 @@ from snakewalk.controller.app.service import adapter
 from snakewalk.controller.app.service.doctor import examine
 from snakewalk.controller.app.service.finding import Finding, worst
 from snakewalk.controller.app.service.scan import Heard, pick_port, scan
-from snakewalk.drivers.bus.budget import wire_budget
+from snakewalk.drivers.bus.budget import chain_budget, wire_budget
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.protocol.packet import Instruction
 from snakewalk.sim.line.sim_line import SimLine
@@ -141,6 +141,8 @@ def test_nobody_answers(line: Recorder) -> None:
 
 def test_a_rate_that_the_wire_does_not_carry(line: Recorder) -> None:
     assert of(doctor(line, rate_hz=5000.0), "wire budget").grade == "fail"
+    longest = chain_budget(4, 1_000_000, fast=True)  # 1.54 ms: 10 bytes of state, 3 of slow state
+    assert f"{longest.cycle_s * 1e3:.2f} ms a cycle" in of(doctor(line), "wire budget").found
     budget = wire_budget(16, 1_000_000, fast=True)
     assert adapter.wire(budget, 250.0).grade == "warn"
     assert "at most 281 Hz" in adapter.wire(budget, 50.0).found

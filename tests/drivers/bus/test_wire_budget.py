@@ -3,10 +3,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from snakewalk.drivers.bus.budget import wire_budget
+from snakewalk.drivers.bus.budget import chain_budget, wire_budget
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.group_read import GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.errors import BudgetError
+from tests.helpers.scripted_port import ScriptedPort
 
 
 @pytest.mark.parametrize(  # measured with 16 XM430
@@ -46,6 +48,18 @@ def test_the_slow_round_is_a_second_read_in_the_longest_cycle() -> None:
     both = wire_budget(16, 1_000_000, fast=True, slow_read_bytes=3)
     assert both.total_bytes == 356 + (14 + 16) + 8 + 16 * (4 + 3)
     assert both.share(50.0) == pytest.approx(50.0 * 5.06e-3)
+
+
+@pytest.mark.parametrize("fast", [False, True])
+@pytest.mark.parametrize("model", ["XM430-W350", "XL330-M288"])
+def test_the_budget_of_a_chain_counts_the_blocks_that_it_reads(model: str, fast: bool) -> None:
+    bus = DynamixelBus(ScriptedPort(lambda raw: []), model)
+    ids = range(1, 17)
+    blocks = (bus.cycle(ids, fast=fast), bus.slow_cycle(ids, fast=fast))
+    replies = [cycle._default_request.reply_bytes for cycle in blocks]
+    requests = [len(cycle._default_request.packet) for cycle in blocks]
+    budget = chain_budget(16, 1_000_000, fast=fast)
+    assert (budget.request_bytes, budget.reply_bytes) == (sum(requests), sum(replies))
 
 
 def test_reading_alone_sends_no_goals() -> None:

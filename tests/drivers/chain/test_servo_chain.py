@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from snakewalk.config.robot import RobotConfig, ServoConfig
+from snakewalk.drivers.bus.budget import chain_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.chain.start_up import inspect
-from snakewalk.drivers.errors import BusError, ChainError
+from snakewalk.drivers.errors import BudgetError, BusError, ChainError
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.drivers.types import JointCommand
@@ -250,3 +251,47 @@ def test_inspection_changes_nothing(line: Recorder) -> None:
     assert [servo.servo_id for servo in report.servos] == [1, 2, 3, 4]
     assert report.servos[0].return_delay_s == pytest.approx(500e-6)
     assert line.writes() == []
+
+
+class DamagedFastReads(Recorder):
+    """The last byte of every reply to a fast sync read is wrong."""
+
+    damaged = False
+
+    def read_until(self, count: int, deadline_s: float) -> bytes:
+        data = super().read_until(count, deadline_s)
+        if self.damaged and data and self.heard[-1].instruction == Instruction.FAST_SYNC_READ:
+            return data[:-1] + bytes([data[-1] ^ 1])
+        return data
+
+
+def test_old_firmware_at_a_rate_that_plain_reads_cannot_keep_is_refused(line: Recorder) -> None:
+    """Before torque: the plan counts on fast reads, which this chain does not have."""
+    line.bank["Firmware Version"][2] = 44
+    fits = chain_budget(4, line.getBaudRate(), fast=False).limit_hz
+    with pytest.raises(BudgetError, match=f"at most {fits:.0f} Hz"):
+        ServoChain(DynamixelBus(line), ROBOT, rate_hz=fits + 1.0).enable()
+    assert at(line, 64, 1) == []
+    ServoChain(DynamixelBus(line), ROBOT, rate_hz=fits - 1.0).enable()
+
+
+@pytest.mark.parametrize(
+    ("beyond", "end"), [(1.1, "cycles will be late"), (0.9, "plain from now on")]
+)
+def test_fast_reads_given_up_in_a_run_are_told_with_what_the_wire_still_carries(
+    beyond: float, end: str
+) -> None:
+    line = DamagedFastReads(ServoBank(ROBOT.servo_ids), START)
+    plain_hz = chain_budget(4, line.getBaudRate(), fast=False).limit_hz
+    chain = ServoChain(DynamixelBus(line), ROBOT, rate_hz=beyond * plain_hz)
+    events: list[str] = []
+    chain.on_event = events.append
+    chain.enable()
+    line.damaged = True
+    for _ in range(8):
+        chain.read()
+    assert not chain.fast
+    (event,) = events
+    assert event.startswith("fast sync reads given up after 3 failures")
+    assert event.endswith(end)
+    assert (f"at most {plain_hz:.0f} Hz of plain reads" in event) == (beyond > 1.0)

@@ -49,9 +49,7 @@ class Rig:
         self.line = LooseLine(ServoBank(ROBOT.servo_ids), BenchPlant(4, start_rad=0.1))
         self.chain = ServoChain(DynamixelBus(self.line), ROBOT, watchdog_s=WATCHDOG_S)
         self.events: list[str] = []
-        recovery = Recovery(
-            self.chain, self.line, policy=policy, confirm=confirm, on_event=self.events.append
-        )
+        recovery = Recovery(self.chain, policy=policy, confirm=confirm, on_event=self.events.append)
         limits = SafetyLimits.from_config(ROBOT, SafetyConfig())
         self.link = SafeLink(self.chain, limits, self.line.clock, recovery)
         self.link.enable()
