@@ -1,4 +1,4 @@
-"""What an AX-12A guards itself against: a blocked shaft, heat, a supply out of range.
+"""Alarms of an AX-12A: a blocked shaft, heat, a supply out of range.
 
 An alarm is a bit of the error byte of every answer while its cause lasts. Those in the mask of
 Shutdown(18) also set Torque Limit(34) to 0 and switch the torque off, and stay until the cause is
@@ -16,10 +16,10 @@ from snakewalk.sim.ax12.protocol1 import Error1
 from snakewalk.sim.plant import ServoDrive
 from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 from snakewalk.sim.servo.motor import MotorModel
+from snakewalk.sim.servo.protection import OVERLOAD_S, SLOW
+from snakewalk.sim.servo.servo_loops import count_blocked
 from snakewalk.sim.servo.supply import Supply
 
-OVERLOAD_S = 1.0
-"""How long full output may be held (ours)."""
 AMBIENT_C = 25.0
 ALARMS: Mapping[str, int] = {
     "overload": Error1.OVERLOAD,
@@ -49,19 +49,20 @@ class Ax12Alarms:
         )
         self._supply = Supply(servos, supply_v)
         self._blocked_s = np.zeros(servos)
-        self._kept = np.zeros(servos, np.uint8)
+        self._slow_rad_s = np.full(servos, SLOW * motor.no_load_rad_s)
+        self._latched = np.zeros(servos, np.uint8)
         self.shown = np.zeros(servos, np.uint8)
         """(S,) bits of the answers."""
         self.temperature_c = np.full(servos, AMBIENT_C)
         """(S,) of the housings: first order in the winding's loss."""
 
     def alarms(self, row: int) -> Mapping[str, int]:
-        """What a servo can detect."""
+        """Errors that a servo can detect, and their bits."""
         del row
         return ALARMS
 
     def supply(self, volts: float | None, rows: Indices | None = None) -> None:
-        """Change the supply of all, or of ``rows``; None: as it was."""
+        """Change the supply of all, or of ``rows``; None: back to the usual voltage."""
         self._supply.change(volts, rows)
 
     def heat(self, rows: Indices, celsius: float) -> None:
@@ -69,39 +70,38 @@ class Ax12Alarms:
         self.temperature_c[rows] = celsius
 
     def detect(self, rows: Indices, error: int) -> None:
-        """Let servos find an error; it stays until ``forget``."""
-        self._kept[rows] |= np.uint8(error)
+        """Raise an error of some servos; it stays until ``reset``."""
+        self._latched[rows] |= np.uint8(error)
         self._shut_down()
 
-    def forget(self, rows: Indices | int) -> None:
-        """Drop what was kept; a cause that lasts is found again."""
-        self._kept[rows] = 0
+    def reset(self, rows: Indices | int) -> None:
+        """Drop latched alarms; a cause that lasts raises its alarm again."""
+        self._latched[rows] = 0
         self._blocked_s[rows] = 0.0
         self.shown[rows] = 0
 
-    def look(self, seconds: float, velocity_rad_s: Floats) -> None:
-        """Judge the last ``seconds``."""
+    def check(self, seconds: float, velocity_rad_s: Floats) -> None:
+        """Update heat and alarms after ``seconds``."""
         drive, motor = self._drive, self._motor
         self._supply.feed(drive.supply_v)
         amps, pwm = self._blocked_shaft.current_a(), self._blocked_shaft.pwm()
         target_c = AMBIENT_C + motor.winding_k_per_w * motor.resistance_ohm * amps**2
         share = 1.0 - np.exp(-seconds / motor.thermal_time_s)
         self.temperature_c += (target_c - self.temperature_c) * share
-        full = np.abs(pwm) >= 0.98 * np.minimum(drive.pwm_limit, 1.0)
-        slow = np.sign(pwm) * velocity_rad_s < 0.05 * motor.no_load_rad_s
-        held = full & slow & (pwm != 0.0) & (drive.torque_on > 0.0)
-        self._blocked_s = np.where(held, self._blocked_s + seconds, 0.0)
+        full = np.where(drive.pwm_limit > 0.0, drive.pwm_limit, 1.0)  # 0 of 0 is no effort
+        on, slow_rad_s = drive.torque_on, self._slow_rad_s
+        count_blocked(self._blocked_s, seconds, pwm, full, on, velocity_rad_s, slow_rad_s)
         tenths = np.rint(drive.supply_v * 10.0)
         low, high = self._register("Min Voltage Limit"), self._register("Max Voltage Limit")
         hot = np.rint(self.temperature_c) > self._register("Temperature Limit")
         found = Error1.VOLTAGE * ((tenths < low) | (tenths > high))
         found |= Error1.OVERLOAD * (self._blocked_s >= OVERLOAD_S) | Error1.OVERHEATING * hot
-        self._kept |= found.astype(np.uint8) & self._register("Shutdown")
-        self.shown[:] = self._kept | found
+        self._latched |= found.astype(np.uint8) & self._register("Shutdown")
+        self.shown[:] = self._latched | found
         self._shut_down()
 
     def _shut_down(self) -> None:
-        self.shown |= self._kept
-        off = (self._kept & self._register("Shutdown")) != 0
+        self.shown |= self._latched
+        off = (self._latched & self._register("Shutdown")) != 0
         self._register("Torque Limit")[off] = 0
         self._register("Torque Enable")[off] = 0

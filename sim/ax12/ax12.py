@@ -1,9 +1,9 @@
-"""AX-12A servos: what their control table does to the motors, and back (e-manual, AX-12A)."""
+"""AX-12A servos: the control table drives the motors, and shows their shafts (e-manual, AX-12A)."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Indices
+from snakewalk.config.arrays import Bools, Floats, Indices
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.protocol.registers import VELOCITY_UNIT_RAD_S
 from snakewalk.sim.ax12.alarms import Ax12Alarms
@@ -53,9 +53,9 @@ class Ax12Servos:
             self._views.__getitem__, self.drive, AX12_MOTOR, self.blocked_shaft, supply_v
         )
         self.events = EventQueue()
-        """What happens to the servos at a time of its own, whoever talks."""
+        """Events that happen to the servos at a time of their own, such as faults."""
         self.powered = np.ones(servos, bool)
-        """(S,) False while a servo has no supply: it hears nothing and lets go."""
+        """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
         self._path = Trajectory(servos)
         self._turn_rad = np.zeros(servos)
         self._registered: dict[int, tuple[int, bytes]] = {}
@@ -71,7 +71,7 @@ class Ax12Servos:
     def __len__(self) -> int:
         return len(self.table)
 
-    # what a host asks for
+    # instructions
 
     def check(self, row: int, address: int, data: bytes) -> int:
         """Error bits that a write of ``data`` would answer; nothing is written."""
@@ -103,7 +103,7 @@ class Ax12Servos:
         self.table[row, address : address + len(data)] = np.frombuffer(data, np.uint8)
         touched = range(address, address + len(data))
         if CELLS["Torque Limit"].address in touched and self["Torque Limit"][row]:
-            self.protection.forget(row)
+            self.protection.reset(row)
         if CELLS["Goal Position"].address in touched:  # a goal switches the torque on
             self["Torque Enable"][row] = 1
         return 0
@@ -123,21 +123,21 @@ class Ax12Servos:
         return self.write(row, *kept) if kept is not None else Error1.INSTRUCTION
 
     def reset(self, row: int) -> None:
-        """Factory values, the ID too; then a start."""
+        """Set factory values, the ID too; then reboot."""
         for name, cell in CELLS.items():
             self[name][row] = cell.initial
         self.reboot(row)
 
-    # what happens to them
+    # power, blocked shafts, time
 
     def reboot(self, row: int) -> None:
-        """Start anew: RAM as it was made, Torque Limit(34) = Max Torque(14), goal = present."""
+        """Restart: initial RAM, Torque Limit(34) = Max Torque(14), goal = present position."""
         for name, cell in CELLS.items():
             if cell.address >= EEPROM_END:
                 self[name][row] = cell.initial
         self["Torque Limit"][row] = self["Max Torque"][row]
         self._registered.pop(row, None)
-        self.protection.forget(row)
+        self.protection.reset(row)
         self.refresh()
         self["Goal Position"][row] = self["Present Position"][row]
 
@@ -166,9 +166,9 @@ class Ax12Servos:
         while self._time_s < until_s:
             stop_s = min(until_s, self._time_s + SLICE_S, self.events.next_s)
             if stop_s > self._time_s:
-                self._steer(stop_s - self._time_s)
+                self._update_drive(stop_s - self._time_s)
                 self.plant.advance(stop_s, self.drive)
-                self.protection.look(stop_s - self._time_s, self.plant.velocity_rad_s)
+                self.protection.check(stop_s - self._time_s, self.plant.velocity_rad_s)
                 self._time_s = stop_s
             if stop_s >= self.events.next_s:
                 self.events.run_due(stop_s)
@@ -176,8 +176,8 @@ class Ax12Servos:
     # registers and shafts
 
     def refresh(self) -> None:
-        """All present values."""
-        self._follow_turns()
+        """Write all present values into the table."""
+        self._update_turns()
         ticks = (self.plant.position_rad - self._turn_rad) * TICKS_PER_RAD + CENTRE_TICKS
         self["Present Position"][:] = np.clip(np.rint(ticks), 0, 1023)
         self["Present Speed"][:] = _signed(self.plant.velocity_rad_s / SPEED_UNIT_RAD_S)
@@ -187,24 +187,24 @@ class Ax12Servos:
         self["Present Temperature"][:] = np.clip(celsius, 0, 255)
         self["Moving"][:] = self._path.ongoing & self._on() & ~self._wheel()
 
-    def _on(self) -> NDArray[np.bool_]:
+    def _on(self) -> Bools:
         return np.asarray((self["Torque Enable"] == 1) & self.powered)
 
-    def _wheel(self) -> NDArray[np.bool_]:
+    def _wheel(self) -> Bools:
         return np.asarray((self["CW Angle Limit"] == 0) & (self["CCW Angle Limit"] == 0))
 
-    def _follow_turns(self) -> None:
-        """The sensor knows no turns: a shaft that is not held may be in another than it was."""
+    def _update_turns(self) -> None:
+        """Take the turn of each free shaft anew: the sensor counts none, so it may have changed."""
         free = ~self._on() | self._wheel()
         turn_rad = TURN_RAD * np.rint(self.plant.position_rad / TURN_RAD)
         self._turn_rad = np.where(free, turn_rad, self._turn_rad)
 
-    def _steer(self, seconds: float) -> None:
+    def _update_drive(self, seconds: float) -> None:
         drive, wheel = self.drive, self._wheel()
         on, speed = self._on(), self["Moving Speed"].astype(int)
         shaft = self.plant.position_rad
         self._path.place(~on | wheel, shaft)
-        self._follow_turns()
+        self._update_turns()
         goal = (self["Goal Position"].astype(float) - CENTRE_TICKS) / TICKS_PER_RAD
         goal += self._turn_rad
         units = (speed & 1023).astype(np.float64) * (SPEED_UNIT_RAD_S / VELOCITY_UNIT_RAD_S)
@@ -231,9 +231,7 @@ class Ax12Servos:
         return block.view(f"<u{cell.size}")[:, 0]
 
 
-def _signed(
-    values: NDArray[np.float64],
-) -> NDArray[np.int_]:
+def _signed(values: Floats) -> NDArray[np.int_]:
     """Magnitude up to 1023 and the direction in bit 10."""
     size = np.clip(np.rint(np.abs(values)), 0, 1023).astype(int)
     return np.where((values < 0.0) & (size > 0), size | CLOCKWISE, size)

@@ -1,1 +1,1 @@
-"""faults."""
+"""Faults of a simulated line, played from a fault file with a seed."""

@@ -1,22 +1,121 @@
-"""Plays a fault file on a simulated line: same file, same seed, same run, same bytes."""
+"""Plays a fault file on a simulated line: the same file and seed give the same bytes."""
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
+from typing import Protocol
 
 import numpy as np
 
 from snakewalk.config import faults as plan
 from snakewalk.config.arrays import Indices
 from snakewalk.config.errors import ConfigError
-from snakewalk.sim.faults.fault_target import FaultTarget
-from snakewalk.sim.line.noise import Noise
+from snakewalk.sim.line.clock import SimClock
+from snakewalk.sim.line.noise import FaultScript, Noise
+from snakewalk.sim.servo.event_queue import EventQueue
 
-_NAMES = ("id", "takes", "behind")
+_ID_KEYS = ("id", "takes", "behind")
 """Keys of a fault that name one servo."""
 
 
+class FaultyProtection(Protocol):
+    """Supply, heat and alarms of some servos."""
+
+    def alarms(self, row: int) -> Mapping[str, int]:
+        """Errors that a servo can detect, by kind of fault, and their bits."""
+        ...
+
+    def supply(self, volts: float | None, rows: Indices | None = None) -> None:
+        """Change the supply of all, or of ``rows``; None: back to the usual voltage."""
+        ...
+
+    def heat(self, rows: Indices, celsius: float) -> None:
+        """Set housings to a temperature."""
+        ...
+
+    def detect(self, rows: Indices, error: int) -> None:
+        """Raise an error of some servos."""
+        ...
+
+
+class FaultyServos(Protocol):
+    """The servos of a line; a row is a place along the chain."""
+
+    @property
+    def events(self) -> EventQueue:
+        """Events that happen to them at a time of their own."""
+        ...
+
+    @property
+    def protection(self) -> FaultyProtection:
+        """Their supply, heat and alarms."""
+        ...
+
+    def block_shafts(self, rows: Indices) -> None:
+        """Block shafts where they are."""
+        ...
+
+    def free_shafts(self, rows: Indices) -> None:
+        """Free blocked shafts."""
+        ...
+
+    def cut_power(self, rows: Indices) -> None:
+        """Take the supply away."""
+        ...
+
+    def restore_power(self, rows: Indices) -> None:
+        """Give it back; the servos restart."""
+        ...
+
+    def reboot(self, row: int) -> None:
+        """Restart one servo."""
+        ...
+
+
+class FaultTarget(Protocol):
+    """A line and the servos on it, of either protocol."""
+
+    clock: SimClock
+
+    @property
+    def servos(self) -> FaultyServos:
+        """Those on the line."""
+        ...
+
+    def ids(self) -> list[int]:
+        """The ID of each row."""
+        ...
+
+    def senders(self, reply: bytes) -> Collection[int]:
+        """IDs of the servos that sent a reply."""
+        ...
+
+    def rename(self, row: int, servo_id: int) -> None:
+        """Give a servo another ID."""
+        ...
+
+    def mute(self, rows: Indices, on: bool) -> None:
+        """Stop servos from replying, or let them reply again."""
+        ...
+
+    def refresh_ids(self) -> None:
+        """Look up again who has which ID, after IDs, power or muting have changed."""
+        ...
+
+    def disconnect(self) -> None:
+        """Take the port away from the host."""
+        ...
+
+    def reconnect(self) -> None:
+        """Give the port back."""
+        ...
+
+    def attach(self, script: FaultScript) -> None:
+        """Let a script act on packets and host."""
+        ...
+
+
 class FaultPlayer:
-    """Faults of a plan on ``line``, from its present time on.
+    """Runs the faults of a plan on ``line``, from its present time on.
 
     Raises:
         ConfigError: the plan names an ID that no servo of the line has, or an error that its servos
@@ -32,25 +131,25 @@ class FaultPlayer:
         self._check(faults, source)
         self.noise = Noise(random.Random(faults.seed), self._start_s, line.senders)
         self.stalls: list[tuple[float, float]] = []
-        """When the host stands still, and for how long; times of the line's clock."""
+        """Pauses of the host: begin on the line's clock, and length, s."""
         for fault in faults.fault:
             if isinstance(fault, plan.Noise):
                 self.noise.add(fault)
             elif isinstance(fault, plan.Stall):
                 self.stalls.append((self._start_s + fault.at_s, fault.for_s))
             else:
-                self._plan(fault)
+                self._schedule(fault)
         self.stalls.sort()
         line.attach(self)
 
     def host_resumes_s(self, now_s: float) -> float:
-        """When a host that wants to go on at ``now_s`` does."""
+        """Time at which a host that calls at ``now_s`` goes on."""
         while self.stalls and self.stalls[0][0] <= now_s:
             begin_s, for_s = self.stalls.pop(0)
             now_s = max(now_s, begin_s + for_s)
         return now_s
 
-    # planning
+    # schedule
 
     def _check(self, faults: plan.FaultPlan, source: str) -> None:
         wrong: list[str] = []
@@ -58,7 +157,7 @@ class FaultPlayer:
         for k, fault in enumerate(faults.fault):
             where = f"{source}: fault.{k}.{fault.kind}"
             named = list(getattr(fault, "ids", ()))
-            named += [getattr(fault, key) for key in _NAMES if hasattr(fault, key)]
+            named += [getattr(fault, key) for key in _ID_KEYS if hasattr(fault, key)]
             wrong += [
                 f"{where}: no servo has ID {each}; the bus has {there}"
                 for each in named
@@ -70,7 +169,7 @@ class FaultPlayer:
             raise ConfigError(wrong)
 
     def _undetectable(self, fault: plan.Trip, where: str) -> list[str]:
-        """What is wrong with an error that a servo named cannot detect."""
+        """Messages about an error that a named servo cannot detect."""
         known = {
             each: self._servos.protection.alarms(self._rows[each])
             for each in fault.ids
@@ -82,7 +181,7 @@ class FaultPlayer:
             if fault.kind not in alarms
         ]
 
-    def _plan(self, fault: plan.Fault) -> None:
+    def _schedule(self, fault: plan.Fault) -> None:
         begin, end = self._actions(fault)
         self._servos.events.schedule(self._start_s + fault.at_s, self._then_refresh_ids(begin))
         for_s = getattr(fault, "for_s", None)
@@ -101,15 +200,17 @@ class FaultPlayer:
         return act
 
     def _actions(self, fault: plan.Fault) -> tuple[Callable[[], None], Callable[[], None] | None]:
-        """What to do at the beginning and at the end."""
+        """Actions at the beginning and at the end of a fault."""
         line, servos = self._line, self._servos
-        guard = servos.protection
+        protection = servos.protection
         rows = np.array([self._rows[each] for each in getattr(fault, "ids", ())], np.intp)
         if isinstance(fault, plan.Port):
             return line.disconnect, line.reconnect
         if isinstance(fault, plan.Supply):
             some = rows if len(rows) else None
-            return lambda: guard.supply(fault.volts, some), lambda: guard.supply(None, some)
+            return lambda: protection.supply(fault.volts, some), lambda: protection.supply(
+                None, some
+            )
         if isinstance(fault, plan.Unplug):
             behind = np.arange(self._rows[fault.behind] + 1, len(line.ids()))
             return lambda: servos.cut_power(behind), lambda: servos.restore_power(behind)
@@ -117,7 +218,7 @@ class FaultPlayer:
             row = self._rows[fault.id]
             return lambda: line.rename(row, fault.takes), lambda: line.rename(row, fault.id)
         if isinstance(fault, plan.Heat):
-            return lambda: guard.heat(rows, fault.celsius), None
+            return lambda: protection.heat(rows, fault.celsius), None
         if isinstance(fault, plan.Trip):
             return lambda: self._trip(rows, fault.kind), None
         return self._servo_actions(fault, rows)
@@ -137,5 +238,5 @@ class FaultPlayer:
             for row in rows:
                 self._servos.reboot(int(row))
         else:
-            guard = self._servos.protection
-            guard.detect(rows, guard.alarms(int(rows[0]))[kind])
+            protection = self._servos.protection
+            protection.detect(rows, protection.alarms(int(rows[0]))[kind])

@@ -1,4 +1,4 @@
-"""Packets that do not arrive as they were sent, by the script of a fault file."""
+"""Noise: packets that do not arrive as they were sent, by the script of a fault file."""
 
 import random
 from collections.abc import Callable, Collection
@@ -7,13 +7,13 @@ from typing import Protocol
 from snakewalk.config import faults as plan
 
 DELAY_S, LATE_S = 1e-3, 0.05
-"""By how much an answer is slow where the file does not say: late is past any time-out."""
+"""Delay of a reply where the file gives none; a late one comes after any time-out."""
 
 
 class Noise:
     """The noise faults of a plan; ``chance`` draws and wrong bits come from one seeded source.
 
-    ``senders`` says who has written an answer.
+    ``senders`` gives the IDs of the servos that sent a reply.
     """
 
     def __init__(
@@ -27,7 +27,7 @@ class Noise:
         """Packets changed so far, by kind."""
 
     def add(self, fault: plan.Noise) -> None:
-        """One more fault; those of a file act in its order."""
+        """Add a fault; those of a file act in its order."""
         self._faults.append(fault)
 
     @property
@@ -46,13 +46,13 @@ class Noise:
     def _change(self, data: bytes, now_s: float, of: str) -> list[tuple[float, bytes]]:
         packets = [(0.0, data)]
         for fault in self._faults:
-            if not self._acts(fault, data, now_s, of):
+            if not self._applies(fault, data, now_s, of):
                 continue
             self.counts[fault.kind] = self.counts.get(fault.kind, 0) + 1
             packets = [new for packet in packets for new in self._one(fault, *packet)]
         return packets
 
-    def _acts(self, fault: plan.Noise, data: bytes, now_s: float, of: str) -> bool:
+    def _applies(self, fault: plan.Noise, data: bytes, now_s: float, of: str) -> bool:
         since_s = now_s - self._start_s - fault.at_s
         if fault.of not in (of, "both") or since_s < 0.0:
             return False
@@ -78,10 +78,10 @@ class Noise:
 
 
 class FaultScript(Protocol):
-    """What a fault file does to packets and to the host."""
+    """The effect of a fault file on packets and on the host."""
 
     noise: Noise
 
     def host_resumes_s(self, now_s: float) -> float:
-        """When a host that wants to go on at ``now_s`` does."""
+        """Time at which a host that calls at ``now_s`` goes on."""
         ...

@@ -1,1 +1,4 @@
-"""The body and the ground in MuJoCo, with the snake's anisotropic friction applied by us."""
+"""The body, its ground, water and obstacles in MuJoCo, as a ``sim.plant.Plant``.
+
+Contacts are frictionless in MuJoCo; the snake's anisotropic friction is added here, compiled.
+"""

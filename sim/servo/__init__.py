@@ -1,1 +1,6 @@
-"""servo."""
+"""The simulated DYNAMIXEL X servo: control tables, firmware, motor and protections.
+
+``bank`` holds the control tables of all servos as one array (servos x bytes), ``firmware`` turns
+registers into the drive of the motors (``sim.plant.ServoDrive``) as time passes, and
+``present_values`` writes what the shafts do back into the registers.
+"""
