@@ -1,4 +1,4 @@
-"""One recording captured: frames read, seen, followed, written and drawn."""
+"""One recording captured: frames read, the animal detected in them, track and pictures written."""
 
 from dataclasses import dataclass
 from itertools import islice
@@ -23,8 +23,8 @@ _SHEETS = (".png", ".jpg", ".jpeg")
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What the command line was told; see its help."""
+class CaptureOptions:
+    """The options of ``snakewalk capture``; see its help."""
 
     recording: Path
     output: Path
@@ -40,81 +40,111 @@ class Wanted:
     force: bool = False
 
 
-def capture_file(wanted: Wanted) -> dict[str, object]:
-    """Do all that is wanted, and tell what was found.
+@dataclass(frozen=True, slots=True)
+class CaptureFacts:
+    """Counts and sizes of a captured recording, rounded for a reader."""
+
+    recording: str
+    track: str
+    frames: int
+    frames_used: int
+    frames_rough: int
+    frames_with_company: int
+    """Frames with distractors."""
+    verdicts: dict[str, int]
+    """Frames of each status."""
+    rate_hz: float
+    rate_assumed: bool
+    background: str
+    animal: str
+    """Whether it is dark or light on its ground."""
+    length_px: float
+    expected_error_px: float | None
+    length_m: float | None
+    head_by: str
+    head_sure: float
+    frames_with_unsure_head: int
+
+
+def capture_recording(options: CaptureOptions) -> CaptureFacts:
+    """Capture a recording and write all results that the options name.
 
     Raises:
         InputError: nothing that can be used in the recording, a result that exists, a bad option.
 
     """
-    _check(wanted)
-    footage = open_footage(wanted.recording, wanted.rate_hz)
-    head_px = None if wanted.head is None else _place(wanted.head)
+    _check(options)
+    footage = open_footage(options.recording, options.rate_hz)
+    head_px = None if options.head is None else _place(options.head)
     console = Console(stderr=True)
     with console.status("learning the background ..."):
         some = footage.some(_SAMPLE)
-        given = None if wanted.background is None else _like(read_image(wanted.background), some[0])
-        detector = make_detector(some, given)
+        background = (
+            None if options.background is None else _like(read_image(options.background), some[0])
+        )
+        detector = make_detector(some, background)
         m_per_px = None
-        if wanted.marker is not None:
+        if options.marker is not None:
             ground = some[0] if detector.background is None else detector.background
-            m_per_px = scale_of_marker(wanted.marker, ground)
-    fixed = not wanted.cropped and len({frame.shape for frame in some}) == 1
+            m_per_px = scale_of_marker(options.marker, ground)
+    fixed = not options.cropped and len({frame.shape for frame in some}) == 1
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("frames", total=footage.count)
         captured = capture(
             footage.read(),
             detector,
             footage.rate_hz,
-            name=str(wanted.recording),
+            name=str(options.recording),
             head_px=head_px,
             fixed=fixed,
             on_progress=lambda: progress.advance(task),
         )
-        if wanted.length_m is not None:
-            m_per_px = scale_of_length(wanted.length_m, captured.length_px)
-        with atomic_write(wanted.output) as part:
+        if options.length_m is not None:
+            m_per_px = scale_of_length(options.length_m, captured.length_px)
+        with atomic_write(options.output) as part:
             save_capture(
                 part,
                 captured,
-                name=wanted.recording.stem,
+                name=options.recording.stem,
                 m_per_px=m_per_px,
-                source=f"captured from {wanted.recording.name}",
+                source=f"captured from {options.recording.name}",
             )
-        if wanted.sheet is not None:
-            contact_sheet(wanted.sheet, footage.read(), captured)
-        if wanted.steps is not None:
+        if options.sheet is not None:
+            contact_sheet(options.sheet, footage.read(), captured)
+        if options.steps is not None:
             number = int(np.argmax(captured.used))
             image = next(islice(footage.read(), number, None))
-            step_picture(wanted.steps, image, detector, captured.points_px[number])
-        if wanted.overlay is not None:
+            step_picture(options.steps, image, detector, captured.points_px[number])
+        if options.overlay is not None:
             task = progress.add_task("overlay film", total=footage.count)
-            overlay_film(wanted.overlay, footage.read(), captured, lambda: progress.advance(task))
-    return _facts(wanted, footage, detector, captured, m_per_px)
+            overlay_film(options.overlay, footage.read(), captured, lambda: progress.advance(task))
+    return _facts(options, footage, detector, captured, m_per_px)
 
 
-def _check(wanted: Wanted) -> None:
-    if wanted.length_m is not None and wanted.marker is not None:
+def _check(options: CaptureOptions) -> None:
+    if options.length_m is not None and options.marker is not None:
         raise InputError("--length-m and --marker both give the scale: say one of them")
-    if wanted.length_m is not None and not 0.0 < wanted.length_m < float("inf"):
-        raise InputError(f"--length-m: the animal must be longer than 0 m, not {wanted.length_m}")
-    if wanted.output.suffix.lower() != ".npz":
-        raise InputError(f"{wanted.output}: a track is an .npz")
-    if wanted.overlay is not None and wanted.overlay.suffix.lower() not in _FILMS:
-        raise InputError(f"{wanted.overlay}: an overlay film is one of {', '.join(_FILMS)}")
-    for picture in (wanted.sheet, wanted.steps):
+    if options.length_m is not None and not 0.0 < options.length_m < float("inf"):
+        raise InputError(f"--length-m: the animal must be longer than 0 m, not {options.length_m}")
+    if options.output.suffix.lower() != ".npz":
+        raise InputError(f"{options.output}: a track is an .npz")
+    if options.overlay is not None and options.overlay.suffix.lower() not in _FILMS:
+        raise InputError(f"{options.overlay}: an overlay film is one of {', '.join(_FILMS)}")
+    for picture in (options.sheet, options.steps):
         if picture is not None and picture.suffix.lower() not in _SHEETS:
             raise InputError(f"{picture}: a picture is one of {', '.join(_SHEETS)}")
-    refuse_to_overwrite([wanted.output, wanted.overlay, wanted.sheet, wanted.steps], wanted.force)
+    refuse_to_overwrite(
+        [options.output, options.overlay, options.sheet, options.steps], options.force
+    )
 
 
-def _place(said: str) -> tuple[float, float]:
+def _place(text: str) -> tuple[float, float]:
     try:
-        x, y = (float(part) for part in said.split(","))
+        x, y = (float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(f"--head {said}: expected X,Y in pixels") from None
+        raise InputError(f"--head {text}: expected X,Y in pixels") from None
     if not np.isfinite([x, y]).all():
-        raise InputError(f"--head {said}: expected X,Y in pixels")
+        raise InputError(f"--head {text}: expected X,Y in pixels")
     return x, y
 
 
@@ -128,32 +158,32 @@ def _like(background: Image, frame: Image) -> Image:
 
 
 def _facts(
-    wanted: Wanted,
+    options: CaptureOptions,
     footage: Footage,
     detector: BodyDetector,
     captured: Capture,
     m_per_px: float | None,
-) -> dict[str, object]:
+) -> CaptureFacts:
     length_px = float(np.nanmedian(captured.length_px))
     known = captured.expected_px[np.isfinite(captured.expected_px)]
     error_px = float(np.median(known)) if known.size else float("nan")
     unsure = int(np.count_nonzero(captured.margin < 0.1))
-    return {
-        "recording": str(wanted.recording),
-        "track": str(wanted.output),
-        "frames": len(captured.status),
-        "frames_used": int(captured.used.sum()),
-        "frames_rough": int((captured.used & ~captured.good).sum()),
-        "frames_with_company": int(captured.with_distractors.sum()),
-        "verdicts": captured.counts,
-        "rate_hz": footage.rate_hz,
-        "rate_assumed": footage.rate_assumed,
-        "background": detector.background_source,
-        "animal": str(detector.polarity),
-        "length_px": round(length_px, 2),
-        "expected_error_px": None if np.isnan(error_px) else round(error_px, 3),
-        "length_m": None if m_per_px is None else round(length_px * m_per_px, 5),
-        "head_by": captured.head_by,
-        "head_sure": round(captured.head_sure, 3),
-        "frames_with_unsure_head": unsure,
-    }
+    return CaptureFacts(
+        recording=str(options.recording),
+        track=str(options.output),
+        frames=len(captured.status),
+        frames_used=int(captured.used.sum()),
+        frames_rough=int((captured.used & ~captured.good).sum()),
+        frames_with_company=int(captured.with_distractors.sum()),
+        verdicts=captured.counts,
+        rate_hz=footage.rate_hz,
+        rate_assumed=footage.rate_assumed,
+        background=detector.background_source,
+        animal=str(detector.polarity),
+        length_px=round(length_px, 2),
+        expected_error_px=None if np.isnan(error_px) else round(error_px, 3),
+        length_m=None if m_per_px is None else round(length_px * m_per_px, 5),
+        head_by=captured.head_by,
+        head_sure=round(captured.head_sure, 3),
+        frames_with_unsure_head=unsure,
+    )

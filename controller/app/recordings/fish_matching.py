@@ -1,8 +1,8 @@
-"""Postures from files: a film, two films, or midlines that someone has tracked already."""
+"""Postures from files: a film, two films, or midlines that were tracked already."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +16,39 @@ MIDLINES = (".csv", ".npz", ".npy", ".mat", ".wcon", ".h5", ".slp", ".json")
 """Endings of tracked bodies; everything else is taken for images."""
 
 
+@dataclass(frozen=True, slots=True)
+class MatchFacts:
+    """Counts and ranges of the postures of a recording."""
+
+    frames: int
+    matched: int
+    rate_hz: float
+    largest_angles_deg: list[float]
+    length_px: float | None = None
+    """Of a film; None of midlines, and so are the next three."""
+    rate_assumed: bool | None = None
+    left_out: dict[str, int] | None = None
+    """Frames without a posture, by reason."""
+    value_v: float | None = None
+    left_over_deg: float | None = None
+    """Of midlines: what the spine angles do not explain, root mean square."""
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the facts that are known, for JSON."""
+        values = {name: getattr(self, name) for name in MatchFacts.__slots__}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+@dataclass(frozen=True, slots=True)
+class MatchedRecording:
+    """Postures, what is known of them, and the matched film they come from."""
+
+    postures: Postures
+    facts: MatchFacts
+    film: FilmMatch | None
+    """None of midlines."""
+
+
 def match_footage(
     top: Path,
     side: Path | None,
@@ -25,9 +58,19 @@ def match_footage(
     build: str,
     rate_hz: float | None,
     length_m: float | None,
-    tick: Callable[[int, int], None],
-) -> tuple[FilmMatch, dict[str, Any]]:
-    """Match a film and say what was found.
+    on_progress: Callable[[int, int], None],
+) -> MatchedRecording:
+    """Match a film, or two films of the same moments.
+
+    Args:
+        top: film from above.
+        side: film from the side.
+        background: picture of the scene without the fish, from above.
+        side_background: the same from the side.
+        build: carp or eel.
+        rate_hz: frames a second, instead of what the file says.
+        length_m: of the body; without it the unit is the body length.
+        on_progress: called with the frames done, and in all.
 
     Raises:
         InputError: a file that cannot be read, or no fish in it.
@@ -41,9 +84,9 @@ def match_footage(
     def count() -> None:
         nonlocal done
         done += 1
-        tick(done, total)
+        on_progress(done, total)
 
-    matched = match_film(
+    film = match_film(
         above.frames,
         total,
         model,
@@ -53,18 +96,22 @@ def match_footage(
         name=top.name,
         on_progress=count,
     )
-    facts = facts_of(matched.postures) | {
-        "length_px": round(matched.model.length_px, 1),
-        "rate_assumed": above.footage.rate_assumed,
-        "left_out": matched.lost,
-    }
-    value = matched.postures.value
-    if value is not None:
-        facts["value_v"] = round(float(np.nanmedian(value)), 3)
-    return matched, facts
+    postures = film.postures
+    value = None if postures.value is None else round(float(np.nanmedian(postures.value)), 3)
+    facts = MatchFacts(
+        frames=postures.frames,
+        matched=int(postures.found.sum()),
+        rate_hz=round(postures.rate_hz, 3),
+        largest_angles_deg=_largest_angles_deg(postures),
+        length_px=round(film.model.length_px, 1),
+        rate_assumed=above.footage.rate_assumed,
+        left_out=film.lost,
+        value_v=value,
+    )
+    return MatchedRecording(postures, facts, film)
 
 
-def read_midlines(file: Path, build: str, rate_hz: float | None) -> tuple[Postures, dict[str, Any]]:
+def read_midlines(file: Path, build: str, rate_hz: float | None) -> MatchedRecording:
     """Postures of a recording that holds midlines.
 
     Raises:
@@ -72,17 +119,18 @@ def read_midlines(file: Path, build: str, rate_hz: float | None) -> tuple[Postur
 
     """
     track = load_track(str(file), rate_hz)
-    found = postures_of_track(track, fish_model(build).joints_at)
-    off = np.degrees(np.sqrt(np.mean((track.angles_rad - found.tangents_rad()[found.found]) ** 2)))
-    return found, facts_of(found) | {"left_over_deg": round(float(off), 2)}
+    postures = postures_of_track(track, fish_model(build).joints_at)
+    rest = track.angles_rad - postures.tangents_rad()[postures.found]
+    facts = MatchFacts(
+        frames=postures.frames,
+        matched=int(postures.found.sum()),
+        rate_hz=round(postures.rate_hz, 3),
+        largest_angles_deg=_largest_angles_deg(postures),
+        left_over_deg=round(float(np.degrees(np.sqrt(np.mean(rest**2)))), 2),
+    )
+    return MatchedRecording(postures, facts, None)
 
 
-def facts_of(postures: Postures) -> dict[str, Any]:
-    """Counts and ranges of postures."""
+def _largest_angles_deg(postures: Postures) -> list[float]:
     size = np.degrees(np.nanmax(np.abs(postures.angles_rad), axis=0))
-    return {
-        "frames": postures.frames,
-        "matched": int(postures.found.sum()),
-        "rate_hz": round(postures.rate_hz, 3),
-        "largest_angles_deg": size.round(1).tolist(),
-    }
+    return [float(angle) for angle in size.round(1)]

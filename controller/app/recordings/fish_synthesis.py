@@ -1,9 +1,9 @@
-"""From postures to a new motion, with what is to be said of it."""
+"""From postures to a new motion: cut, ordered, composed, and retargeted to a robot."""
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -32,8 +32,8 @@ from snakewalk.controller.kinematics.retarget import Retarget
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What is asked of a synthesis; angles in degrees, as on the command line."""
+class SynthesisOptions:
+    """The options of a synthesis; angles in degrees, as on the command line."""
 
     through: list[tuple[float, float]]
     seconds: float = 20.0
@@ -50,7 +50,29 @@ class Wanted:
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
+class SynthesisFacts:
+    """Counts of a synthesis, and the joint steps at its joins."""
+
+    segments: dict[str, int]
+    """By kind."""
+    beats_merged: int
+    pieces_used: int
+    seconds: float
+    joins_without_rule: int
+    reached_s: list[float]
+    robot: str
+    join_step_deg: float | None = None
+    """Largest joint step where one piece ends and the next begins; None with one piece."""
+    join_step_blended_deg: float | None = None
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the facts that are known, for JSON."""
+        values = {name: getattr(self, name) for name in SynthesisFacts.__slots__}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+@dataclass(frozen=True, slots=True)
+class SynthesisedMotion:
     """A motion and where it is from."""
 
     source: Postures
@@ -60,72 +82,74 @@ class Made:
     motion: Postures
     joints_rad: Floats
     """(T, joints) of the robot."""
-    robot: str
-    facts: dict[str, Any]
+    facts: SynthesisFacts
 
     def save(self, file: Path) -> None:
         """Write it as a recording that a run can take."""
-        with file.open("wb") as stream:
-            save_motion(stream, self.motion, self.joints_rad, self.robot, self.sequence)
+        save_motion(file, self.motion, self.joints_rad, self.facts.robot, self.sequence)
 
 
-def synthesise_motion(source: Postures, wanted: Wanted) -> Made:
+def synthesise_motion(source: Postures, options: SynthesisOptions) -> SynthesisedMotion:
     """Cut, choose, compose, retarget.
 
     Raises:
         InputError: no segment, a control point out of reach, an unknown robot or reference.
 
     """
-    robot = load_robot(wanted.robot)
-    within = float(np.radians(wanted.within_deg))
-    reference = None
-    if wanted.reference == "commonest":
-        if not source.found.any():
-            raise InputError(f"{source.name}: holds no posture")
-        reference = commonest_posture(source.angles_rad, within)
-        if wanted.mirror:
-            raise InputError("--mirror needs the straight reference: a bent one has no mirror end")
-    elif wanted.reference != "straight":
-        raise InputError(f"--reference {wanted.reference}: straight or commonest")
-    cutting = Segmentation(within_rad=within, merge_rad=float(np.radians(wanted.merge_deg)))
-    segments = cut(source, cutting, reference)
-    pieces = piece_graph(source, segments, mirror=wanted.mirror)
-    if wanted.through:
-        points = np.array(wanted.through)
-        radius = wanted.radius * source.length
-        sequence = through(pieces, points, radius=radius, limit_s=wanted.limit_s)
+    robot = load_robot(options.robot)
+    segments = _segments(source, options)
+    pieces = piece_graph(source, segments, mirror=options.mirror)
+    if options.through:
+        points = np.array(options.through)
+        radius = options.radius * source.length
+        sequence = through(pieces, points, radius=radius, limit_s=options.limit_s)
     else:
-        sequence = at_random(pieces, wanted.seconds, np.random.default_rng(wanted.seed))
+        sequence = at_random(pieces, options.seconds, np.random.default_rng(options.seed))
     motion = replace(
-        compose(pieces, sequence, wanted.blend_s),
+        compose(pieces, sequence, options.blend_s),
         name=f"{source.name}, put together anew",
         source=source.source,
         licence=source.licence,
     )
     retarget = Retarget(robot)
-    joints = joint_motion(pieces, sequence, retarget, wanted.blend_s)
-    facts: dict[str, Any] = {
-        "segments": _count([segment.kind for segment in segments]),
-        "beats_merged": sum(segment.parts - 1 for segment in segments),
-        "pieces_used": len(sequence.order),
-        "seconds": round((motion.frames - 1) / motion.rate_hz, 2),
-        "joins_without_rule": sequence.forced,
-        "reached_s": [round(at, 2) for at in sequence.reached_s],
-        "robot": robot.name,
-    }
+    joints = joint_motion(pieces, sequence, retarget, options.blend_s)
+    kinds = Counter(str(segment.kind) for segment in segments)
+    facts = SynthesisFacts(
+        segments=dict(sorted(kinds.items())),
+        beats_merged=sum(segment.parts - 1 for segment in segments),
+        pieces_used=len(sequence.order),
+        seconds=round((motion.frames - 1) / motion.rate_hz, 2),
+        joins_without_rule=sequence.forced,
+        reached_s=[round(at, 2) for at in sequence.reached_s],
+        robot=robot.name,
+    )
     steps = _steps(joint_pieces(pieces, sequence, retarget))
-    at = junctions(pieces, sequence)
     if len(steps):
-        after = np.abs(np.diff(joints, axis=0))[at]
-        facts["join_step_deg"] = round(float(np.degrees(steps.max())), 2)
-        facts["join_step_blended_deg"] = round(float(np.degrees(after.max())), 2)
-    return Made(source, segments, pieces, sequence, motion, joints, robot.name, facts)
+        after = np.abs(np.diff(joints, axis=0))[junctions(pieces, sequence)]
+        facts = replace(
+            facts,
+            join_step_deg=round(float(np.degrees(steps.max())), 2),
+            join_step_blended_deg=round(float(np.degrees(after.max())), 2),
+        )
+    return SynthesisedMotion(source, segments, pieces, sequence, motion, joints, facts)
+
+
+def _segments(source: Postures, options: SynthesisOptions) -> list[MotionSegment]:
+    """Cut the motion at the basic posture that the options name."""
+    within = float(np.radians(options.within_deg))
+    reference = None
+    if options.reference == "commonest":
+        if not source.found.any():
+            raise InputError(f"{source.name}: holds no posture")
+        reference = commonest_posture(source.angles_rad, within)
+        if options.mirror:
+            raise InputError("--mirror needs the straight reference: a bent one has no mirror end")
+    elif options.reference != "straight":
+        raise InputError(f"--reference {options.reference}: straight or commonest")
+    segmentation = Segmentation(within_rad=within, merge_rad=float(np.radians(options.merge_deg)))
+    return cut(source, segmentation, reference)
 
 
 def _steps(parts: list[Floats]) -> Floats:
     """(joins,) largest joint step where one piece ends and the next begins, unblended."""
     return np.array([np.abs(b[0] - a[-1]).max() for a, b in pairwise(parts)])
-
-
-def _count(kinds: list[Any]) -> dict[str, int]:
-    return {kind: kinds.count(kind) for kind in sorted(set(kinds))}

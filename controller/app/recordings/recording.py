@@ -1,10 +1,10 @@
-"""What a recording is, and what of it a robot can do: the facts of ``snakewalk track``."""
+"""The facts of ``snakewalk track``: what a recording holds, and what of it a robot can do."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from snakewalk.config.arrays import Floats
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import StatesConfig
@@ -19,11 +19,60 @@ from snakewalk.sim.servo.motor import MOTORS
 
 
 @dataclass(frozen=True, slots=True)
-class Examined:
-    """A recording and its facts, ready to be shown or written as JSON."""
+class PaceFacts:
+    """Joint speed at the animal's pace, and how much slower a robot must be."""
+
+    joint_speed_rad_s: float
+    joint_speed_95_rad_s: float
+    joint_speed_unsmoothed_rad_s: float
+    joint_acceleration_rad_s2: float
+    joint_speed_limit_rad_s: float
+    times_no_load_speed: float | None
+    """None where the servo's motor is not known."""
+    slowed_by: float
+    slowed_by_for_speed: float
+    slowed_by_for_acceleration: float
+    longer_if_slowed_where_needed: float
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingFacts:
+    """A recording measured for one robot on one ground, rounded for a reader."""
+
+    recording: str
+    source: str
+    licence: str
+    frames: int
+    frames_left_out: int
+    head_and_tail_swapped: int
+    rate_hz: float
+    rate_assumed: bool
+    length_mm: float | None
+    waves_on_body: float
+    wave_hz: float
+    wave_share: float
+    time_towards_head: float
+    bend_k_rad: float
+    bend_k_most_rad: float
+    energy_kept: float
+    robot: str
+    states_kept: int
+    states_refused: dict[str, int]
+    """Shapes refused, by reason, each counted for the first reason only."""
+    pace: PaceFacts
+
+    def as_dict(self) -> dict[str, object]:
+        """Return all facts, those of the pace among the others, for JSON."""
+        own = {name: getattr(self, name) for name in RecordingFacts.__slots__ if name != "pace"}
+        return own | {name: getattr(self.pace, name) for name in PaceFacts.__slots__}
+
+
+@dataclass(frozen=True, slots=True)
+class ExaminedRecording:
+    """A recording and its facts."""
 
     track: Track
-    facts: dict[str, Any]
+    facts: RecordingFacts
 
 
 def examine(
@@ -31,7 +80,7 @@ def examine(
     robot_name: str = "yaw16",
     world_name: str = "flat",
     rate_hz: float | None = None,
-) -> Examined:
+) -> ExaminedRecording:
     """Load a recording and measure it for a robot on a ground.
 
     Raises:
@@ -47,49 +96,46 @@ def examine(
     for reason, refuse in shape_filters(robot, friction, states).items():
         bad = refuse(kept)
         refused[reason], kept = int(bad.sum()), kept[~bad]
-    length_mm = None if track.length_m is None else round(1e3 * track.length_m, 1)
-    facts: dict[str, Any] = {
-        "recording": name_or_path,
-        "source": track.source,
-        "licence": track.licence,
-        "frames": track.frames,
-        "frames_left_out": track.dropped,
-        "head_and_tail_swapped": track.flips,
-        "rate_hz": round(track.rate_hz, 3),
-        "rate_assumed": track.rate_assumed,
-        "length_mm": length_mm,
-        "waves_on_body": round(wave.waves, 2),
-        "wave_hz": round(wave.frequency_hz, 2),
-        "wave_share": round(wave.share, 2),
-        "time_towards_head": round(wave.headward, 2),
-        "bend_k_rad": round(float(np.median(track.bend_rad)), 2),
-        "bend_k_most_rad": round(float(track.bend_rad.max()), 2),
-        "energy_kept": round(float(energy_kept(track.angles_rad, states.coefficients).mean()), 4),
-        "robot": robot.name,
-        "states_kept": len(kept),
-        "states_refused": refused,
-    }
-    return Examined(track, facts | _pace(track, shapes, wave.frequency_hz, robot))
+    facts = RecordingFacts(
+        recording=name_or_path,
+        source=track.source,
+        licence=track.licence,
+        frames=track.frames,
+        frames_left_out=track.dropped,
+        head_and_tail_swapped=track.flips,
+        rate_hz=round(track.rate_hz, 3),
+        rate_assumed=track.rate_assumed,
+        length_mm=None if track.length_m is None else round(1e3 * track.length_m, 1),
+        waves_on_body=round(wave.waves, 2),
+        wave_hz=round(wave.frequency_hz, 2),
+        wave_share=round(wave.share, 2),
+        time_towards_head=round(wave.headward, 2),
+        bend_k_rad=round(float(np.median(track.bend_rad)), 2),
+        bend_k_most_rad=round(float(track.bend_rad.max()), 2),
+        energy_kept=round(float(energy_kept(track.angles_rad, states.coefficients).mean()), 4),
+        robot=robot.name,
+        states_kept=len(kept),
+        states_refused=refused,
+        pace=_pace(track, shapes, wave.frequency_hz, robot),
+    )
+    return ExaminedRecording(track, facts)
 
 
-def _pace(
-    track: Track, shapes: np.ndarray[Any, Any], wave_hz: float, robot: RobotConfig
-) -> dict[str, Any]:
-    """Joint speed at the animal's pace, and how much slower this robot must be."""
+def _pace(track: Track, shapes: Floats, wave_hz: float, robot: RobotConfig) -> PaceFacts:
     joints = Retarget(robot).joints_rad(shapes)
     demand = joint_demand(joints, track.time_s, track.rate_hz, wave_hz)
     slow = slowing(demand, robot.joint_speed_limit_rad_s, robot.joint_acceleration_limit_rad_s2)
     fastest = float(demand.speed_rad_s.max())
     motor = MOTORS.get(robot.servo.model)
-    return {
-        "joint_speed_rad_s": round(fastest, 2),
-        "joint_speed_95_rad_s": round(float(np.percentile(demand.speed_rad_s, 95.0)), 2),
-        "joint_speed_unsmoothed_rad_s": round(demand.raw_speed_rad_s, 2),
-        "joint_acceleration_rad_s2": round(float(demand.acceleration_rad_s2.max(initial=0.0)), 1),
-        "joint_speed_limit_rad_s": robot.joint_speed_limit_rad_s,
-        "times_no_load_speed": None if motor is None else round(fastest / motor.no_load_rad_s, 2),
-        "slowed_by": round(slow.throughout, 2),
-        "slowed_by_for_speed": round(slow.by_speed, 2),
-        "slowed_by_for_acceleration": round(slow.by_acceleration, 2),
-        "longer_if_slowed_where_needed": round(slow.where_needed, 2),
-    }
+    return PaceFacts(
+        joint_speed_rad_s=round(fastest, 2),
+        joint_speed_95_rad_s=round(float(np.percentile(demand.speed_rad_s, 95.0)), 2),
+        joint_speed_unsmoothed_rad_s=round(demand.raw_speed_rad_s, 2),
+        joint_acceleration_rad_s2=round(float(demand.acceleration_rad_s2.max(initial=0.0)), 1),
+        joint_speed_limit_rad_s=robot.joint_speed_limit_rad_s,
+        times_no_load_speed=None if motor is None else round(fastest / motor.no_load_rad_s, 2),
+        slowed_by=round(slow.throughout, 2),
+        slowed_by_for_speed=round(slow.by_speed, 2),
+        slowed_by_for_acceleration=round(slow.by_acceleration, 2),
+        longer_if_slowed_where_needed=round(slow.where_needed, 2),
+    )

@@ -3,7 +3,6 @@
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,27 +122,28 @@ def midline_angles(points: Floats, joints_at: tuple[float, ...]) -> tuple[float,
     return float(head[0]), angles[0]
 
 
-def save_postures(path: Path | BinaryIO, postures: Postures) -> None:
+def save_postures(path: Path, postures: Postures) -> None:
     """Write postures with their skeletons, so that the file is a recording for a run as well."""
     optional = {
         key: values
         for key in ("height", "pitch_rad", "value")
         if (values := getattr(postures, key)) is not None
     }
-    np.savez_compressed(
-        path,
-        points=postures.points(),
-        base=postures.base,
-        head_rad=postures.head_rad,
-        angles_rad_spine=postures.angles_rad,
-        joints_at=postures.joints_at,
-        rate_hz=postures.rate_hz,
-        length_m=np.nan if postures.length_m is None else postures.length_m,
-        name=postures.name,
-        source=postures.source,
-        licence=postures.licence,
-        **optional,
-    )
+    with path.open("wb") as stream:  # a path would get .npz appended where it ends in .NPZ
+        np.savez_compressed(
+            stream,
+            points=postures.points(),
+            base=postures.base,
+            head_rad=postures.head_rad,
+            angles_rad_spine=postures.angles_rad,
+            joints_at=postures.joints_at,
+            rate_hz=postures.rate_hz,
+            length_m=np.nan if postures.length_m is None else postures.length_m,
+            name=postures.name,
+            source=postures.source,
+            licence=postures.licence,
+            **optional,
+        )
 
 
 def load_postures(path: Path) -> Postures:

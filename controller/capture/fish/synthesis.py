@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
@@ -265,26 +264,23 @@ def joint_motion(
 
 
 def save_motion(
-    path: Path | BinaryIO,
-    postures: Postures,
-    joints_rad: Floats,
-    robot: str,
-    sequence: PieceSequence,
+    path: Path, postures: Postures, joints_rad: Floats, robot: str, sequence: PieceSequence
 ) -> None:
-    """Write a motion; ``controller.capture.readers.load.load_track`` reads it as any recording."""
-    np.savez_compressed(
-        path,
-        points=postures.points(),
-        rate_hz=postures.rate_hz,
-        length_m=np.nan if postures.length_m is None else postures.length_m,
-        base=postures.base,
-        head_rad=postures.head_rad,
-        angles_rad_spine=postures.angles_rad,
-        joints_at=postures.joints_at,
-        joints_rad=joints_rad,
-        robot=robot,
-        segments=np.array(sequence.order),
-        name=postures.name,
-        source=postures.source,
-        licence=postures.licence,
-    )
+    """Write a motion that ``load_track`` reads, with the joints (T, joints) of one robot."""
+    with path.open("wb") as stream:
+        np.savez_compressed(
+            stream,
+            points=postures.points(),
+            rate_hz=postures.rate_hz,
+            length_m=np.nan if postures.length_m is None else postures.length_m,
+            base=postures.base,
+            head_rad=postures.head_rad,
+            angles_rad_spine=postures.angles_rad,
+            joints_at=postures.joints_at,
+            joints_rad=joints_rad,
+            robot=robot,
+            segments=np.array(sequence.order),
+            name=postures.name,
+            source=postures.source,
+            licence=postures.licence,
+        )

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.recordings.capturing import Wanted, capture_file
+from snakewalk.controller.app.recordings.capturing import CaptureOptions, capture_recording
 from snakewalk.controller.capture.image.video import open_footage
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.capture.scale import scale_of_marker
@@ -73,9 +73,9 @@ def test_nothing_is_overwritten_without_force(swim: Path, tmp_path: Path) -> Non
     track = tmp_path / "t.npz"
     track.write_bytes(b"mine")
     with pytest.raises(InputError, match=r"t\.npz: exists; --force overwrites it"):
-        capture_file(Wanted(swim, track))
+        capture_recording(CaptureOptions(swim, track))
     assert track.read_bytes() == b"mine"
-    capture_file(Wanted(swim, track, force=True))
+    capture_recording(CaptureOptions(swim, track, force=True))
     assert load_track(str(track)).frames == 24
 
 
@@ -86,7 +86,7 @@ def test_a_fault_leaves_nothing_behind(swim: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.avi"
     cut.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match=r"ends after \d+ of 24 frames"):
-        capture_file(Wanted(cut, folder / "t.npz"))
+        capture_recording(CaptureOptions(cut, folder / "t.npz"))
     assert list(folder.iterdir()) == []
 
 
@@ -105,9 +105,9 @@ def test_a_folder_of_images_is_taken_in_the_order_of_its_numbers(tmp_path: Path)
 def test_a_given_background_is_used(swim: Path, tmp_path: Path) -> None:
     ground = tmp_path / "ground.png"
     cv2.imwrite(str(ground), empty(SCENE))
-    facts = capture_file(Wanted(swim, tmp_path / "t.npz", background=ground))
-    assert facts["background"] == "given"
-    assert facts["frames_used"] == 24
+    facts = capture_recording(CaptureOptions(swim, tmp_path / "t.npz", background=ground))
+    assert facts.background == "given"
+    assert facts.frames_used == 24
 
 
 def test_markers_give_the_scale(tmp_path: Path) -> None:
@@ -164,7 +164,7 @@ def test_bad_options_are_told_before_any_work(
     (tmp_path / "bare").mkdir()
     paths = {"recording", "output", "overlay", "sheet", "background"}
     given = {k: tmp_path / str(v) if k in paths else v for k, v in change.items()}
-    wanted = replace(Wanted(swim, tmp_path / "t.npz"), **given)  # type: ignore[arg-type]
+    options = replace(CaptureOptions(swim, tmp_path / "t.npz"), **given)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=said):
-        capture_file(wanted)
+        capture_recording(options)
     assert not (tmp_path / "t.npz").exists()

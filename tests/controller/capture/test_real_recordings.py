@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from snakewalk.controller.app.recordings.recording import Examined, examine
+from snakewalk.controller.app.recordings.recording import ExaminedRecording, examine
 from snakewalk.controller.app.runs.factory import prepare_walk
 
 LAMPREY = "lamprey/lampreydata.csv"
@@ -15,7 +15,7 @@ WORM = "worm-images/skeletons.npz"
 
 
 @pytest.fixture(scope="module")
-def seen(shared_data: Path) -> dict[str, Examined]:
+def seen(shared_data: Path) -> dict[str, ExaminedRecording]:
     rates = {LAMPREY: None, FISH: 60.0, OMEGA: None, DELTA: None, WORM: None}
     return {
         name: examine(str(shared_data / name), rate_hz=rate)
@@ -35,9 +35,9 @@ def seen(shared_data: Path) -> dict[str, Examined]:
     ],
 )
 def test_every_recording_loads_whole_and_is_used(
-    seen: dict[str, Examined], name: str, frames: int, dropped: int, rate_hz: float
+    seen: dict[str, ExaminedRecording], name: str, frames: int, dropped: int, rate_hz: float
 ) -> None:
-    facts = seen[name].facts
+    facts = seen[name].facts.as_dict()
     assert (facts["frames"], facts["frames_left_out"]) == (frames, dropped)
     assert facts["rate_hz"] == pytest.approx(rate_hz)
     assert facts["head_and_tail_swapped"] == 0
@@ -46,8 +46,10 @@ def test_every_recording_loads_whole_and_is_used(
     assert facts["states_kept"] > 0.6 * frames
 
 
-def test_the_lamprey_swims_as_published_and_must_be_slowed(seen: dict[str, Examined]) -> None:
-    facts = seen[LAMPREY].facts
+def test_the_lamprey_swims_as_published_and_must_be_slowed(
+    seen: dict[str, ExaminedRecording],
+) -> None:
+    facts = seen[LAMPREY].facts.as_dict()
     assert 1 / facts["waves_on_body"] == pytest.approx(0.57, rel=0.15)  # wavelength, body lengths
     assert facts["wave_hz"] == pytest.approx(3.85, rel=0.02)
     assert facts["time_towards_head"] == 0.0
@@ -57,17 +59,17 @@ def test_the_lamprey_swims_as_published_and_must_be_slowed(seen: dict[str, Exami
 
 
 def test_the_slow_fish_shakes_in_its_keypoints_more_than_it_moves(
-    seen: dict[str, Examined],
+    seen: dict[str, ExaminedRecording],
 ) -> None:
-    facts = seen[FISH].facts
+    facts = seen[FISH].facts.as_dict()
     assert facts["joint_speed_unsmoothed_rad_s"] > 20.0
     assert facts["joint_speed_rad_s"] < 3.0
 
 
-def test_the_worms_reversals_are_seen(seen: dict[str, Examined]) -> None:
+def test_the_worms_reversals_are_seen(seen: dict[str, ExaminedRecording]) -> None:
     # read off the angle maps: the wave runs headwards from 6.3 to 10.6 s of 18.8
-    assert seen[OMEGA].facts["time_towards_head"] == pytest.approx(4.3 / 18.75, abs=0.03)
-    assert 0.1 < seen[DELTA].facts["time_towards_head"] < 0.4
+    assert seen[OMEGA].facts.as_dict()["time_towards_head"] == pytest.approx(4.3 / 18.75, abs=0.03)
+    assert 0.1 < seen[DELTA].facts.as_dict()["time_towards_head"] < 0.4
 
 
 @pytest.mark.parametrize("name", [LAMPREY, DELTA, WORM])

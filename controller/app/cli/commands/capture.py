@@ -1,5 +1,6 @@
 """``snakewalk capture``: from a film of an animal to a track that the robot can walk."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -53,9 +54,9 @@ def capture(
 ) -> None:
     """Find the animal in every frame: silhouette, medial axis, 100 equal chords, head and tail."""
     require_extra("capture needs", "cv2", "skimage")
-    from snakewalk.controller.app.recordings.capturing import Wanted, capture_file  # noqa: PLC0415  heavy
+    from snakewalk.controller.app.recordings.capturing import CaptureOptions, capture_recording  # noqa: PLC0415  heavy
 
-    wanted = Wanted(
+    options = CaptureOptions(
         recording=recording,
         output=output,
         background=background,
@@ -69,4 +70,4 @@ def capture(
         steps=steps,
         force=force,
     )
-    show(capture_file(wanted), as_json)
+    show(asdict(capture_recording(options)), as_json)

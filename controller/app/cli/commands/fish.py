@@ -43,7 +43,8 @@ def film(
         task = bar.add_task("frames", total=None)
         truth = render(
             folder, motion=motion, build=build, length_px=length_px, frames=frames, side=side,
-            seed=seed, tick=lambda done, total: bar.update(task, completed=done, total=total),
+            seed=seed,
+            on_progress=lambda done, total: bar.update(task, completed=done, total=total),
         )  # fmt: skip
     found: dict[str, object] = {
         "folder": str(folder),
@@ -93,26 +94,26 @@ def match(
     if length is not None and not 0.0 < length < 1e3:
         raise InputError(f"--length: a body length in metres, above 0; not {length:g}")
     known = None if truth is None else load_postures(truth)
-    matched = None
     if footage.suffix.lower() in MIDLINES:
         if side is not None:
             raise InputError(f"{footage}: midlines have no side view; --side goes with images")
-        found, facts = read_midlines(footage, build, rate)
+        matched = read_midlines(footage, build, rate)
     else:
         with _bar() as bar:
             task = bar.add_task("frames", total=None)
-            matched, facts = match_footage(
+            matched = match_footage(
                 footage, side, background, side_background, build=build, rate_hz=rate,
-                length_m=length, tick=lambda k, total: bar.update(task, completed=k, total=total),
+                length_m=length,
+                on_progress=lambda done, total: bar.update(task, completed=done, total=total),
             )  # fmt: skip
-        found = matched.postures
-    accuracy = None if known is None else compare(found, known)
+    accuracy = None if known is None else compare(matched.postures, known)
     with atomic_write(output) as part:
-        save_postures(part, found)
+        save_postures(part, matched.postures)
     if picture is not None:
         from snakewalk.controller.app.report.plots.fish import draw_match  # noqa: PLC0415
 
-        draw_match(picture, found, known, matched, footage)
+        draw_match(picture, matched.postures, known, matched.film, footage)
+    facts = matched.facts.as_dict()
     if accuracy is not None:
         facts |= accuracy.facts()
     show(facts | {"postures": str(output)}, as_json)
@@ -146,26 +147,29 @@ def synthesise(
     as_json: Json = False,
 ) -> None:
     """Put segments of a film together anew, at random or through control points."""
-    from snakewalk.controller.app.recordings.fish_synthesis import Wanted, synthesise_motion  # noqa: PLC0415
+    from snakewalk.controller.app.recordings.fish_synthesis import (  # noqa: PLC0415
+        SynthesisOptions,
+        synthesise_motion,
+    )
     from snakewalk.controller.capture.fish.postures import load_postures  # noqa: PLC0415
 
     refuse_to_overwrite([output, picture], force)
     check_picture(picture)
-    wanted = Wanted(
+    options = SynthesisOptions(
         through=_points(through or []), seconds=seconds, seed=seed, radius=radius, limit_s=limit,
         mirror=mirror, within_deg=within, merge_deg=merge, reference=reference, blend_s=blend,
         robot=robot,
     )  # fmt: skip
     _check_npz(output)
     source: Postures = load_postures(postures)
-    made = synthesise_motion(source, wanted)
+    made = synthesise_motion(source, options)
     with atomic_write(output) as part:
         made.save(part)
     if picture is not None:
         from snakewalk.controller.app.report.plots.fish_path import draw_synthesis  # noqa: PLC0415
 
-        draw_synthesis(picture, made, wanted)
-    show(made.facts | {"track": str(output)}, as_json)
+        draw_synthesis(picture, made, options)
+    show(made.facts.as_dict() | {"track": str(output)}, as_json)
 
 
 def _check_npz(path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -10,6 +10,9 @@ from rich.progress import track as progress
 from rich.table import Table
 
 from snakewalk.controller.app.cli.options import Json, console
+
+if TYPE_CHECKING:
+    from snakewalk.controller.app.recordings.recording import RecordingFacts
 from snakewalk.controller.app.result_files import check_picture
 
 
@@ -41,43 +44,44 @@ def track(
     if picture is not None:
         from snakewalk.controller.app.report.plots.recording import draw  # noqa: PLC0415
 
-        draw([(one.track, Path(one.facts["recording"]).name) for one in found], picture)
+        draw([(one.track, Path(one.facts.recording).name) for one in found], picture)
     if as_json:
-        print(json.dumps([one.facts for one in found]))
+        print(json.dumps([one.facts.as_dict() for one in found]))
         return
     for one in found:
         _show(one.facts)
 
 
-def _show(facts: dict[str, Any]) -> None:
+def _show(facts: "RecordingFacts") -> None:
     """One recording as a table of two columns with the units in words."""
-    length = "no scale" if facts["length_mm"] is None else f"{facts['length_mm']:g} mm long"
-    assumed = " (assumed; say --rate)" if facts["rate_assumed"] else ""
-    refused = ", ".join(f"{n} for {why}" for why, n in facts["states_refused"].items() if n)
-    stall = facts["times_no_load_speed"]
+    pace = facts.pace
+    length = "no scale" if facts.length_mm is None else f"{facts.length_mm:g} mm long"
+    assumed = " (assumed; say --rate)" if facts.rate_assumed else ""
+    refused = ", ".join(f"{n} for {why}" for why, n in facts.states_refused.items() if n)
+    stall = pace.times_no_load_speed
     rows = {
-        "source": "; ".join(dict.fromkeys((str(facts["source"]), str(facts["licence"])))),
-        "frames": f"{facts['frames']}, {facts['frames_left_out']} left out, "
-        f"{facts['rate_hz']:g} Hz{assumed}, {length}",
-        "wave": f"{facts['waves_on_body']} on the body, {facts['wave_hz']} Hz, "
-        f"{facts['wave_share']:.0%} of the bending; towards the head "
-        f"{facts['time_towards_head']:.0%} of the time",
-        "bend K": f"{facts['bend_k_rad']} rad, at most {facts['bend_k_most_rad']}",
-        "in 7 coefficients": f"{facts['energy_kept']:.2%} of the energy",
-        "states": f"{facts['states_kept']} of {facts['frames']} usable by {facts['robot']}"
+        "source": "; ".join(dict.fromkeys((str(facts.source), str(facts.licence)))),
+        "frames": f"{facts.frames}, {facts.frames_left_out} left out, "
+        f"{facts.rate_hz:g} Hz{assumed}, {length}",
+        "wave": f"{facts.waves_on_body} on the body, {facts.wave_hz} Hz, "
+        f"{facts.wave_share:.0%} of the bending; towards the head "
+        f"{facts.time_towards_head:.0%} of the time",
+        "bend K": f"{facts.bend_k_rad} rad, at most {facts.bend_k_most_rad}",
+        "in 7 coefficients": f"{facts.energy_kept:.2%} of the energy",
+        "states": f"{facts.states_kept} of {facts.frames} usable by {facts.robot}"
         + (f"; refused {refused}" if refused else ""),
-        "joint speed": f"{facts['joint_speed_rad_s']} rad/s at the animal's pace; a plan may ask "
-        f"{facts['joint_speed_limit_rad_s']:g}"
+        "joint speed": f"{pace.joint_speed_rad_s} rad/s at the animal's pace; a plan may ask "
+        f"{pace.joint_speed_limit_rad_s:g}"
         + ("" if stall is None else f"; {stall} of the servo's no-load speed"),
-        "slowed": f"{facts['slowed_by']} times throughout (speed {facts['slowed_by_for_speed']}, "
-        f"acceleration {facts['slowed_by_for_acceleration']}); "
-        f"{facts['longer_if_slowed_where_needed']} times longer if only where needed",
+        "slowed": f"{pace.slowed_by} times throughout (speed {pace.slowed_by_for_speed}, "
+        f"acceleration {pace.slowed_by_for_acceleration}); "
+        f"{pace.longer_if_slowed_where_needed} times longer if only where needed",
     }
-    if facts["head_and_tail_swapped"]:
-        rows["warning"] = f"head and tail change places {facts['head_and_tail_swapped']} times"
-    elif facts["time_towards_head"] > 0.5:
+    if facts.head_and_tail_swapped:
+        rows["warning"] = f"head and tail change places {facts.head_and_tail_swapped} times"
+    elif facts.time_towards_head > 0.5:
         rows["warning"] = "the wave runs towards the head: an animal going backwards, or tail first"
-    table = Table(title=facts["recording"], title_justify="left", box=None, show_header=False)
+    table = Table(title=facts.recording, title_justify="left", box=None, show_header=False)
     for key, text in rows.items():
         table.add_row(key, text)
     console.print(table)

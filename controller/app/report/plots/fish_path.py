@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from snakewalk.controller.app.recordings.fish_synthesis import Made, Wanted
+from snakewalk.controller.app.recordings.fish_synthesis import SynthesisedMotion, SynthesisOptions
 from snakewalk.controller.app.report.figures.style import (
     BLUE,
     FAINT,
@@ -27,7 +27,7 @@ KINDS = {"glide": GREY, "forward": GREEN, "left": BLUE, "right": RED}
 _BODIES = 40
 
 
-def draw_synthesis(file: Path, made: Made, wanted: Wanted) -> None:
+def draw_synthesis(file: Path, made: SynthesisedMotion, options: SynthesisOptions) -> None:
     """Draw a synthesis to ``file``.
 
     Raises:
@@ -41,12 +41,12 @@ def draw_synthesis(file: Path, made: Made, wanted: Wanted) -> None:
         left, right = upper.subplots(1, 2, squeeze=False)[0]
         _pieces(left, made)
         _graph(right, made)
-        _way(lower.subplots(1, 1), made, wanted)
+        _way(lower.subplots(1, 1), made, options)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 
-def _pieces(axes: Axes, made: Made) -> None:
+def _pieces(axes: Axes, made: SynthesisedMotion) -> None:
     """Way of the base of the head in each segment, all from one posture."""
     for piece in made.pieces.pieces:
         axes.plot(piece.base[:, 0], piece.base[:, 1], color=KINDS[piece.kind], linewidth=1.3)
@@ -58,7 +58,7 @@ def _pieces(axes: Axes, made: Made) -> None:
     axes.legend(handles=handles, loc="upper left")
 
 
-def _graph(axes: Axes, made: Made) -> None:
+def _graph(axes: Axes, made: SynthesisedMotion) -> None:
     """Segments on a ring, a line where one may follow another; used joins dark."""
     pieces = made.pieces
     count = len(pieces.pieces)
@@ -81,7 +81,7 @@ def _graph(axes: Axes, made: Made) -> None:
     axes.set_title("what may follow what (dark: used)")
 
 
-def _way(axes: Axes, made: Made, wanted: Wanted) -> None:
+def _way(axes: Axes, made: SynthesisedMotion, options: SynthesisOptions) -> None:
     """Bodies along the new way, joins as dots, control points as circles."""
     motion = made.motion
     points = motion.points()
@@ -92,16 +92,16 @@ def _way(axes: Axes, made: Made, wanted: Wanted) -> None:
     axes.add_collection(bodies)
     joins = motion.base[junctions(made.pieces, made.sequence)]
     axes.plot(joins[:, 0], joins[:, 1], "o", color=INK, markersize=2.5)
-    for k, (x, y) in enumerate(wanted.through):
-        radius = wanted.radius * made.source.length
+    for k, (x, y) in enumerate(options.through):
+        radius = options.radius * made.source.length
         axes.add_patch(Circle((x, y), radius, fill=False, edgecolor=RED, linewidth=1.4))
         axes.text(x, y, str(k + 1), color=RED, ha="center", va="center", weight="bold")
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(_unit(made))
-    kind = "through control points" if wanted.through else "at random"
-    axes.set_title(f"{made.facts['seconds']} s {kind}: {made.facts['pieces_used']} segments")
+    kind = "through control points" if options.through else "at random"
+    axes.set_title(f"{made.facts.seconds} s {kind}: {made.facts.pieces_used} segments")
 
 
-def _unit(made: Made) -> str:
+def _unit(made: SynthesisedMotion) -> str:
     return "body lengths" if made.source.length_m is None else "m"
