@@ -80,7 +80,7 @@ def make_log(
         path_m=planned,
         waypoints_m=waypoints,
         waypoint_radius_m=run.waypoint_radius_m,
-        predicted_speed_m_s=0.93 * 0.8 * PULSE_M_S,
+        predicted_speed_m_s=0.8 * PULSE_M_S,
         states={"recorded": 43, "random": 157, "refused": 61},
     )
     with RunLog(path) as log:
@@ -150,7 +150,7 @@ def make_log(
                 links_m=np.column_stack([points, np.full(links, 0.03)]),
                 centre_m=[*centre, 0.03],
                 speed_m_s=ETA * PULSE_M_S * (1 + 0.05 * np.sin(4 * t)) if going else 0.0,
-                predicted_speed_m_s=0.93 * 0.8 * PULSE_M_S if going else 0.0,
+                predicted_speed_m_s=0.8 * PULSE_M_S if going else 0.0,
                 pulse_m_s=PULSE_M_S if going else 0.0,
                 path_s_m=max(along - 0.5 * robot.length_m * shrink, 0.0),
                 target=target,

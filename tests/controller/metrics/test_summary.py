@@ -23,7 +23,7 @@ def test_numbers_of_a_known_run(record: RunRecord) -> None:
     assert n["waypoint_times_s"] == pytest.approx(said)
     assert n["eta"] == pytest.approx(0.75, rel=0.01)
     assert n["pulse_m_s"] == 0.3
-    assert n["eta_predicted"] == pytest.approx(0.93 * 0.8)
+    assert n["eta_predicted"] == pytest.approx(0.8)
     assert n["lag_s"] == pytest.approx(0.06, abs=3e-3)
     assert n["peak_torque_n_m"] == pytest.approx(1.78 * n["peak_current_a"])
     assert n["missed_deadlines"] == 3
