@@ -1,11 +1,11 @@
-"""The frames of a control cycle: bytes of regular replies to values, goals to bytes.
+"""Frames of a control cycle: goals to bytes, and the bytes of regular replies to values.
 
-Loops over bytes, compiled when this is imported, never in a cycle. What is not exactly as expected
-is refused here and left to the careful reader.
+Loops over bytes, compiled when this module is imported, never in a cycle. A reply that is not
+exactly as expected is refused here and left to ``drivers.bus.group_read``.
 """
 
 import numpy as np
-from numba import boolean, int32, int64, types, uint8, uint16
+from numba import boolean, int32, int64, types, uint8
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bytes
@@ -13,22 +13,22 @@ from snakewalk.drivers.compiling import compiled
 from snakewalk.drivers.protocol.crc import TABLE
 
 IRREGULAR, FLAWLESS, WITH_ERRORS = 0, 1, 2
-"""What a reader found: not the expected bytes; all without an error byte; some with one."""
+"""Results: not the expected bytes; no servo reports an error; some servos do."""
 HEAD = 8
-"""Bytes of a status packet in front of its error byte, and of a fast answer in front of all."""
+"""Bytes of a status packet before its error byte, and of a fast reply before its parts."""
 PARAMS_AT, VALUES_AT = 8, 12
-"""In a sync write: its parameters; behind address and length, the servos' shares."""
-SHARE_BYTES = 5
-"""In it, of each servo: ID and value."""
+"""In a sync write: where its parameters begin, and, behind address and length, the entries."""
+ENTRY_BYTES = 5
+"""Entry of one servo: ID and value."""
 
 
 _RAW = types.Array(uint8, 1, "C", readonly=True)
 _ROW, _ROWS = uint8[::1], uint8[:, ::1]
 
 
-@compiled(uint16(_RAW, int64, int64))
-def _crc(data: Bytes, start: int, stop: int) -> int:
-    crc = 0
+@compiled(int64(_RAW, int64, int64, int64))
+def crc_of(data: Bytes, start: int, stop: int, crc: int) -> int:
+    """CRC of a part of ``data``, continued from ``crc``."""
     for k in range(start, stop):
         crc = ((crc << 8) & 0xFFFF) ^ int(TABLE[(crc >> 8) ^ int(data[k])])
     return crc
@@ -45,11 +45,11 @@ def _header_in(data: Bytes, start: int, stop: int) -> bool:
 
 @compiled(int64(_RAW, _ROWS, _ROWS, _ROW))
 def read_plain(raw: Bytes, heads: Bytes, data: Bytes, error: Bytes) -> int:
-    """Take N status packets apart, none of them stuffed.
+    """Decode N status packets, none of them stuffed.
 
     Args:
-        raw: what has come.
-        heads: (N, 8) how each must begin.
+        raw: bytes received.
+        heads: (N, 8) expected heads.
         data: (N, length) filled, unless irregular.
         error: (N,) filled, unless irregular.
 
@@ -65,7 +65,7 @@ def read_plain(raw: Bytes, heads: Bytes, data: Bytes, error: Bytes) -> int:
         for k in range(HEAD):
             if raw[at + k] != heads[servo, k]:
                 return IRREGULAR
-        if _crc(raw, at, end - 2) != int(raw[end - 2]) | int(raw[end - 1]) << 8:
+        if crc_of(raw, at, end - 2, 0) != int(raw[end - 2]) | int(raw[end - 1]) << 8:
             return IRREGULAR
         if _header_in(raw, at + HEAD, end):
             return IRREGULAR
@@ -79,7 +79,7 @@ def read_plain(raw: Bytes, heads: Bytes, data: Bytes, error: Bytes) -> int:
 
 @compiled(int64(_RAW, _ROW, _ROW, _ROWS, _ROW))
 def read_fast(raw: Bytes, head: Bytes, ids: Bytes, data: Bytes, error: Bytes) -> int:
-    """Take the reply to a fast read apart: ``head`` (8,), then shares of ``ids`` (N,)."""
+    """Decode the reply to a fast read: ``head`` (8,), then the parts of ``ids`` (N,)."""
     count, length = data.shape
     end = HEAD + count * (length + 4)
     if len(raw) != end:
@@ -87,7 +87,7 @@ def read_fast(raw: Bytes, head: Bytes, ids: Bytes, data: Bytes, error: Bytes) ->
     for k in range(HEAD):
         if raw[k] != head[k]:
             return IRREGULAR
-    if _crc(raw, 0, end - 2) != int(raw[end - 2]) | int(raw[end - 1]) << 8:
+    if crc_of(raw, 0, end - 2, 0) != int(raw[end - 2]) | int(raw[end - 1]) << 8:
         return IRREGULAR
     found = FLAWLESS
     for servo in range(count):
@@ -104,12 +104,12 @@ def read_fast(raw: Bytes, head: Bytes, ids: Bytes, data: Bytes, error: Bytes) ->
 
 @compiled(boolean(_ROW, int32[::1]))
 def fill(frame: Bytes, values: NDArray[np.int32]) -> bool:
-    """Put ``values`` (N,) and the CRC into a sync write; False if it must be stuffed first."""
+    """Write ``values`` (N,) and the CRC into a sync write; False if it must be stuffed first."""
     for servo in range(len(values)):
         value = int(values[servo])
         for k in range(4):
-            frame[VALUES_AT + SHARE_BYTES * servo + 1 + k] = (value >> (8 * k)) & 0xFF
+            frame[VALUES_AT + ENTRY_BYTES * servo + 1 + k] = (value >> (8 * k)) & 0xFF
     end = len(frame) - 2
-    crc = int(_crc(frame, 0, end))
+    crc = int(crc_of(frame, 0, end, 0))
     frame[end], frame[end + 1] = crc & 0xFF, crc >> 8
     return not _header_in(frame, PARAMS_AT, end)

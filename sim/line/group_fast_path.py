@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bytes
-from snakewalk.drivers.protocol.crc import TABLE, crc16
+from snakewalk.drivers.protocol.crc import crc16
+from snakewalk.drivers.protocol.frames import crc_of
 from snakewalk.drivers.protocol.packet import HEADER, STATUS, Instruction, fast_head, stuff
 from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
 from snakewalk.sim.line.instruction_handler import InstructionHandler, Reply
-from snakewalk.sim.servo.servo_loops import crc_of, fill_replies
+from snakewalk.sim.servo.servo_loops import fill_replies
 
 MOTION = range(126, 136)
 """Present Current, Velocity and Position: refreshed alone where nothing else is read."""
@@ -49,7 +50,7 @@ class GroupRead(ABC):
 
     def answers(self, table: Bytes, whole: bool) -> list[Reply]:
         """Packets with the table's present bytes."""
-        fill_replies(self._packet, self._shape, table, self._rows, self._block, TABLE)
+        fill_replies(self._packet, self._shape, table, self._rows, self._block)
         return self._cut(self._packet.tobytes(), whole)
 
     @abstractmethod
@@ -178,6 +179,5 @@ def _intact(raw: bytes) -> bool:
     return (
         raw[5] | raw[6] << 8 == len(raw) - 7
         and raw.find(HEADER[:3], 8, -2) < 0
-        and crc_of(np.frombuffer(raw, np.uint8), 0, len(raw) - 2, 0, TABLE)
-        == raw[-2] | raw[-1] << 8
+        and crc_of(np.frombuffer(raw, np.uint8), 0, len(raw) - 2, 0) == raw[-2] | raw[-1] << 8
     )

@@ -9,22 +9,14 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import AnyInts, Bytes, Floats, Indices, Ints
 from snakewalk.drivers.compiling import compiled, readonly_array
+from snakewalk.drivers.protocol.frames import crc_of
 
 # as numba writes them; what is only read may be read-only, and a register's column has gaps
 _READ = readonly_array("uint8", layout="C")
 _TABLE = "uint8[:, ::1]"
-_CRC = readonly_array("uint16", layout="C")
 _PLACES = readonly_array("int64", layout="C")
 _SEEN = readonly_array(layout="C")
 _FRAME = readonly_array(dimensions=2, layout="C")
-
-
-@compiled(f"int64({_READ}, int64, int64, int64, {_CRC})")
-def crc_of(data: Bytes, start: int, stop: int, crc: int, crc_table: NDArray[np.uint16]) -> int:
-    """CRC of a part of ``data``, going on from ``crc``; ``crc_table`` (256,) is that of a byte."""
-    for k in range(start, stop):
-        crc = ((crc << 8) & 0xFFFF) ^ int(crc_table[(crc >> 8) ^ int(data[k])])
-    return crc
 
 
 @compiled("void(uint8[::1], int64, int64, int64)")
@@ -70,14 +62,13 @@ def write_motion(
         write_le(table[row], at_position, int(ticks), 4)
 
 
-@compiled(f"void(uint8[::1], {_PLACES}, {_TABLE}, {_PLACES}, {_PLACES}, {_CRC})")
+@compiled(f"void(uint8[::1], {_PLACES}, {_TABLE}, {_PLACES}, {_PLACES})")
 def fill_replies(
     packet: Bytes,
     shape: Ints,
     table: Bytes,
     rows: Indices,
     block: Ints,
-    crc_table: NDArray[np.uint16],
 ) -> None:
     """Fill the answers of ``rows`` to one group read into the template ``packet``.
 
@@ -88,22 +79,21 @@ def fill_replies(
         table: (S, bytes) control tables.
         rows: servos, in the order of their shares.
         block: (3,) address and length of the data, and address of Hardware Error Status.
-        crc_table: (256,) CRC of a byte.
 
     """
     head, share, error_at, data_at = shape[0], shape[1], shape[2], shape[3]
     address, length, status = block[0], block[1], block[2]
-    crc = crc_of(packet, 0, head, 0, crc_table)
+    crc = crc_of(packet, 0, head, 0)
     for k in range(len(rows)):
         row, start = rows[k], head + k * share
         packet[start + error_at] = 0x80 if table[row, status] else 0
         for j in range(length):
             packet[start + data_at + j] = table[row, address + j]
         end = start + share
-        crc = crc_of(packet, start, end - 2, crc if head else 0, crc_table)
+        crc = crc_of(packet, start, end - 2, crc if head else 0)
         packet[end - 2] = crc & 0xFF
         packet[end - 1] = crc >> 8
-        crc = crc_of(packet, end - 2, end, crc, crc_table)
+        crc = crc_of(packet, end - 2, end, crc)
 
 
 @compiled(

@@ -1,3 +1,5 @@
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from dynamixel_sdk import Protocol2PacketHandler
@@ -5,9 +7,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from snakewalk.drivers.errors import StuffingError
-from snakewalk.drivers.protocol.crc import crc16, crc16_rows
+from snakewalk.drivers.protocol.crc import crc16
+from snakewalk.drivers.protocol.frames import crc_of
 from snakewalk.drivers.protocol.packet import stuff, unstuff
 
+Crc = Callable[[np.ndarray, int, int, int], int]
 HEADER = b"\xff\xff\xfd"
 # bytes that make the pattern likely
 NASTY = st.lists(st.sampled_from([0xFF, 0xFD, 0x00, 0x55, 0xFE]), max_size=40).map(bytes)
@@ -28,10 +32,11 @@ def test_crc_goes_on_from_a_start(head: bytes, tail: bytes) -> None:
     assert crc16(tail, crc16(head)) == crc16(head + tail)
 
 
-@given(st.integers(0, 40), st.integers(0, 9), st.integers(0, 2**32 - 1))
-def test_rows_are_the_crcs_of_each_row(length: int, count: int, seed: int) -> None:
-    rows = np.random.default_rng(seed).integers(0, 256, (count, length)).astype(np.uint8)
-    assert crc16_rows(rows).tolist() == [crc16(row.tobytes()) for row in rows]
+@pytest.mark.parametrize("loop", [crc_of, crc_of.py_func], ids=["compiled", "interpreted"])
+@given(st.binary(max_size=60), st.integers(0, 60))
+def test_the_compiled_crc_continues_from_any_place(loop: Crc, data: bytes, cut: int) -> None:
+    raw, cut = np.frombuffer(data, np.uint8), min(cut, len(data))
+    assert loop(raw, cut, len(raw), loop(raw, 0, cut, 0)) == crc16(data)
 
 
 @given(st.integers(1, 40), st.data())

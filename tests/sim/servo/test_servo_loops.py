@@ -5,10 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from snakewalk.drivers.protocol.crc import TABLE, crc16
 from snakewalk.drivers.protocol.packet import encode_fast, fast_head
 from snakewalk.sim.servo import servo_loops
 
@@ -21,15 +18,6 @@ def plain(function: Callable[..., Any]) -> Callable[..., Any]:
 BOTH = [pytest.param(lambda f: f, id="compiled"), pytest.param(plain, id="plain")]
 
 
-@settings(deadline=None)  # the first call compiles
-@given(data=st.binary(max_size=60), cut=st.integers(0, 60))
-def test_crc_goes_on_from_where_it_stopped(data: bytes, cut: int) -> None:
-    raw, cut = np.frombuffer(data, np.uint8), min(cut, len(data))
-    for crc_of in (servo_loops.crc_of, plain(servo_loops.crc_of)):
-        head = crc_of(raw, 0, cut, 0, TABLE)
-        assert crc_of(raw, cut, len(raw), head, TABLE) == crc16(data)
-
-
 @pytest.mark.parametrize("how", BOTH)
 def test_a_fast_answer_is_what_servos_write_one_after_the_other(how: Any) -> None:
     table = np.random.default_rng(1).integers(0, 256, (5, 40), np.uint8)
@@ -38,7 +26,7 @@ def test_a_fast_answer_is_what_servos_write_one_after_the_other(how: Any) -> Non
     shares = b"".join(bytes((9, i)) + bytes(8) for i in ids)
     packet = np.frombuffer(fast_head(len(shares)) + shares, np.uint8).copy()
     shape, block = np.array([8, 10, 0, 2]), np.array([20, 6, 7])
-    how(servo_loops.fill_replies)(packet, shape, table, rows, block, TABLE)
+    how(servo_loops.fill_replies)(packet, shape, table, rows, block)
     parts = [
         (0x80 if table[row, 7] else 0, i, table[row, 20:26].tobytes())
         for row, i in zip(rows, ids, strict=True)
