@@ -15,7 +15,7 @@ from snakewalk.config.loader import load_robot
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.kinematics.links import pose_at
 from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadDetector
-from snakewalk.controller.localization.pose_fit import both_ways
+from snakewalk.controller.localization.pose_fit import fit_both_ends
 from tests.oracles.overhead_scene import DrawnView
 
 TITLE = "Overhead camera: a frame of 640 x 480 to head, heading and links, on one core"
@@ -51,12 +51,12 @@ def _rows() -> list[Row]:
         scenes.append((pose, bend, view.picture(pose, bend, k + 1)))
     off_m, off_rad, used = [], [], 0
     for pose, bend, image in scenes:
-        sighting = detector.detect(image, 0.0)
-        if sighting.status is not FrameStatus.GOOD:
+        detection = detector.detect(image, 0.0)
+        if detection.status is not FrameStatus.GOOD:
             continue
         used += 1
         # which end leads is known from the frame before; here from the truth
-        fits = both_ways(robot, sighting.line_m, bend)
+        fits = fit_both_ends(robot, detection.line_m, bend)
         fit = max(fits, key=lambda one: np.cos(one.heading_rad - pose.heading_rad))
         off_m.append(float(np.hypot(*(fit.head_m - pose.head_in_world_m[:2]))))
         turn = fit.heading_rad - pose.heading_rad
@@ -67,7 +67,7 @@ def _rows() -> list[Row]:
         _, bend, image = next(endless)
         line_m = detector.detect(image, 0.0).line_m
         if np.isfinite(line_m).all():
-            both_ways(robot, line_m, bend)
+            fit_both_ends(robot, line_m, bend)
 
     sight_s = cpu_s(partial(detector.detect, scenes[0][2], 0.0), 10)
     whole_s = cpu_s(frame, FRAMES)

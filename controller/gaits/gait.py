@@ -14,8 +14,8 @@ from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
 
 CYCLE_SAMPLES = 129
-"""Phases at which a cycle is looked at; the first and the last are the same."""
-Aim = Literal["way", "climb", "turn"]
+"""Phases at which a cycle is sampled; the first and the last are the same."""
+Aim = Literal["advance", "climb", "turn"]
 """Ground covered, height won, or the heading turned."""
 
 
@@ -72,8 +72,8 @@ class Gait(ABC):
     """Shipped world that it is run in where none is asked for."""
     p_gain: ClassVar[int | None] = None
     """Register 84 of every servo where the robot's own would squeeze too hard."""
-    aim: ClassVar[Aim] = "way"
-    """What it is there for, and judged by."""
+    aim: ClassVar[Aim] = "advance"
+    """The purpose that its speed is measured by."""
     model: ClassVar[type[GaitParameters]] = GaitParameters
 
     def __init__(self, params: GaitParameters | None = None) -> None:
@@ -134,8 +134,8 @@ class Range:
     default: float
     low: float
     high: float
-    said: str
-    """Its description."""
+    description: str
+    """One line."""
 
     @property
     def step(self) -> float:
@@ -159,6 +159,6 @@ def ranges(model: type[GaitParameters]) -> dict[str, Range]:
             default=float(field.default),
             low=bounds.get("ge", bounds.get("gt", 0.0)),
             high=bounds.get("le", bounds.get("lt", 1.0)),
-            said=field.description or "",
+            description=field.description or "",
         )
     return found

@@ -1,7 +1,7 @@
 """The head's pose from an overhead camera, carried from frame to frame by dead reckoning.
 
-A frame says where the body was when it was taken; what the joints have done since then is reckoned
-on. So the pose is a frame that drifts (``DeadReckoning``), laid anew in the world at each frame.
+A frame says where the body was when it was taken; what the joints have done since then is added
+by dead reckoning. So the pose is a frame that drifts, placed anew in the world at each image.
 """
 
 from collections import deque
@@ -15,35 +15,35 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.localization.dead_reckoning import DeadReckoning
-from snakewalk.controller.localization.overhead_camera import Sighting
-from snakewalk.controller.localization.pose_fit import PoseFit, both_ways
+from snakewalk.controller.localization.overhead_camera import LineDetection
+from snakewalk.controller.localization.pose_fit import PoseFit, fit_both_ends
 from snakewalk.drivers.types import BodyPose, JointState
 
 MISFIT = 0.5
 """Largest error of a fit that is used, in lengths of a link."""
-SURE = 0.25
+DECISIVE = 0.25
 """Of the worse fit's error: a fit this much better says alone which end is the head."""
 GAP_S = 0.2
-"""So long without a frame that can be used is told."""
-KEPT_S = 2.0
+"""A longer time without a frame that can be used is reported."""
+HISTORY_S = 2.0
 """How far back a late frame may date."""
 
 
 class Camera(Protocol):
-    """Where frames come from, as sightings."""
+    """Where frames come from, as detections."""
 
-    def first(self) -> Sighting:
-        """Look now and wait for what is seen; the body lies still."""
+    def first(self) -> LineDetection:
+        """Take a frame now and wait for its detection; the body lies still."""
         ...
 
-    def seen(self, now_s: float) -> list[Sighting]:
+    def arrived(self, now_s: float) -> list[LineDetection]:
         """Return what has come in since the last call, in order of time."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class _Moment:
-    """What was believed at one read of the joints, in the drifting frame."""
+    """The estimate at one read of the joints, in the drifting frame."""
 
     time_s: float
     place: Floats
@@ -52,23 +52,28 @@ class _Moment:
 
 
 class CameraPose:
-    """Call with each joint state, in order of time; returns the pose believed."""
+    """Call with each joint state, in order of time; returns the estimated pose."""
 
     def __init__(
         self,
         robot: RobotConfig,
         camera: Camera,
         reckoning: DeadReckoning,
-        note: Callable[[str], None] = lambda text: None,
+        on_event: Callable[[str], None] = lambda text: None,
     ) -> None:
-        self._robot, self._camera, self._reckoning, self._note = robot, camera, reckoning, note
-        self._past: deque[_Moment] = deque()
+        self._robot, self._camera, self._reckoning, self._on_event = (
+            robot,
+            camera,
+            reckoning,
+            on_event,
+        )
+        self._history: deque[_Moment] = deque()
         self._offset = np.zeros(3)  # of the drifting frame in the world
         self._fixed_s: float | None = None
-        self._why = ""
+        self._reason = ""
         self._gap = False
         self.frames = 0
-        """Looked at so far."""
+        """Frames taken in so far."""
         self.used = 0
         """Of these."""
 
@@ -76,62 +81,62 @@ class CameraPose:
         """Advance to the state's time, and take in the frames that have arrived."""
         odometry = self._reckoning(state)
         place = np.array([*odometry.head_in_world_m[:2], odometry.heading_rad])
-        self._past.append(_Moment(state.time_s, place, np.array(state.position_rad)))
-        while self._past[0].time_s < state.time_s - KEPT_S:
-            self._past.popleft()
+        self._history.append(_Moment(state.time_s, place, np.array(state.position_rad)))
+        while self._history[0].time_s < state.time_s - HISTORY_S:
+            self._history.popleft()
         if self._fixed_s is None:
             self._fixed_s = state.time_s
-            self._take(self._camera.first())
-        for sighting in self._camera.seen(state.time_s):
-            self._take(sighting)
-        self._tell(state.time_s)
-        return self._pose(_laid(self._offset, place), state.time_s)
+            self._update(self._camera.first())
+        for detection in self._camera.arrived(state.time_s):
+            self._update(detection)
+        self._report_gap(state.time_s)
+        return self._pose(_in_world(self._offset, place), state.time_s)
 
-    def _take(self, sighting: Sighting) -> None:
+    def _update(self, detection: LineDetection) -> None:
         self.frames += 1
-        if sighting.status is not FrameStatus.GOOD:
-            self._why = str(sighting.status)
+        if detection.status is not FrameStatus.GOOD:
+            self._reason = str(detection.status)
             return
-        then = self._at(sighting.time_s)
-        fit = self._chosen(both_ways(self._robot, sighting.line_m, then.joint_rad), then)
+        then = self._at(detection.time_s)
+        fit = self._head_end(fit_both_ends(self._robot, detection.line_m, then.joint_rad), then)
         if fit.error_m > MISFIT * self._robot.link_length_m:
-            self._why = f"what is seen lies {fit.error_m * 1e3:.0f} mm off the measured joints"
+            self._reason = f"what is seen lies {fit.error_m * 1e3:.0f} mm off the measured joints"
             return
         self.used += 1
-        self._fixed_s = sighting.time_s
+        self._fixed_s = detection.time_s
         turn = fit.heading_rad - then.place[2]
         self._offset = np.append(fit.head_m - _turned(then.place[:2], turn), turn)
 
-    def _chosen(self, fits: tuple[PoseFit, PoseFit], then: _Moment) -> PoseFit:
-        """Which end is the head: by the joints' shape; where both fit, by where it was believed."""
+    def _head_end(self, fits: tuple[PoseFit, PoseFit], then: _Moment) -> PoseFit:
+        """Which end is the head: by the joints' shape; where both fit, by the last estimate."""
         better, worse = sorted(fits, key=lambda fit: fit.error_m)
         apart = worse.error_m > MISFIT * self._robot.link_length_m
-        if apart and better.error_m < SURE * worse.error_m:
+        if apart and better.error_m < DECISIVE * worse.error_m:
             return better
-        believed = _laid(self._offset, then.place)
+        believed = _in_world(self._offset, then.place)
         c, s = np.cos(believed[2]), np.sin(believed[2])
         return max(fits, key=lambda fit: np.cos(fit.heading_rad) * c + np.sin(fit.heading_rad) * s)
 
     def _at(self, time_s: float) -> _Moment:
         """Joints and drifting pose at the time of a frame, between two reads."""
-        if len(self._past) == 1:
-            return self._past[0]
-        times = np.array([moment.time_s for moment in self._past])
+        if len(self._history) == 1:
+            return self._history[0]
+        times = np.array([moment.time_s for moment in self._history])
         k = int(np.clip(np.searchsorted(times, time_s), 1, len(times) - 1))
-        one, two = self._past[k - 1], self._past[k]
+        one, two = self._history[k - 1], self._history[k]
         part = float(np.clip((time_s - one.time_s) / (two.time_s - one.time_s), 0.0, 1.0))
         change = two.place - one.place
         change[2] = np.arctan2(np.sin(change[2]), np.cos(change[2]))
         joints = one.joint_rad + part * (two.joint_rad - one.joint_rad)
         return _Moment(time_s, one.place + part * change, joints)
 
-    def _tell(self, now_s: float) -> None:
-        """Say when the camera has lost the body, and when it has it again."""
+    def _report_gap(self, now_s: float) -> None:
+        """Report when the camera has lost the body, and when it has it again."""
         blind_s = now_s - (self._fixed_s or 0.0)
         if self._gap != (blind_s > GAP_S):
             self._gap = not self._gap
-            self._note(
-                f"the camera has lost the body: {self._why or 'no frame came'}; reckoning on"
+            self._on_event(
+                f"the camera has lost the body: {self._reason or 'no frame came'}; reckoning on"
                 if self._gap
                 else "the camera has the body again"
             )
@@ -147,6 +152,6 @@ def _turned(point: Floats, by_rad: float) -> Floats:
     return np.array([c * point[0] - s * point[1], s * point[0] + c * point[1]])
 
 
-def _laid(frame: Floats, place: Floats) -> Floats:
+def _in_world(frame: Floats, place: Floats) -> Floats:
     """(3,) a place of the drifting frame in the world."""
     return np.append(frame[:2] + _turned(place[:2], frame[2]), frame[2] + place[2])

@@ -15,7 +15,7 @@ from snakewalk.drivers.types import BodyPose, JointState
 
 
 class DeadReckoning:
-    """Call with each joint state, in order of time; returns the pose believed."""
+    """Call with each joint state, in order of time; returns the estimated pose."""
 
     def __init__(
         self,

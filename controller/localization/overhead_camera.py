@@ -1,6 +1,6 @@
 """A camera above the floor: from a frame to the body's line in the world.
 
-The floor maps to the image by one homography. What is seen of the body is its outline, which lies
+The floor maps to the image by one homography. The image shows the body's outline, which lies
 as high as its axis; seen from a lens at height ``h`` above the foot ``f``, a point at height ``z``
 covers the floor further out, at ``g = f + (p - f) h / (h - z)``, and that is undone.
 """
@@ -79,8 +79,8 @@ class CameraModel:
 
 
 @dataclass(frozen=True, slots=True)
-class Sighting:
-    """What one frame says of the body."""
+class LineDetection:
+    """The body's line in one frame."""
 
     time_s: float
     """When the image was taken."""
@@ -100,7 +100,7 @@ class OverheadDetector:
     shade: float = 0.0
     """Part of the floor's light that the body's shadow may take: so much darker is still floor."""
 
-    def detect(self, image: Image, time_s: float) -> Sighting:
+    def detect(self, image: Image, time_s: float) -> LineDetection:
         """Find the body in one frame (H, W[, 3]).
 
         Raises:
@@ -109,7 +109,7 @@ class OverheadDetector:
         """
         skeleton = self.detect_px(image).skeleton
         line = self.model.on_plane(skeleton.points_px, self.axis_height_m)
-        return Sighting(time_s, line, skeleton.status)
+        return LineDetection(time_s, line, skeleton.status)
 
     def detect_px(self, image: Image) -> Detection:
         """Silhouette and skeleton of a frame, in pixels.

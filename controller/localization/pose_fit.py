@@ -1,8 +1,8 @@
-"""Where a chain of known shape lies, from a line seen of its body.
+"""The pose of a chain of known shape from the detected line of its body.
 
 The joints are measured, so only place and heading are open: the link centres by forward kinematics
-are laid on the seen line by Procrustes' rigid fit, at equal ways from its middle, which may slide
-a little: a tip that is hidden or sticks out moves it.
+are fitted to the detected line by Procrustes' rigid fit, evenly spaced from its middle, which
+may shift a little: a tip that is hidden or sticks out moves it.
 """
 
 from dataclasses import dataclass
@@ -15,14 +15,14 @@ from snakewalk.controller.kinematics.links import body_in_world, pose_at
 
 _ROUNDS = 5
 _BLUR_M = 0.003
-"""How far a link's place on the line is usually off."""
+"""Usual error of a link's place on the line."""
 _TIPS_M = 0.02
 """How far the line's middle may be off the body's."""
 
 
 @dataclass(frozen=True, slots=True)
 class PoseFit:
-    """One way to lay the chain on the line."""
+    """One fit of the chain to the line."""
 
     head_m: Floats
     """(2,) centre of the head link."""
@@ -34,13 +34,13 @@ class PoseFit:
     """Root of the mean square distance of the links from their places on the line."""
 
 
-def both_ways(robot: RobotConfig, line_m: Floats, joint_rad: Floats) -> tuple[PoseFit, PoseFit]:
+def fit_both_ends(robot: RobotConfig, line_m: Floats, joint_rad: Floats) -> tuple[PoseFit, PoseFit]:
     """Fit with the line's first end as the head, and with its last end.
 
     Args:
         robot: its links.
         line_m: (P, 2) from tip to tip.
-        joint_rad: (J,) measured when the line was seen.
+        joint_rad: (J,) measured when the line was detected.
 
     """
     body = body_in_world(robot, pose_at(np.zeros(2), 0.0), joint_rad)
@@ -53,15 +53,15 @@ def _fit(robot: RobotConfig, line_m: Floats, links: Floats) -> PoseFit:
     number = np.arange(len(links)) - 0.5 * (len(links) - 1)
     middle_m = 0.5 * arc[-1] + number * robot.link_length_m
     weight = np.ones(len(links))
-    slide_m = 0.0
+    shift_along_m = 0.0
     for _ in range(_ROUNDS):
-        seen, ahead = _along(line_m, arc, middle_m + slide_m)
-        turn, shift = _rigid(links, seen, weight)
-        away = seen - links @ turn.T - shift
+        line, ahead = _along(line_m, arc, middle_m + shift_along_m)
+        turn, shift = _rigid(links, line, weight)
+        away = line - links @ turn.T - shift
         size = np.hypot(*away.T)
         usual = 1.4826 * float(np.median(size)) + 1e-4
         weight = 1.0 / np.maximum(1.0, size / (1.5 * usual))  # Huber
-        slide_m += _slide(links @ turn.T, ahead, away, weight, slide_m)
+        shift_along_m += _shift_along(links @ turn.T, ahead, away, weight, shift_along_m)
     return PoseFit(
         shift,
         float(np.arctan2(turn[1, 0], turn[0, 0])),
@@ -78,7 +78,9 @@ def _along(line_m: Floats, arc: Floats, at: Floats) -> tuple[Floats, Floats]:
     return line_m[k - 1] + (at - arc[k - 1])[:, None] * ahead, ahead
 
 
-def _slide(links: Floats, ahead: Floats, away: Floats, weight: Floats, slid_m: float) -> float:
+def _shift_along(
+    links: Floats, ahead: Floats, away: Floats, weight: Floats, shifted_m: float
+) -> float:
     """How much further along the line the links lie, if the body's bends tell.
 
     One step of least squares for slide, shift and turn together; tips that are lost or stick out
@@ -98,15 +100,15 @@ def _slide(links: Floats, ahead: Floats, away: Floats, weight: Floats, slid_m: f
     right = matrix.T @ (away.ravel() * row)
     stiff = (_BLUR_M / _TIPS_M) ** 2
     normal[3, 3] += stiff
-    right[3] -= stiff * slid_m
+    right[3] -= stiff * shifted_m
     return float(np.linalg.solve(normal, right)[3])
 
 
-def _rigid(links: Floats, seen: Floats, weight: Floats) -> tuple[Floats, Floats]:
-    """Turn (2, 2) and shift (2,) that lay ``links`` on ``seen`` with the least squares."""
+def _rigid(links: Floats, line: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Turn (2, 2) and shift (2,) of ``links`` to ``line`` with the least squares."""
     share = weight / weight.sum()
-    a, b = share @ links, share @ seen
-    p, q = links - a, seen - b
+    a, b = share @ links, share @ line
+    p, q = links - a, line - b
     sin = float(share @ (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]))
     cos = float(share @ (p * q).sum(axis=1))
     size = float(np.hypot(sin, cos)) or 1.0

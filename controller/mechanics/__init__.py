@@ -1,1 +1,1 @@
-"""mechanics."""
+"""Mechanics on paper: ground contact, friction, loads and speed of a body, without a simulator."""

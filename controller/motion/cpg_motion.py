@@ -48,7 +48,7 @@ class Part:
 
     def begin(self, cpg: Cpg) -> None:
         """Make it what the oscillators go to."""
-        cpg.become(self.pattern, self.gain, self.clock_gain)
+        cpg.set_pattern(self.pattern, self.gain, self.clock_gain)
 
 
 def quickest_change(cpg: Cpg, pattern: Pattern, limit: Pace) -> tuple[tuple[Part, ...], Pace]:
@@ -61,7 +61,7 @@ def quickest_change(cpg: Cpg, pattern: Pattern, limit: Pace) -> tuple[tuple[Part
         the parts of the change, one after the other, and the largest speeds on the way.
 
     """
-    start = cpg.now()
+    start = cpg.state()
     slow = CRAWL * min(cpg.pattern.omega_rad_s or np.inf, pattern.omega_rad_s or np.inf)
     crawl = replace(pattern, omega_rad_s=slow if np.isfinite(slow) else 0.0)
     ways: list[tuple[Part, ...]] = [(Part(pattern, g, g),) for g in GAINS if g >= LEAST_DIRECT]
@@ -86,14 +86,14 @@ def _judge(
         step_s = max(SAMPLE_S, part.time_s / MOST_SAMPLES)
         part.begin(cpg)
         times_s = np.arange(0.0, part.time_s, step_s)
-        one, speed, change = cpg.judge(
+        one, speed, change = cpg.peak_share(
             times_s, limit.speed_rad_s, limit.acceleration_rad_s2, enough
         )
         over = max(over, one)
         fast, hard = np.maximum(fast, speed), np.maximum(hard, change)
         if over > enough:
             break
-        cpg.skip(part.time_s)
+        cpg.advance(part.time_s)
     return over, Pace(fast, hard)
 
 

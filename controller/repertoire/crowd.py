@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.repertoire.repertoire import Repertoire
-from snakewalk.controller.repertoire.warp import bridge_frames, tip_way_m
+from snakewalk.controller.repertoire.replay import bridge_frames, tip_travel_m
 
-Whole = NDArray[np.int32]
+Ints32 = NDArray[np.int32]
 LANES = 8
 """Links are padded to a multiple of this, so that a vector unit takes them without a rest."""
 
@@ -33,10 +33,10 @@ class Crowd:
         padded = -(-self._links // LANES) * LANES
         self._shape = np.zeros((len(shape), 3, padded), dtype=np.float32)
         self._shape[:, :, : self._links] = shape.transpose(0, 2, 1)
-        self._bridge = np.array(
+        self._bridge_length = np.array(
             [
                 [
-                    bridge_frames(tip_way_m(a.link_m[-1], b.link_m[0]), largest_tip_m)
+                    bridge_frames(tip_travel_m(a.link_m[-1], b.link_m[0]), largest_tip_m)
                     for b in segments
                 ]
                 for a in segments
@@ -51,31 +51,31 @@ class Crowd:
         """(N,) size over that of the recorded body."""
         self.visible: NDArray[np.bool_] = np.ones(bodies, dtype=np.bool_)
         """(N,)"""
-        self.segment: Whole = np.zeros(bodies, dtype=np.int32)
-        """(N,) wanted: taken up when a cycle ends."""
-        self.cycles: Whole = np.zeros(bodies, dtype=np.int32)
-        """(N,) cycles of the segment since it was taken up."""
-        self._playing: Whole = np.zeros(bodies, dtype=np.int32)
-        self._next: Whole = np.zeros(bodies, dtype=np.int32)
+        self.segment: Ints32 = np.zeros(bodies, dtype=np.int32)
+        """(N,) requested: begins when the cycle ends."""
+        self.cycles: Ints32 = np.zeros(bodies, dtype=np.int32)
+        """(N,) cycles of the segment since it began."""
+        self._playing: Ints32 = np.zeros(bodies, dtype=np.int32)
+        self._next: Ints32 = np.zeros(bodies, dtype=np.int32)
         self._ended: NDArray[np.bool_] = np.zeros(bodies, dtype=np.bool_)
-        self._begun: Whole = np.zeros(bodies, dtype=np.int32)
-        self._whole: Whole = np.zeros(bodies, dtype=np.int32)
-        self._left: Whole = np.zeros(bodies, dtype=np.int32)
+        self._bridge_from: Ints32 = np.zeros(bodies, dtype=np.int32)
+        self._bridge_frames: Ints32 = np.zeros(bodies, dtype=np.int32)
+        self._bridge_remaining: Ints32 = np.zeros(bodies, dtype=np.int32)
         self._points = np.zeros((bodies, 3, padded), dtype=np.float32)
 
     @property
-    def playing(self) -> Whole:
+    def playing(self) -> Ints32:
         """(N,) segment of each body now."""
         return self._playing
 
-    def put(self, body: int, frame: Frame, *, segment: int = 0, scale: float = 1.0) -> None:
+    def place(self, body: int, frame: Frame, *, segment: int = 0, scale: float = 1.0) -> None:
         """Place a body so that its next frame is the first of ``segment``."""
         self.rotation[body] = frame.rotation.ravel()
         self.origin_m[body] = frame.origin_m
         self.scale[body] = scale
         self.segment[body] = self._playing[body] = segment
         self._next[body] = self._first[segment]
-        self._left[body] = self.cycles[body] = 0
+        self._bridge_remaining[body] = self.cycles[body] = 0
         self._ended[body] = False
 
     def stagger(self, seed: int = 0) -> None:
@@ -91,16 +91,16 @@ class Crowd:
         """Go on by ``frames`` frames."""
         for _ in range(frames):
             _step(
-                self._turn, self._move, self._shape, self._first, self._last, self._bridge,
+                self._turn, self._move, self._shape, self._first, self._last, self._bridge_length,
                 self.rotation, self.origin_m, self.scale, self.visible, self.segment, self.cycles,
-                self._playing, self._next, self._ended, self._begun, self._whole, self._left,
-                self._points,
+                self._playing, self._next, self._ended, self._bridge_from, self._bridge_frames,
+                self._bridge_remaining, self._points,
             )  # fmt: skip
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def _square(r):  # type: ignore[no-untyped-def]
-    """Take rounding out of the axes: x keeps its direction, y and z are made anew."""
+def _orthonormalise(r):  # type: ignore[no-untyped-def]
+    """Remove rounding from the axes: x keeps its direction, y and z are made anew."""
     size = 1.0 / np.sqrt(r[0] * r[0] + r[3] * r[3] + r[6] * r[6])
     r[0], r[3], r[6] = r[0] * size, r[3] * size, r[6] * size
     along = r[0] * r[1] + r[3] * r[4] + r[6] * r[7]
@@ -114,8 +114,8 @@ def _square(r):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def _step(  # type: ignore[no-untyped-def]  # noqa: PLR0915
-    turn, move, shape, first, last, bridge, rotation, origin, scale, visible, wanted,
-    cycles, playing, following, ended, begun, whole, left, points,
+    turn, move, shape, first, last, bridge, rotation, origin, scale, visible, requested,
+    cycles, playing, following, ended, bridge_from, bridge_frames_of, bridge_remaining, points,
 ):  # fmt: skip
     """One frame of every body; plain numbers, for a slice in this loop costs more than its work."""
     lanes = shape.shape[2]
@@ -123,25 +123,28 @@ def _step(  # type: ignore[no-untyped-def]  # noqa: PLR0915
         if ended[b]:
             ended[b] = False
             cycles[b] += 1
-            _square(rotation[b])
-            new = wanted[b]
+            _orthonormalise(rotation[b])
+            new = requested[b]
             if new != playing[b]:
-                begun[b] = last[playing[b]]
-                whole[b] = left[b] = bridge[playing[b], new]
+                bridge_from[b] = last[playing[b]]
+                bridge_frames_of[b] = bridge_remaining[b] = bridge[playing[b], new]
                 playing[b] = new
                 cycles[b] = 0
                 following[b] = first[new]
-        at, s, seen = following[b], scale[b], visible[b]
+        at, s, shown = following[b], scale[b], visible[b]
         a, share = at, 0.0
         r00, r01, r02 = rotation[b, 0], rotation[b, 1], rotation[b, 2]
         r10, r11, r12 = rotation[b, 3], rotation[b, 4], rotation[b, 5]
         r20, r21, r22 = rotation[b, 6], rotation[b, 7], rotation[b, 8]
         x, y, z = origin[b, 0], origin[b, 1], origin[b, 2]
-        if seen and left[b] > 0:  # the shape goes over, the body frame stays
-            a, share = begun[b], (whole[b] - left[b] + 1.0) / (whole[b] + 1.0)
-            left[b] -= 1
+        if shown and bridge_remaining[b] > 0:  # the shape goes over, the body frame stays
+            a, share = (
+                bridge_from[b],
+                (bridge_frames_of[b] - bridge_remaining[b] + 1.0) / (bridge_frames_of[b] + 1.0),
+            )
+            bridge_remaining[b] -= 1
         else:
-            left[b] = 0
+            bridge_remaining[b] = 0
             u, v, w = s * move[at, 0], s * move[at, 1], s * move[at, 2]
             x += r00 * u + r01 * v + r02 * w
             y += r10 * u + r11 * v + r12 * w
@@ -173,7 +176,7 @@ def _step(  # type: ignore[no-untyped-def]  # noqa: PLR0915
                 following[b] = first[playing[b]]
             else:
                 following[b] = at + 1
-        if not seen:
+        if not shown:
             continue
         x0, y0, z0 = np.float32(x), np.float32(y), np.float32(z)
         f00, f01, f02 = np.float32(s * r00), np.float32(s * r01), np.float32(s * r02)

@@ -1,5 +1,10 @@
-"""Exact kinematic replay of segments from any pose ([YT] 4.1, Eq. 10-12, corrected)."""
+"""Kinematic replay of segments from any pose, and bridges between them ([YT] 4.1 and 4.2).
 
+The replay is exact; Eq. 10-12 are corrected (``Segment``). A bridge takes as many frames as the
+distance that the tail has to go asks for.
+"""
+
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -8,12 +13,11 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.repertoire.segment import Segment
-from snakewalk.controller.repertoire.warp import bridge
 
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """A body's way, frame by frame; the start is not among the frames."""
+    """A body's motion, frame by frame; the start is not among the frames."""
 
     rotation: Floats
     """(T, 3, 3) of the body frame in the world."""
@@ -32,7 +36,7 @@ def replay(segment: Segment, start: Frame, scale: float = 1.0) -> Replayed:
     """Play one cycle from ``start``.
 
     ``scale`` is the ratio of this body's size to the recorded one's. It scales the shape (Eq. 12)
-    and the way too: a body twice as long that made the recorded steps would slip.
+    and the travel too: a body twice as long that made the recorded steps would slip.
     """
     turned, gone_m = segment.travel()
     rotation = start.rotation @ turned[1:]
@@ -46,7 +50,7 @@ def replay_all(
 ) -> Replayed:
     """Play segments one after the other, with bridges in which the body frame stays.
 
-    ``largest_tip_m``: way of the tail, in the body frame of the recorded size, in a frame.
+    ``largest_tip_m``: distance of the tail, in the body frame of the recorded size, in a frame.
     """
     parts: list[Replayed] = []
     at = start
@@ -66,3 +70,29 @@ def replay_all(
             for name in ("rotation", "origin_m", "link_m")
         )
     )
+
+
+def tip_travel_m(before_m: Floats, after_m: Floats) -> float:
+    """How far the tail goes in the body frame between shapes (L, 3)."""
+    return float(np.linalg.norm(after_m[-1] - before_m[-1]))
+
+
+def bridge_frames(travel_m: float, largest_m: float) -> int:
+    """Return the frames between two shapes, so that no step of the tip is over ``largest_m``.
+
+    n frames make n + 1 steps, so n is the least for which ``travel / (n + 1) <= largest``.
+
+    Raises:
+        ValueError: ``largest_m`` is not positive.
+
+    """
+    if largest_m <= 0.0:
+        raise ValueError("the largest distance of the tip must be over 0")
+    return max(0, math.ceil(travel_m / largest_m - 1e-9) - 1)
+
+
+def bridge(before_m: Floats, after_m: Floats, largest_m: float) -> Floats:
+    """(n, L, 3) shapes linear between ``before_m`` and ``after_m`` (L, 3), both left out."""
+    count = bridge_frames(tip_travel_m(before_m, after_m), largest_m)
+    share = np.arange(1, count + 1) / (count + 1.0)
+    return np.asarray(before_m + share[:, None, None] * (after_m - before_m))

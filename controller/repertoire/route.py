@@ -1,4 +1,4 @@
-"""From one cycle's end to the next action: the rest of a route, or a new one from where it is."""
+"""Following a route: the next action at the end of a cycle, planned before or searched anew."""
 
 from collections.abc import Sequence
 
@@ -8,16 +8,21 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.frame import body_frame
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.rotations import wrap
-from snakewalk.controller.repertoire.moves import Moves, start_pose
-from snakewalk.controller.repertoire.search import AIM_SHARE, Route, search
+from snakewalk.controller.repertoire.search import (
+    AIM_SHARE,
+    MotionPrimitives,
+    Route,
+    plane_pose,
+    search,
+)
 
 
-class Follower:
+class RouteFollower:
     """Chooses actions for a ``RepertoireMotion`` and counts the waypoints that are reached."""
 
     def __init__(
         self,
-        moves: Moves,
+        primitives: MotionPrimitives,
         route: Route,
         waypoints_m: Sequence[tuple[float, float]],
         radius_m: float,
@@ -26,7 +31,7 @@ class Follower:
         beam: int = 100,
     ) -> None:
         """Start on ``route``; with ``replan`` the search begins again at the end of each cycle."""
-        self._moves, self._route = moves, route
+        self._primitives, self._route = primitives, route
         self._waypoints_m, self._radius_m = tuple(waypoints_m), radius_m
         self._replan, self._beam = replan, beam
         self.reached = 0
@@ -42,7 +47,7 @@ class Follower:
         """Whether every waypoint has been reached."""
         return self.reached == len(self._waypoints_m)
 
-    def watch(self, view: BodyView) -> None:
+    def count_waypoints(self, view: BodyView) -> None:
         """Count a waypoint when the centre is near it."""
         if self.done:
             return
@@ -51,7 +56,7 @@ class Follower:
 
     def choose(self, view: BodyView) -> int | None:
         """Return the next action; None after the last."""
-        pose = start_pose(body_frame(view.link_m))
+        pose = plane_pose(body_frame(view.link_m))
         self.measured.append(pose)
         taken = len(self.chosen)
         if not self._replan:
@@ -62,7 +67,7 @@ class Follower:
             if self.done:
                 return None
             ahead = search(
-                self._moves,
+                self._primitives,
                 pose,
                 self._waypoints_m,
                 AIM_SHARE * self._radius_m,
@@ -72,22 +77,22 @@ class Follower:
             )
             action = ahead.actions[0]
         self.chosen.append(action)
-        self.predicted.append(self._moves.after(pose, action))
+        self.predicted.append(self._primitives.after(pose, action))
         return action
 
     def errors(self) -> Floats:
-        """(n, 2) way and turn by which each action missed its prediction, m and rad."""
-        found, said = np.array(self.measured), np.array(self.predicted[: len(self.measured)])
-        return _apart(found, said)
+        """(n, 2) distance and turn by which each action missed its prediction, m and rad."""
+        predicted = np.array(self.predicted[: len(self.measured)])
+        return _errors(np.array(self.measured), predicted)
 
     def route_errors(self) -> Floats:
-        """(n, 2) the same against the route as planned, without looking in between."""
+        """(n, 2) the same against the route as planned, without measuring in between."""
         count = min(len(self.measured), len(self._route.actions))
-        return _apart(np.array(self.measured)[:count], self._route.pose[1 : count + 1])
+        return _errors(np.array(self.measured)[:count], self._route.pose[1 : count + 1])
 
 
-def _apart(found: Floats, said: Floats) -> Floats:
-    if not len(found):
+def _errors(measured: Floats, predicted: Floats) -> Floats:
+    if not len(measured):
         return np.zeros((0, 2))
-    off = found - said
+    off = measured - predicted
     return np.column_stack([np.hypot(off[:, 0], off[:, 1]), np.abs(wrap(off[:, 2]))])

@@ -7,11 +7,47 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.rotations import wrap
-from snakewalk.controller.repertoire.moves import SAMPLES, Moves
+from snakewalk.controller.repertoire.repertoire import Repertoire
 
 AIM_SHARE = 0.75
 """Of a waypoint's radius that is aimed at: the body does not end a cycle quite where predicted."""
+SAMPLES = 10
+"""Moments of a cycle at which the distance to a waypoint is checked."""
+
+
+class MotionPrimitives:
+    """What each action of a repertoire does in a cycle, in the plane."""
+
+    def __init__(self, repertoire: Repertoire, scale: float = 1.0) -> None:
+        travels = [segment.flat_travel() for segment in repertoire.segments]
+        stretch = np.array([scale, scale, 1.0])
+        marks = [np.linspace(0, len(t) - 1, SAMPLES + 1).round().astype(int)[1:] for t in travels]
+        self.travel = np.array([t[m] * stretch for t, m in zip(travels, marks, strict=True)])
+        """(A, SAMPLES, 3) x, y, heading in the frame at the beginning of the cycle."""
+        self.duration_s = np.array([segment.duration_s for segment in repertoire.segments])
+        """(A,)"""
+        end = self.travel[:, -1]
+        chord = np.hypot(end[:, 0], end[:, 1])
+        best = int(np.argmax(chord / self.duration_s))
+        self.speed_m_s = float(chord[best] / self.duration_s[best])
+        """Largest."""
+        self.turn_rad_s = max(float(np.abs(end[:, 2] / self.duration_s).max()), 1e-3)
+        """Largest."""
+        self.course_rad = float(np.arctan2(end[best, 1], end[best, 0]) - 0.5 * end[best, 2])
+        """Direction of travel against the body frame's x at the beginning of a cycle."""
+
+    def after(self, pose: Floats, action: int) -> Floats:
+        """(3,) where ``action`` leads from ``pose`` (3,) in a cycle."""
+        c, s = np.cos(pose[2]), np.sin(pose[2])
+        x, y, turn = self.travel[action, -1]
+        return np.array([pose[0] + c * x - s * y, pose[1] + s * x + c * y, pose[2] + turn])
+
+
+def plane_pose(frame: Frame) -> Floats:
+    """(3,) x, y and heading."""
+    return np.array([frame.origin_m[0], frame.origin_m[1], frame.heading_rad])
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +65,7 @@ class Route:
 
 
 def search(
-    moves: Moves,
+    primitives: MotionPrimitives,
     start: ArrayLike,
     waypoints_m: Sequence[tuple[float, float]],
     radius_m: float,
@@ -41,7 +77,7 @@ def search(
     """Beam search: the quickest sequence that passes within ``radius_m`` of all waypoints in order.
 
     Each round tries every action after each of the ``beam`` best sequences; one is worth the time
-    that it has taken and a lower estimate of what is left: the way at the largest speed, and the
+    that it has taken and a lower estimate of the rest: the distance at the largest speed, and the
     turn towards the next waypoint.
 
     Returns:
@@ -59,11 +95,11 @@ def search(
     best: tuple[_Level, int] | None = None
     candidates = 0
     for _ in range(depth):
-        ends, count, spent = _tried(moves, level, goals, radius_m)
+        ends, count, spent = _expanded(primitives, level, goals, radius_m)
         candidates += len(ends)
-        cost = spent + _left_s(moves, ends, count, goals, after, radius_m)
+        cost = spent + _remaining_s(primitives, ends, count, goals, after, radius_m)
         order = np.argsort(cost, kind="stable")[:beam]
-        parent, action = np.divmod(order, len(moves.duration_s))
+        parent, action = np.divmod(order, len(primitives.duration_s))
         level = _Level(ends[order], count[order], spent[order], level, parent, action)
         done = level.passed >= len(goals)
         if done.any():
@@ -76,7 +112,7 @@ def search(
         if not going.any():
             break
         level = level.only(np.flatnonzero(going))
-    return _traced(*(best or (level, 0)), candidates)
+    return _backtracked(*(best or (level, 0)), candidates)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,26 +139,26 @@ class _Level:
         )  # fmt: skip
 
 
-def _tried(
-    moves: Moves, level: _Level, goals: Floats, radius_m: float
+def _expanded(
+    primitives: MotionPrimitives, level: _Level, goals: Floats, radius_m: float
 ) -> tuple[Floats, NDArray[np.int64], Floats]:
     """Every action after each sequence: (nA, 3) poses, (nA,) waypoints passed, (nA,) time."""
     c, s = np.cos(level.pose[:, 2]), np.sin(level.pose[:, 2])
-    x, y = moves.way[None, :, :, 0], moves.way[None, :, :, 1]
+    x, y = primitives.travel[None, :, :, 0], primitives.travel[None, :, :, 1]
     at_x = level.pose[:, 0, None, None] + c[:, None, None] * x - s[:, None, None] * y
     at_y = level.pose[:, 1, None, None] + s[:, None, None] * x + c[:, None, None] * y
-    count = np.repeat(level.passed[:, None], len(moves.duration_s), axis=1)
+    count = np.repeat(level.passed[:, None], len(primitives.duration_s), axis=1)
     for k in range(SAMPLES):  # in time: a cycle may pass two waypoints
         goal = goals[np.minimum(count, len(goals) - 1)]
         gap = np.hypot(at_x[:, :, k] - goal[:, :, 0], at_y[:, :, k] - goal[:, :, 1])
         count += (gap <= radius_m) & (count < len(goals))
-    heading = level.pose[:, 2, None] + moves.way[None, :, -1, 2]
+    heading = level.pose[:, 2, None] + primitives.travel[None, :, -1, 2]
     ends = np.stack([at_x[:, :, -1], at_y[:, :, -1], heading], axis=2)
-    spent = level.time_s[:, None] + moves.duration_s
+    spent = level.time_s[:, None] + primitives.duration_s
     return ends.reshape(-1, 3), count.ravel(), spent.ravel()
 
 
-def _traced(level: _Level, at: int, candidates: int) -> Route:
+def _backtracked(level: _Level, at: int, candidates: int) -> Route:
     """Follow a sequence back to its beginning."""
     reached, time_s = int(level.passed[at]), float(level.time_s[at])
     poses, actions = [level.pose[at]], []
@@ -135,18 +171,20 @@ def _traced(level: _Level, at: int, candidates: int) -> Route:
     return Route(tuple(actions[::-1]), np.array(poses[::-1]), reached, time_s, candidates)
 
 
-def _left_s(
-    moves: Moves,
+def _remaining_s(
+    primitives: MotionPrimitives,
     pose: Floats,
     count: NDArray[np.int64],
     goals: Floats,
     after: Floats,
     radius_m: float,
 ) -> Floats:
-    """(n,) estimate of the time that is left."""
+    """(n,) estimate of the remaining time, s."""
     which = np.minimum(count, len(goals) - 1)
     to = goals[which] - pose[:, :2]
     way = np.hypot(to[:, 0], to[:, 1])
-    off = np.arctan2(to[:, 1], to[:, 0]) - pose[:, 2] - moves.course_rad
-    left = (np.maximum(way - radius_m, 0.0) + after[which]) / moves.speed_m_s
-    return np.where(count >= len(goals), 0.0, left + 0.5 * np.abs(wrap(off)) / moves.turn_rad_s)
+    off = np.arctan2(to[:, 1], to[:, 0]) - pose[:, 2] - primitives.course_rad
+    left = (np.maximum(way - radius_m, 0.0) + after[which]) / primitives.speed_m_s
+    return np.where(
+        count >= len(goals), 0.0, left + 0.5 * np.abs(wrap(off)) / primitives.turn_rad_s
+    )

@@ -1,4 +1,4 @@
-"""The secondary controller ([YT] 5.1): from a wanted speed or turn to a segment."""
+"""The secondary controller ([YT] 5.1): from a requested speed or turn to a segment."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class SecondaryController:
         self._last: int | None = None
         self._repeats = 0
 
-    def wanted(self, speed_m_s: float, turn_rad_s: float = 0.0) -> int:
+    def nearest(self, speed_m_s: float, turn_rad_s: float = 0.0) -> int:
         """Nearest segment: by turn, and by speed where no turn is nearer than straight on."""
         nearest = int(np.argmin(np.abs(self._turn_rad_s - turn_rad_s)))
         if nearest not in self._forward:
@@ -37,12 +37,12 @@ class SecondaryController:
         return int(self._forward[np.argmin(off)])
 
     def choose(self, speed_m_s: float, turn_rad_s: float = 0.0) -> int:
-        """As ``wanted``, for the next cycle; after ``patience`` equal ones a random other.
+        """As ``nearest``, for the next cycle; after ``patience`` equal ones a random other.
 
         The other one is of the same kind where there is one: a body that goes straight on does not
         turn for a change.
         """
-        chosen = self.wanted(speed_m_s, turn_rad_s)
+        chosen = self.nearest(speed_m_s, turn_rad_s)
         if chosen == self._last and self._repeats >= self._patience:
             alike = np.sign(np.round(self._turn_rad_s, 2)) == np.sign(
                 np.round(self._turn_rad_s[chosen], 2)

@@ -34,7 +34,7 @@ class Segment:
     joint_rad: Floats
     """(T, J) joint angles at the end of each frame."""
     closure_m: float
-    """Largest way of a link, in the body frame, between the first and the last pose."""
+    """Largest distance of a link, in the body frame, between the first and the last pose."""
     closure_rad: float
     """Largest difference of a joint between them."""
 
@@ -65,7 +65,7 @@ class Segment:
 
     @property
     def speed_m_s(self) -> float:
-        """Way of a cycle over its time, along the arc."""
+        """Distance of a cycle over its time, along the arc."""
         x, y, turn = self.flat_travel()[-1]
         half = 0.5 * float(turn)
         return float(np.hypot(x, y)) / float(np.sinc(half / np.pi)) / self.duration_s

@@ -1,1 +1,1 @@
-"""Shape states from tangent angles, the library of states, and walks on graphs of them."""
+"""Shapes: states from tangent angles, the library of states, and walks on graphs of them."""

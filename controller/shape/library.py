@@ -10,14 +10,14 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.shape.states import energy_kept, random_states, to_angles, to_states
 
-Refuse = Callable[[Floats], NDArray[np.bool_]]
+ShapeFilter = Callable[[Floats], NDArray[np.bool_]]
 """Shapes (S, N) to a mask (S,) of those that cannot be used."""
 _ROUNDS = 50
 
 
 @dataclass(frozen=True, slots=True)
 class StateLibrary:
-    """Shapes that passed every test, and how many did not."""
+    """Shapes that passed every filter, and how many did not."""
 
     shapes_rad: Floats
     """(S, N) tangent angles, head first, zero mean."""
@@ -38,7 +38,7 @@ class StateLibrary:
 
 def build_library(
     track_rad: Floats,
-    tests: dict[str, Refuse],
+    filters: dict[str, ShapeFilter],
     *,
     coefficients: int,
     random_count: int,
@@ -52,15 +52,15 @@ def build_library(
 
     """
     states = curvature * to_states(track_rad, coefficients)
-    rejected = dict.fromkeys(tests, 0)
-    recorded = _passing(to_angles(states, track_rad.shape[-1]), tests, rejected)
+    rejected = dict.fromkeys(filters, 0)
+    recorded = _passing(to_angles(states, track_rad.shape[-1]), filters, rejected)
     made: list[Floats] = []
     for _ in range(_ROUNDS):
         missing = random_count - sum(map(len, made))
         if missing <= 0:
             break
         drawn = to_angles(random_states(states, max(missing, 20), rng), track_rad.shape[-1])
-        made.append(_passing(drawn, tests, rejected)[:missing])
+        made.append(_passing(drawn, filters, rejected)[:missing])
     fresh = np.concatenate([np.empty((0, track_rad.shape[-1])), *made])
     if len(fresh) < random_count or len(recorded) + len(fresh) < 2:
         reasons = ", ".join(f"{name}: {count}" for name, count in rejected.items())
@@ -73,11 +73,11 @@ def build_library(
     return StateLibrary(np.concatenate([recorded, fresh]), len(recorded), rejected, kept)
 
 
-def _passing(shapes: Floats, tests: dict[str, Refuse], rejected: dict[str, int]) -> Floats:
-    for name, refuse in tests.items():
+def _passing(shapes: Floats, filters: dict[str, ShapeFilter], rejected: dict[str, int]) -> Floats:
+    for name, refuses in filters.items():
         if len(shapes) == 0:
             break
-        bad = refuse(shapes)
+        bad = refuses(shapes)
         rejected[name] += int(bad.sum())
         shapes = shapes[~bad]
     return shapes

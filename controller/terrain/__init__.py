@@ -1,1 +1,1 @@
-"""The ground as the planner sees it: height field in, safe path out."""
+"""Terrain: how risky the ground is, and safe paths over it."""

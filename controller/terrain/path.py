@@ -10,7 +10,7 @@ from snakewalk.drivers.compiling import compiled
 
 _STEP_M = 0.01
 WINDOW_M = 1.5
-"""How far along the path a follower is looked for: on its own lap, where a path crosses itself."""
+"""How far ahead a point is projected: onto its own lap, where a path crosses itself."""
 
 
 class SplinePath:
@@ -58,19 +58,19 @@ class SplinePath:
         """Arc length of the closest point in ``[from_s_m, from_s_m + window_m]``."""
         at_s_m, gap_m = np.array([from_s_m]), np.empty(1)
         point = np.asarray(point_m, dtype=float)[None, :2]
-        _follow(self._s, self._xy, np.ascontiguousarray(point), at_s_m, gap_m, window_m)
+        _project(self._s, self._xy, np.ascontiguousarray(point), at_s_m, gap_m, window_m)
         return float(at_s_m[0])
 
-    def follow(self, points_m: Floats, s_m: Floats, gap_m: Floats) -> None:
-        """Take followers along: each to the closest point of ``WINDOW_M`` from where it was.
+    def project(self, points_m: Floats, s_m: Floats, gap_m: Floats) -> None:
+        """Project points onto the path: each within ``WINDOW_M`` ahead of its last arc length.
 
         Args:
-            points_m: (n, 2) where they are.
+            points_m: (n, 2) in the world.
             s_m: (n,) arc lengths; written.
             gap_m: (n,) distances from the path there; written.
 
         """
-        _follow(self._s, self._xy, points_m, s_m, gap_m, WINDOW_M)
+        _project(self._s, self._xy, points_m, s_m, gap_m, WINDOW_M)
 
     def first_pass(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
         """Arc length, from ``from_s_m`` on, at which the path first comes nearest to a point.
@@ -87,7 +87,7 @@ class SplinePath:
 @compiled(
     "void(float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64)"
 )
-def _follow(
+def _project(
     marks_m: Floats, xy_m: Floats, points_m: Floats, s_m: Floats, gap_m: Floats, window_m: float
 ) -> None:
     for k in range(len(points_m)):

@@ -14,12 +14,12 @@ from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.relief import Relief
 from snakewalk.controller.terrain.safe_graph import SafeGraph
 
-_LOOK_M = 0.02  # how densely a spline is checked again
+_CHECK_STEP_M = 0.02  # how densely a spline is checked again
 _ROUNDS = 7  # halvings: a corner's pieces end at a hundredth of their length
 
 
 class TerrainPlanner:
-    """Lays paths on one piece of ground; on a flat floor, plain splines through the points.
+    """Plans paths on one piece of ground; on a flat floor, plain splines through the points.
 
     Built once (fields and graph), then called with the points of each path; the first point is
     where the head is, and may lie anywhere.
@@ -30,7 +30,7 @@ class TerrainPlanner:
         self.graph = None if self.relief is None else SafeGraph(self.relief)
 
     def __call__(self, points_m: ArrayLike) -> SplinePath:
-        """Lay a path from where the body is, on good ground or bad, through (n, 2) waypoints.
+        """Plan a path from where the body is, on good ground or bad, through (n, 2) waypoints.
 
         From an unsafe first point the path leads straight to the nearest safe node.
 
@@ -47,7 +47,7 @@ class TerrainPlanner:
         return self._spline(self._polygon(points, self.graph), points, self.relief)
 
     def plan(self, points_m: ArrayLike) -> SplinePath:
-        """Lay a path as a call does, but refuse a start that is off the world or on unsafe ground.
+        """Plan a path as a call does, but refuse a start that is off the world or on unsafe ground.
 
         Raises:
             InputError: as for a call, and for the first point.
@@ -66,11 +66,11 @@ class TerrainPlanner:
         for k in range(1, len(points)):
             here, there = anchors[k - 1], anchors[k]
             if k == 1 and there is not None:  # the body may stand beside an island of safe nodes
-                here = graph.nearest(points[0], graph.reaching(there))
-            way = None if here is None or there is None else graph.way(here, there)
-            if way is None:
+                here = graph.nearest(points[0], graph.can_reach(there))
+            nodes = None if here is None or there is None else graph.cheapest_path(here, there)
+            if nodes is None:
                 raise InputError(self._blocked(k, points))
-            pieces.append(straighten(np.vstack([points[k - 1], way, points[k]]), graph)[1:])
+            pieces.append(straighten(np.vstack([points[k - 1], nodes, points[k]]), graph)[1:])
         return np.vstack(pieces)
 
     def _spline(self, corners: Floats, points: Floats, relief: Relief) -> SplinePath:
@@ -99,7 +99,7 @@ class TerrainPlanner:
 
     def _unsafe(self, path: SplinePath, start: Floats, relief: Relief) -> Floats:
         """Arc lengths where a path is on unsafe ground, past the way out of a bad start."""
-        s = np.linspace(0.0, path.length_m, max(2, int(path.length_m / _LOOK_M) + 1))
+        s = np.linspace(0.0, path.length_m, max(2, int(path.length_m / _CHECK_STEP_M) + 1))
         safe = relief.safe(*path.position(s).T)
         if not relief.safe(*start):
             safe[: int(np.argmax(safe))] = True
@@ -164,24 +164,24 @@ _REACH = 14  # nodes a straight piece may skip; also the whole leg at once is tr
 _CORNER_M = 0.3  # what a corner costs, as metres of path: few corners make wide bends
 
 
-def straighten(way_m: Floats, graph: SafeGraph) -> Floats:
+def straighten(nodes_m: Floats, graph: SafeGraph) -> Floats:
     """(k, 2) corners of the cheapest safe polygon from the first to the last of (m, 2) points.
 
-    Consecutive points of the way are taken to be joined; any other piece must be safe all along.
+    Consecutive points are taken to be joined; any other piece must be safe all along.
     """
-    last = len(way_m) - 1
+    last = len(nodes_m) - 1
     pairs = [(i, j) for j in range(1, last + 1) for i in range(max(0, j - _REACH), j)]
     if last > _REACH:
         pairs.append((0, last))
     a, b = np.array(pairs).T
-    price, safe = graph.price(way_m[a], way_m[b])
-    price = np.where(safe | (b - a == 1), price, np.inf) + _CORNER_M * graph.length_weight
+    cost, safe = graph.edge_cost(nodes_m[a], nodes_m[b])
+    cost = np.where(safe | (b - a == 1), cost, np.inf) + _CORNER_M * graph.length_weight
     best, back = np.full(last + 1, np.inf), np.zeros(last + 1, dtype=int)
     best[0] = 0.0
-    for i, j, cost in zip(a.tolist(), b.tolist(), price.tolist(), strict=True):
-        if best[i] + cost < best[j]:
-            best[j], back[j] = best[i] + cost, i
+    for i, j, weight in zip(a.tolist(), b.tolist(), cost.tolist(), strict=True):
+        if best[i] + weight < best[j]:
+            best[j], back[j] = best[i] + weight, i
     corners = [last]
     while corners[-1] != 0:
         corners.append(int(back[corners[-1]]))
-    return way_m[corners[::-1]]
+    return nodes_m[corners[::-1]]

@@ -1,4 +1,4 @@
-"""The graph of safe nodes, and the cheapest ways through it ([PT] 2.6.1, [KP] 4.3)."""
+"""The graph of safe nodes, and the cheapest paths through it ([PT] 2.6.1, [KP] 4.3)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from snakewalk.config.arrays import Floats, Indices
 from snakewalk.controller.terrain.relief import Relief
 
 # A tenth is kept back for the nodes and edges: the spline may leave the polygon by a little.
-IN_HAND = 0.9
+RISK_LIMIT = 0.9
 
 # Half of the sixteen neighbours; the other half are the same edges seen from the other end.
 _STEPS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (2, -1), (1, -2))
@@ -17,7 +17,7 @@ _SAMPLE_M = 0.05
 
 
 class SafeGraph:
-    """Safe nodes on a grid, joined to up to sixteen neighbours; built once, asked often.
+    """Safe nodes on a grid, joined to up to sixteen neighbours; built once, searched often.
 
     The printed weight of an edge, the variance of the elevation along it, is zero along every
     contour, also across the steepest slope, and grows with the square of an edge's length. Here it
@@ -35,7 +35,7 @@ class SafeGraph:
         x = _centred(ground.x0_m + ground.size_m[0] / 2, w, config.node_spacing_m)
         y = _centred(ground.y0_m + ground.size_m[1] / 2, h, config.node_spacing_m)
         xx, yy = np.meshgrid(x, y)
-        safe = relief.risk(xx, yy) <= IN_HAND
+        safe = relief.risk(xx, yy) <= RISK_LIMIT
         index = np.where(safe, np.cumsum(safe).reshape(safe.shape) - 1, -1)
         self.nodes_m = np.stack([xx[safe], yy[safe]], axis=-1)
         """(n, 2) safe nodes."""
@@ -53,12 +53,12 @@ class SafeGraph:
             return None
         return int(np.argmin(gap))
 
-    def reaching(self, target: int) -> NDArray[np.bool_]:
+    def can_reach(self, target: int) -> NDArray[np.bool_]:
         """(n,) nodes from which ``target`` can be reached."""
         return np.isfinite(self._tree(target)[0])
 
-    def way(self, start: int, target: int) -> Floats | None:
-        """(m, 2) nodes of the cheapest way, both ends included; None if there is no way."""
+    def cheapest_path(self, start: int, target: int) -> Floats | None:
+        """(m, 2) nodes of the cheapest path, both ends included; None if there is none."""
         score, towards = self._tree(target)
         if not np.isfinite(score[start]):
             return None
@@ -67,7 +67,7 @@ class SafeGraph:
             at.append(int(towards[at[-1]]))
         return self.nodes_m[at]
 
-    def price(self, from_m: Floats, to_m: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def edge_cost(self, from_m: Floats, to_m: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """Weights of straight pieces (k, 2) to (k, 2), and whether each is safe all along."""
         config = self._relief.config
         length = np.hypot(*(to_m - from_m).T)
@@ -75,14 +75,14 @@ class SafeGraph:
         part = np.linspace(0.0, 1.0, count)[:, None, None]
         x, y = np.moveaxis(from_m + part * (to_m - from_m), -1, 0)
         variance = self._relief.variance_m2(x, y).mean(axis=0)
-        safe = np.asarray((self._relief.risk(x, y) <= IN_HAND).all(axis=0))
+        safe = np.asarray((self._relief.risk(x, y) <= RISK_LIMIT).all(axis=0))
         per_m = np.asarray(variance, float) / config.node_spacing_m + config.length_weight
         return length * per_m, safe
 
     def _tree(self, target: int) -> tuple[Floats, Indices]:
         """Score to ``target`` and the next node towards it, from every node.
 
-        Kept: a path laid again has the same waypoints and another start, and costs no search.
+        Cached: a path that is planned again has the same waypoints and another start.
         """
         if target not in self._trees:
             score, towards = dijkstra(
@@ -100,7 +100,7 @@ class SafeGraph:
             both = (here >= 0) & (there >= 0)
             pairs.append(np.stack([here[both], there[both]]))
         a, b = np.concatenate(pairs, axis=1)
-        weight, safe = self.price(self.nodes_m[a], self.nodes_m[b])
+        weight, safe = self.edge_cost(self.nodes_m[a], self.nodes_m[b])
         n = len(self.nodes_m)
         return csr_array(coo_array((weight[safe], (a[safe], b[safe])), shape=(n, n)))
 

@@ -13,7 +13,6 @@ from contextlib import suppress
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -23,36 +22,12 @@ from snakewalk.controller.kinematics.rotations import offset_rad
 from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
+from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.time_law import TimeLaw
 
 
-class Path(Protocol):
-    """A path over the ground, by arc length from its start."""
-
-    @property
-    def length_m(self) -> float:
-        """Arc length of the whole path."""
-        ...
-
-    def position(self, s_m: ArrayLike) -> Floats:
-        """(..., 2) points at arc lengths, clamped to the ends."""
-        ...
-
-    def follow(self, points_m: Floats, s_m: Floats, gap_m: Floats) -> None:
-        """Move (n,) arc lengths on to where (n, 2) points are nearest; write them and the gaps."""
-        ...
-
-    def nearest(self, point_m: ArrayLike, from_s_m: float = 0.0, window_m: float = 1.5) -> float:
-        """Arc length of the closest point in ``[from_s_m, from_s_m + window_m]``."""
-        ...
-
-    def first_pass(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
-        """Arc length at which the path first comes nearest to a point that it leads through."""
-        ...
-
-
-def aim_rad(path: Path, from_m: Floats, along_m: float, carrot_m: float) -> float:
+def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -> float:
     """Direction from a point to the carrot ``carrot_m`` beyond ``along_m`` on the path.
 
     The path is taken to go on straight past its end, or the last carrot would turn the body around.
@@ -77,7 +52,7 @@ _SHORTEST_STEP_S = 1e-5
 
 # Body lengths of track before another path may be planned: turning back takes about as much.
 _REPLAN_AFTER_BODIES = 2.0
-Planner = Callable[[Floats], Path]
+Planner = Callable[[Floats], SplinePath]
 """Plans a path through (n, 2) points in order."""
 
 
@@ -207,7 +182,7 @@ class Pilot:
     def _steer(self, dt_s: float, view: BodyView) -> Floats:
         followers_m = self._followers_m
         followers_m[0], followers_m[1] = view.centre_m[:2], view.link_m[0, :2]
-        self.path.follow(followers_m, self._along_m, self._gap_m)
+        self.path.project(followers_m, self._along_m, self._gap_m)
         self._count(followers_m[0], followers_m[1])
         self.decision = None
         if self.head >= self._chooser.track.end - _LOOKAHEAD_SEGMENTS:

@@ -12,12 +12,12 @@ from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.mechanics.traction import quasi_static_gain
 from snakewalk.controller.shape.crossing import self_touches
-from snakewalk.controller.shape.library import Refuse
+from snakewalk.controller.shape.library import ShapeFilter
 
 
 def shape_filters(
     robot: RobotConfig, friction: FrictionConfig, states: StatesConfig, points: int = 100
-) -> dict[str, Refuse]:
+) -> dict[str, ShapeFilter]:
     """Tests by reason, cheapest first: each takes shapes (S, points) to a mask (S,) of bad ones.
 
     No turn beyond ``states.turn_limit_rad``: a walk decides again after a part of a shape, so that

@@ -16,12 +16,12 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.controller.app.runs.rendered_camera import centre_of, seen_whole
+from snakewalk.controller.app.runs.rendered_camera import centre_of, require_whole_body
 from snakewalk.controller.capture.image.video import read_image
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
+    LineDetection,
     OverheadDetector,
-    Sighting,
 )
 from snakewalk.drivers.clock import Clock
 
@@ -45,7 +45,7 @@ class DeviceCamera:
         self.detector = overhead_detector(run, robot)
         self._name = f"camera {camera.device}"
         self._device = open_device(camera)
-        self._found: queue.SimpleQueue[Sighting | InputError] = queue.SimpleQueue()
+        self._found: queue.SimpleQueue[LineDetection | InputError] = queue.SimpleQueue()
         self._gone: InputError | None = None
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="overhead camera", daemon=True)
@@ -53,19 +53,19 @@ class DeviceCamera:
         try:
             self.start = self.first()
             """What the camera saw first."""
-            seen_whole(self.start, self._name)
+            require_whole_body(self.start, self._name)
         except InputError:
             self.close()
             raise
 
-    def first(self) -> Sighting:
+    def first(self) -> LineDetection:
         """Wait for the next frame.
 
         Raises:
             InputError: none comes.
 
         """
-        self.seen(self._clock.now_s())
+        self.arrived(self._clock.now_s())
         if self._gone is not None:
             raise self._gone
         try:
@@ -77,9 +77,9 @@ class DeviceCamera:
             raise found
         return found
 
-    def seen(self, now_s: float) -> list[Sighting]:
+    def arrived(self, now_s: float) -> list[LineDetection]:
         """Return what has been seen since the last call, up to ``now_s``."""
-        found: list[Sighting] = []
+        found: list[LineDetection] = []
         while not self._found.empty():
             one = self._found.get_nowait()
             if isinstance(one, InputError):

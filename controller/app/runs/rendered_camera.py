@@ -13,8 +13,8 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
+    LineDetection,
     OverheadDetector,
-    Sighting,
 )
 from snakewalk.drivers.clock import Clock
 
@@ -28,16 +28,16 @@ def centre_of(run: RunConfig) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def seen_whole(sighting: Sighting, camera: str) -> Sighting:
-    """Return the sighting.
+def require_whole_body(detection: LineDetection, camera: str) -> LineDetection:
+    """Return the detection.
 
     Raises:
         InputError: it does not show the whole body.
 
     """
-    if sighting.status is not FrameStatus.GOOD:
-        raise InputError(f"{camera}: the robot is not seen whole at its start: {sighting.status}")
-    return sighting
+    if detection.status is not FrameStatus.GOOD:
+        raise InputError(f"{camera}: the robot is not seen whole at its start: {detection.status}")
+    return detection
 
 
 class RenderedCamera:
@@ -69,17 +69,17 @@ class RenderedCamera:
         self._qpos, self._clock = qpos, clock
         self._period_s = 1.0 / run.camera.rate_hz
         self._next_s = clock.now_s()
-        self._coming: deque[Sighting] = deque()
-        seen_whole(self.first(), "the simulated camera")
+        self._coming: deque[LineDetection] = deque()
+        require_whole_body(self.first(), "the simulated camera")
 
-    def first(self) -> Sighting:
+    def first(self) -> LineDetection:
         """Look now."""
-        return self._look(self._clock.now_s())
+        return self._detect(self._clock.now_s())
 
-    def seen(self, now_s: float) -> list[Sighting]:
+    def arrived(self, now_s: float) -> list[LineDetection]:
         """Take a frame if one is due; return those that have arrived."""
         if now_s >= self._next_s - 1e-9:
-            self._coming.append(self._look(now_s))
+            self._coming.append(self._detect(now_s))
             missed = int((now_s - self._next_s) / self._period_s + 1e-9)
             self._next_s += (missed + 1) * self._period_s
         found = []
@@ -91,5 +91,5 @@ class RenderedCamera:
         """Free the frame buffer."""
         self._view.close()
 
-    def _look(self, now_s: float) -> Sighting:
+    def _detect(self, now_s: float) -> LineDetection:
         return self.detector.detect(self._view.picture(self._qpos()), now_s)

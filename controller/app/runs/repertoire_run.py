@@ -19,10 +19,9 @@ from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.repertoire.motion import RepertoireMotion
-from snakewalk.controller.repertoire.moves import Moves
 from snakewalk.controller.repertoire.repertoire import Repertoire
-from snakewalk.controller.repertoire.route import Follower
-from snakewalk.controller.repertoire.search import Route
+from snakewalk.controller.repertoire.route import RouteFollower
+from snakewalk.controller.repertoire.search import MotionPrimitives, Route
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent, OnProgress
 from snakewalk.drivers.types import BodyPose
@@ -43,9 +42,9 @@ class RepertoireRun:
     ground: HeightField | None = field(default=None, init=False)
 
     @cached_property
-    def moves(self) -> Moves:
-        """Moves of the repertoire, for this robot's length."""
-        return Moves(self.repertoire, self.robot.length_m / self.repertoire.length_m)
+    def primitives(self) -> MotionPrimitives:
+        """Motion primitives of the repertoire, for this robot's length."""
+        return MotionPrimitives(self.repertoire, self.robot.length_m / self.repertoire.length_m)
 
     @property
     def action_names(self) -> list[str]:
@@ -87,8 +86,8 @@ class RouteMotion:
 
     def __init__(self, prepared: RepertoireRun, on_event: OnEvent) -> None:
         run, route = prepared.run, prepared.route
-        self.follower = Follower(
-            prepared.moves,
+        self.follower = RouteFollower(
+            prepared.primitives,
             route,
             run.waypoints_m,
             run.waypoint_radius_m,
@@ -141,7 +140,7 @@ class RouteMotion:
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""
-        self.follower.watch(view)
+        self.follower.count_waypoints(view)
         if self.follower.done:
             self._motion.stop()
         return self._motion.step(dt_s, view)
@@ -181,7 +180,7 @@ class RouteRun:
 
     job: RepertoireRun
     finished: Finished
-    follower: Follower
+    follower: RouteFollower
 
     @property
     def complete(self) -> bool:

@@ -21,7 +21,7 @@ from snakewalk.controller.motion.source import MotionSource, Pace
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.runtime.forecast import Forecast, forecast, margin_faults
-from snakewalk.controller.shape.library import Refuse, StateLibrary, build_library
+from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.walk.joint_track import JointTrack
@@ -53,7 +53,7 @@ class WalkRun:
         return Retarget(self.robot, POINTS)
 
     @cached_property
-    def shape_filters(self) -> dict[str, Refuse]:
+    def shape_filters(self) -> dict[str, ShapeFilter]:
         """Tests of a shape: turn, joints in range, no self-contact, traction."""
         return shape_filters(self.robot, self.world.friction, self.run.states, POINTS)
 

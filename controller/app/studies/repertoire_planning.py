@@ -25,10 +25,15 @@ from snakewalk.controller.app.runs.repertoire_run import (
 )
 from snakewalk.controller.app.studies.repertoire_physics import FRAME_S, PhysicsBody
 from snakewalk.controller.repertoire.motion import RepertoireMotion
-from snakewalk.controller.repertoire.moves import Moves, start_pose
 from snakewalk.controller.repertoire.repertoire import load_repertoire
-from snakewalk.controller.repertoire.route import Follower
-from snakewalk.controller.repertoire.search import AIM_SHARE, Route, search
+from snakewalk.controller.repertoire.route import RouteFollower
+from snakewalk.controller.repertoire.search import (
+    AIM_SHARE,
+    MotionPrimitives,
+    Route,
+    plane_pose,
+    search,
+)
 
 FORMAT = "snakewalk-plan-1"
 
@@ -71,12 +76,12 @@ def plan_route(
             f"{file}: recorded on world {repertoire.world}; run {run.name} is on "
             f"{ground.name}: give --world {repertoire.world}, or record there"
         )
-    moves = Moves(repertoire, body.length_m / repertoire.length_m)
+    primitives = MotionPrimitives(repertoire, body.length_m / repertoire.length_m)
     first = int(np.argmax([segment.speed_m_s for segment in repertoire.segments]))
-    start = start_pose(initial_frame(run, body, pose_of_action(run, body, repertoire, first)))
-    route = search(moves, start, run.waypoints_m, AIM_SHARE * run.waypoint_radius_m, beam=beam)
+    start = plane_pose(initial_frame(run, body, pose_of_action(run, body, repertoire, first)))
+    route = search(primitives, start, run.waypoints_m, AIM_SHARE * run.waypoint_radius_m, beam=beam)
     if route.reached < len(run.waypoints_m):
-        route = search(moves, start, run.waypoints_m, run.waypoint_radius_m, beam=beam)
+        route = search(primitives, start, run.waypoints_m, run.waypoint_radius_m, beam=beam)
     if route.reached < len(run.waypoints_m):
         raise InputError(
             f"run {run.name}: no sequence of these actions passes waypoint {route.reached + 1} "
@@ -221,33 +226,35 @@ def search_cost(
     found = job.route
     for _ in range(TRIES):
         begun = time.process_time()
-        found = search(job.moves, start, run.waypoints_m, aimed_m, beam=beam)
+        found = search(job.primitives, start, run.waypoints_m, aimed_m, beam=beam)
         best = min(best, time.process_time() - begun)
     random = np.random.default_rng(seed)
     spent, ran = 0.0, 0
     while ran < candidates:
         count = min(length, candidates - ran)
-        actions = tuple(int(k) for k in random.integers(len(job.moves.duration_s), size=count))
+        actions = tuple(int(k) for k in random.integers(len(job.primitives.duration_s), size=count))
         spent += physics_route(job, actions)[0]
         ran += count
         on_progress(ran)
     return SearchCost(best / found.candidates, spent / ran, ran, found.candidates)
 
 
-def physics_route(job: RepertoireRun, actions: tuple[int, ...]) -> tuple[float, Follower]:
+def physics_route(job: RepertoireRun, actions: tuple[int, ...]) -> tuple[float, RouteFollower]:
     """Run a sequence on the simulated robot open loop; return its CPU time and its follower."""
     pose = [job.route.pose[0]]
     for action in actions:
-        pose.append(job.moves.after(pose[-1], action))
+        pose.append(job.primitives.after(pose[-1], action))
     route = Route(actions, np.array(pose), 0, 0.0, 1)
     run = job.run
-    follower = Follower(job.moves, route, run.waypoints_m, run.waypoint_radius_m, replan=False)
+    follower = RouteFollower(
+        job.primitives, route, run.waypoints_m, run.waypoint_radius_m, replan=False
+    )
     motion = RepertoireMotion(job.repertoire, job.robot, actions[0], follower.choose)
     pose_rad = pose_of_action(run, job.robot, job.repertoire, actions[0]).joint_rad
     with PhysicsBody(job.robot, job.world, pose_rad, run.start_m, job.start_heading_rad) as body:
         begun = time.process_time()
         while not motion.stopping:
             view = body.view()
-            follower.watch(view)
+            follower.count_waypoints(view)
             body.frame(motion.step(FRAME_S, view))
         return time.process_time() - begun, follower

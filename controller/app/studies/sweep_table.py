@@ -100,7 +100,7 @@ def number(row: dict[str, str], key: str) -> float:
     return float(row[key]) if row[key] else float("nan")
 
 
-UNITS: dict[Aim, str] = {"way": "m/s", "climb": "m/s up", "turn": "rad/s"}
+UNITS: dict[Aim, str] = {"advance": "m/s", "climb": "m/s up", "turn": "rad/s"}
 
 
 def digest(rows: list[dict[str, str]]) -> list[dict[str, object]]:

@@ -1,1 +1,1 @@
-"""cpg."""
+"""The central pattern generator: coupled oscillators that run any gait and change between them."""

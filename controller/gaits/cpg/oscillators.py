@@ -16,27 +16,64 @@ The phase differences ``phi_ij = beta_j - beta_i`` are those of a gait: with ``e
 neighbours are coupled and none in a ring, so every start but a set of measure 0 ends in step.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.gaits.cpg.course import course, judged, pulled
-from snakewalk.controller.gaits.cpg.damped import Damped
 from snakewalk.controller.gaits.cpg.pattern import HARMONICS, Pattern
+from snakewalk.controller.gaits.cpg.trajectory import coupling_rates, peak_share, trajectory
 from snakewalk.controller.gaits.wave import TURN
 
 COUPLING_PER_S = 20.0
 LONGEST_STEP_S = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Damped:
+    """A critically damped approach to a goal: ``z'' = a (a/4 (Z - z) - z')``.
+
+    In closed form ``Z + (A + B t) e^(-a t/2)``, from a value and a rate.
+    """
+
+    goal: Floats
+    left: Floats
+    slope: Floats
+    gain: float
+
+    @staticmethod
+    def start(value: Floats, rate: Floats, goal: Floats, gain: float) -> "Damped":
+        """Begin from values and rates of any one shape."""
+        left = value - goal
+        return Damped(goal, left, rate + 0.5 * gain * left, gain)
+
+    def at(self, t_s: Floats | float) -> tuple[Floats, Floats]:
+        """Value and rate at a time, or one value's at times (T,)."""
+        h = 0.5 * self.gain
+        fading = np.exp(-h * t_s)
+        line = self.left + self.slope * t_s
+        return self.goal + line * fading, (self.slope - h * line) * fading
+
+    def sum(self, t_s: Floats | float) -> Floats:
+        """Integral of the value from 0 to a time, or one value's to times (T,)."""
+        h = 0.5 * self.gain
+        fading = np.exp(-h * t_s)
+        fallen = (1.0 - fading) / h
+        ramp = (fallen - t_s * fading) / h
+        return np.asarray(self.goal * t_s + self.left * fallen + self.slope * ramp)
+
+
 CpgState = tuple[Damped, Damped, float, float, Pattern]
 
 
 class Cpg:
-    """J oscillators, at rest until ``become``."""
+    """J oscillators, at rest until ``set_pattern``."""
 
     def __init__(self, joint_rad: Floats) -> None:
         """Start at rest at angles (J,)."""
         self.joints = len(joint_rad)
         self.pattern = Pattern.rest(joint_rad)
-        self.astray_rad: Floats = np.zeros(self.joints)
+        self.phase_error_rad: Floats = np.zeros(self.joints)
         """(J,) eps: each oscillator's phase less that of the pattern; add to it to disturb them."""
         self._phase_rad = 0.0
         self._t_s = 0.0
@@ -45,8 +82,10 @@ class Cpg:
         self._slow = Damped.start(state, np.zeros_like(state), state, 1.0)
         self._clock = Damped.start(still, still, still, 1.0)
 
-    def become(self, pattern: Pattern, gain: float = 6.0, clock_gain: float | None = None) -> None:
-        """Go to another pattern; amplitudes settle within about ``10 / gain`` seconds."""
+    def set_pattern(
+        self, pattern: Pattern, gain: float = 6.0, clock_gain: float | None = None
+    ) -> None:
+        """Change to another pattern; amplitudes settle within about ``10 / gain`` seconds."""
         value, rate = self._slow.at(self._t_s)
         omega, omega_rate = self._clock.at(self._t_s)
         self._phase_rad = float(self._phase_rad + self._clock.sum(self._t_s)[0]) % TURN
@@ -59,47 +98,47 @@ class Cpg:
         self._t_s = 0.0
         self.pattern = pattern
 
-    def now(self) -> CpgState:
+    def state(self) -> CpgState:
         """Everything that changes, for ``restore``."""
         return self._slow, self._clock, self._t_s, self._phase_rad, self.pattern
 
     def restore(self, state: CpgState) -> None:
-        """Go back to what ``now`` returned."""
+        """Go back to what ``state`` returned."""
         self._slow, self._clock, self._t_s, self._phase_rad, self.pattern = state
 
-    def skip(self, time_s: float) -> None:
-        """Go on by a time without looking."""
+    def advance(self, time_s: float) -> None:
+        """Go on by a time."""
         self._t_s += time_s
 
     def step(self, dt_s: float) -> Floats:
         """Go on by ``dt_s``; returns the angles (J,)."""
         self._t_s += dt_s
-        if self.astray_rad.any():
+        if self.phase_error_rad.any():
             parts = int(np.ceil(dt_s / LONGEST_STEP_S))
             for _ in range(parts):
-                h, e = dt_s / parts, self.astray_rad
-                one = _pull(e)
-                two = _pull(e + 0.5 * h * one)
-                three = _pull(e + 0.5 * h * two)
-                four = _pull(e + h * three)
-                self.astray_rad = e + h / 6.0 * (one + 2.0 * two + 2.0 * three + four)
+                h, e = dt_s / parts, self.phase_error_rad
+                one = _coupling(e)
+                two = _coupling(e + 0.5 * h * one)
+                three = _coupling(e + 0.5 * h * two)
+                four = _coupling(e + h * three)
+                self.phase_error_rad = e + h / 6.0 * (one + 2.0 * two + 2.0 * three + four)
         return self.angle_rad()
 
     def angle_rad(self) -> Floats:
         """(J,) now."""
-        return np.asarray(self.ahead(np.zeros(1))[0][0])
+        return np.asarray(self.predict(np.zeros(1))[0][0])
 
     def velocity_rad_s(self) -> Floats:
         """(J,) now."""
-        return np.asarray(self.ahead(np.zeros(1))[1][0])
+        return np.asarray(self.predict(np.zeros(1))[1][0])
 
-    def ahead(self, t_s: Floats) -> tuple[Floats, Floats]:
-        """Angles and speeds (T, J) at times (T,) from now, ``astray_rad`` staying as it is."""
+    def predict(self, t_s: Floats) -> tuple[Floats, Floats]:
+        """Angles and speeds (T, J) at times (T,) from now, ``phase_error_rad`` staying as it is."""
         angle, speed = np.empty((2, len(t_s), self.joints))
-        course(*self._course(t_s), angle, speed)
+        trajectory(*self._trajectory_arguments(t_s), angle, speed)
         return angle, speed
 
-    def judge(
+    def peak_share(
         self, t_s: Floats, speed_rad_s: Floats, acceleration_rad_s2: Floats, enough: float
     ) -> tuple[float, Floats, Floats]:
         """Largest share of limits (J,) that is reached at even times (T,) from now.
@@ -111,18 +150,26 @@ class Cpg:
         """
         fast, hard = np.zeros((2, self.joints))
         limits = speed_rad_s, acceleration_rad_s2
-        return judged(*self._course(t_s), *limits, enough, fast, hard), fast, hard
+        return peak_share(*self._trajectory_arguments(t_s), *limits, enough, fast, hard), fast, hard
 
-    def _course(
+    def _trajectory_arguments(
         self, t_s: Floats
     ) -> tuple[Floats, Floats, Floats, Floats, Floats, float, Floats, Floats]:
-        """Return what the loops of ``cpg_course`` take first."""
+        """First arguments of the loops in ``trajectory``."""
         slow, turn = self._slow, self._clock
         clock = np.array(
             [self._phase_rad, turn.goal[0], turn.left[0], turn.slope[0], 0.5 * turn.gain]
         )
-        astray = self.astray_rad, _pull(self.astray_rad)
-        return self._t_s + t_s, clock, slow.goal, slow.left, slow.slope, 0.5 * slow.gain, *astray
+        phase_error = self.phase_error_rad, _coupling(self.phase_error_rad)
+        return (
+            self._t_s + t_s,
+            clock,
+            slow.goal,
+            slow.left,
+            slow.slope,
+            0.5 * slow.gain,
+            *phase_error,
+        )
 
 
 def _packed(pattern: Pattern, bias_rad: Floats) -> Floats:
@@ -134,8 +181,8 @@ def _packed(pattern: Pattern, bias_rad: Floats) -> Floats:
     return state
 
 
-def _pull(astray_rad: Floats) -> Floats:
+def _coupling(phase_error_rad: Floats) -> Floats:
     """(J,) coupling of neighbours along the body."""
-    out = np.empty(len(astray_rad))
-    pulled(astray_rad, COUPLING_PER_S, out)
+    out = np.empty(len(phase_error_rad))
+    coupling_rates(phase_error_rad, COUPLING_PER_S, out)
     return out

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadDetector
-from snakewalk.controller.localization.pose_fit import both_ways
+from snakewalk.controller.localization.pose_fit import fit_both_ends
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.rendering.top_view import TopView
 
@@ -25,7 +25,7 @@ def main(file: Path) -> None:
     image = view.picture(plant.qpos)
     view.close()
     shape, line_m = detector.detect_px(image).silhouette, detector.detect(image, 0.0).line_m
-    fits = both_ways(robot, line_m, plant.position_rad)
+    fits = fit_both_ends(robot, line_m, plant.position_rad)
     fit = min(fits, key=lambda one: one.error_m)
     links = model.in_image(fit.links_m, robot.body_radius_m)
     line = model.in_image(line_m, robot.body_radius_m)

@@ -25,9 +25,9 @@ CHANGES = tuple(itertools.pairwise((*NAMES, NAMES[0], NAMES[5], NAMES[7], NAMES[
 
 def settled(gait: Gait, rng: np.random.Generator | None = None) -> Cpg:
     cpg = Cpg(np.zeros(16))
-    cpg.become(Pattern.of(gait, ROBOT, 3.0), gain=6.0)
+    cpg.set_pattern(Pattern.of(gait, ROBOT, 3.0), gain=6.0)
     if rng is not None:
-        cpg.astray_rad = rng.uniform(-np.pi, np.pi, 16)
+        cpg.phase_error_rad = rng.uniform(-np.pi, np.pi, 16)
     for _ in range(round(20.0 / DT_S)):
         cpg.step(DT_S)
     return cpg
@@ -55,7 +55,7 @@ def test_it_comes_into_step_from_any_phases() -> None:
     cycle = gait.joints_rad(ROBOT, PHASES)
     for _ in range(5):
         cpg = settled(gait, rng)
-        differences = np.mod(np.diff(cpg.astray_rad) + np.pi, 2.0 * np.pi) - np.pi
+        differences = np.mod(np.diff(cpg.phase_error_rad) + np.pi, 2.0 * np.pi) - np.pi
         assert np.abs(differences).max() < 1e-3
         assert np.abs(cycle - cpg.angle_rad()).max(axis=1).min() < 0.01
 
@@ -64,11 +64,11 @@ def test_it_comes_into_step_at_the_rate_of_the_chains_slowest_mode() -> None:
     """``2 w (1 - cos(pi / n))``: the smallest eigenvalue of a chain's coupling."""
     cpg = Cpg(np.zeros(16))
     mode = np.cos(np.pi * (np.arange(16) + 0.5) / 16)
-    cpg.astray_rad = 1e-3 * mode
+    cpg.phase_error_rad = 1e-3 * mode
     for _ in range(100):
         cpg.step(DT_S)
     rate = 2.0 * 20.0 * (1.0 - np.cos(np.pi / 16))
-    np.testing.assert_allclose(cpg.astray_rad, 1e-3 * mode * np.exp(-2.0 * rate), rtol=1e-4)
+    np.testing.assert_allclose(cpg.phase_error_rad, 1e-3 * mode * np.exp(-2.0 * rate), rtol=1e-4)
 
 
 def test_angle_and_speed_do_not_jump_where_the_pattern_changes() -> None:
@@ -78,7 +78,7 @@ def test_angle_and_speed_do_not_jump_where_the_pattern_changes() -> None:
     for name in rng.permutation(NAMES):
         angle, speed = cpg.angle_rad(), cpg.velocity_rad_s()
         gain = float(rng.uniform(1.0, 10.0))
-        cpg.become(Pattern.of(GAITS[name](), ROBOT, rng.uniform(0.5, 6.0)), gain)
+        cpg.set_pattern(Pattern.of(GAITS[name](), ROBOT, rng.uniform(0.5, 6.0)), gain)
         np.testing.assert_allclose(cpg.angle_rad(), angle, atol=1e-9)
         np.testing.assert_allclose(cpg.velocity_rad_s(), speed, atol=1e-8)
         for _ in range(int(rng.integers(3, 60))):
@@ -113,7 +113,7 @@ def test_a_disturbed_pattern_returns_to_the_gait() -> None:
     motion.become(gait)
     for _ in range(400):
         motion.step(DT_S, None)  # type: ignore[arg-type]
-    motion.cpg.astray_rad = motion.cpg.astray_rad + np.linspace(-1.0, 1.0, 16)
+    motion.cpg.phase_error_rad = motion.cpg.phase_error_rad + np.linspace(-1.0, 1.0, 16)
     cycle = gait.joints_rad(ROBOT, PHASES)
     away = np.abs(cycle - motion.goal_rad()).max(axis=1).min()
     for _ in range(600):

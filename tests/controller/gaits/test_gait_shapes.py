@@ -62,7 +62,7 @@ def test_every_gait_says_what_it_is_and_every_parameter_has_a_range(gait: type[G
     for name, span in ranges(gait.model).items():
         assert span.low < span.high, name
         assert span.low <= span.default <= span.high, name
-        assert span.said, name
+        assert span.description, name
 
 
 def test_all_faults_of_parameters_are_reported_at_once() -> None:

@@ -14,10 +14,10 @@ from snakewalk.controller.localization.camera_pose import CameraPose
 from snakewalk.controller.localization.dead_reckoning import DeadReckoning
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
+    LineDetection,
     OverheadDetector,
-    Sighting,
 )
-from snakewalk.controller.localization.pose_fit import both_ways
+from snakewalk.controller.localization.pose_fit import fit_both_ends
 from snakewalk.drivers.types import BodyPose, JointState
 from tests.oracles.overhead_scene import DrawnView
 
@@ -52,7 +52,7 @@ def test_head_and_heading_are_found_to_a_third_of_a_pixel(heading: float, bend: 
     pose = pose_at(head, heading)
     seen = DETECTOR.detect(VIEW.picture(pose, bend), 0.0)
     assert seen.status is FrameStatus.GOOD
-    fits = both_ways(ROBOT, seen.line_m, bend)
+    fits = fit_both_ends(ROBOT, seen.line_m, bend)
     near = min(fits, key=lambda fit: np.hypot(*(fit.head_m - head)))
     assert np.hypot(*(near.head_m - head)) < 0.0031  # 9.4 mm a pixel
     assert turn_between(near.heading_rad, heading) < 0.006
@@ -65,7 +65,7 @@ def test_the_joints_tell_the_head_from_the_tail_where_the_shape_has_two_ends() -
     pose = pose_at(np.array([0.4, 0.2]), 0.5)
     line = DETECTOR.detect(VIEW.picture(pose, coiled_in_front), 0.0).line_m
     for seen in (line, line[::-1]):
-        better = min(both_ways(ROBOT, seen, coiled_in_front), key=lambda fit: fit.error_m)
+        better = min(fit_both_ends(ROBOT, seen, coiled_in_front), key=lambda fit: fit.error_m)
         np.testing.assert_allclose(better.head_m, (0.4, 0.2), atol=0.005)
 
 
@@ -76,44 +76,44 @@ def test_one_bad_stretch_of_the_line_hardly_moves_the_fit() -> None:
         [np.interp(np.linspace(-0.5, 16.5, 171), np.arange(17), axis) for axis in links.T]
     )
     line[80:100, 1] += 0.05 * np.sin(np.linspace(0.0, np.pi, 20))
-    bent = both_ways(ROBOT, line, bend)[0]
+    bent = fit_both_ends(ROBOT, line, bend)[0]
     assert np.hypot(*bent.head_m) < 0.008
 
 
 def test_a_hidden_tail_does_not_pull_a_bent_body_back() -> None:
     bend = wave(0.4, 0.0)
-    whole = sighting(0.0, pose_at(np.zeros(2), 0.0), bend).line_m[::-1]
+    whole = detection(0.0, pose_at(np.zeros(2), 0.0), bend).line_m[::-1]
     cut = whole[:-6]  # 42 mm: the middle moves by 21 mm
-    assert np.hypot(*both_ways(ROBOT, cut, bend)[0].head_m) < 0.006
+    assert np.hypot(*fit_both_ends(ROBOT, cut, bend)[0].head_m) < 0.006
 
 
 @dataclass
 class Scene:
     """A camera that hands over a list of frames, each ``delay_s`` after it was taken."""
 
-    frames: list[Sighting]
+    frames: list[LineDetection]
     delay_s: float = 1.0 / 30.0
-    start: Sighting | None = None
+    start: LineDetection | None = None
     handed: int = field(default=0)
 
-    def first(self) -> Sighting:
+    def first(self) -> LineDetection:
         return self.start or self.frames[0]
 
-    def seen(self, now_s: float) -> list[Sighting]:
+    def arrived(self, now_s: float) -> list[LineDetection]:
         due = [one for one in self.frames if one.time_s + self.delay_s <= now_s]
         new = due[self.handed :]
         self.handed = len(due)
         return new
 
 
-def sighting(time_s: float, pose: BodyPose, bend: np.ndarray) -> Sighting:
+def detection(time_s: float, pose: BodyPose, bend: np.ndarray) -> LineDetection:
     """Exact, without an image: the line through the links, its ends in either order."""
     body = body_in_world(ROBOT, pose, bend)
     links, half = body.link_m[:, :2], 0.5 * ROBOT.link_length_m * body.forward[:, :2]
     corners = np.vstack([links[0] + half[0], links, links[-1] - half[-1]])
     at = np.concatenate([[0.0], np.arange(17) + 0.5, [17.0]])
     line = np.column_stack([np.interp(np.linspace(0, 17, 171), at, axis) for axis in corners.T])
-    return Sighting(time_s, line[::-1].copy(), FrameStatus.GOOD)
+    return LineDetection(time_s, line[::-1].copy(), FrameStatus.GOOD)
 
 
 def believer(scene: Scene, said: list[str], start=(0.0, 0.0), heading=0.0) -> CameraPose:
@@ -126,7 +126,7 @@ def test_a_late_frame_is_laid_to_the_joints_of_its_own_time() -> None:
     reckoning = DeadReckoning(ROBOT, FrictionConfig(), (0.7, -0.4), 1.1)
     states = [state_at(0.02 * k, wave(0.4, 0.08 * k)) for k in range(60)]
     true = [reckoning(state) for state in states]
-    frames = [sighting(states[k].time_s, true[k], states[k].position_rad) for k in range(0, 60, 3)]
+    frames = [detection(states[k].time_s, true[k], states[k].position_rad) for k in range(0, 60, 3)]
     pose = believer(Scene(frames), [], start=(0.5, -0.5), heading=0.8)
     for state, truth in zip(states, true, strict=True):
         found = pose(state)
@@ -139,7 +139,7 @@ def test_a_late_frame_is_laid_to_the_joints_of_its_own_time() -> None:
 def test_a_body_laid_straight_has_its_head_where_the_run_says() -> None:
     straight = np.zeros(16)
     truth = pose_at(np.array([0.1, 0.05]), 0.1)
-    pose = believer(Scene([sighting(0.0, truth, straight)]), [])
+    pose = believer(Scene([detection(0.0, truth, straight)]), [])
     found = pose(state_at(0.0, straight))
     np.testing.assert_allclose(found.head_in_world_m[:2], (0.1, 0.05), atol=1e-3)
     assert turn_between(found.heading_rad, 0.1) < 1e-3
@@ -148,7 +148,7 @@ def test_a_body_laid_straight_has_its_head_where_the_run_says() -> None:
 def test_a_body_laid_the_wrong_way_round_is_found_at_its_first_bend() -> None:
     bend = np.where(NUMBER < 8, 0.25, 0.0)
     truth = pose_at(np.array([-1.1, 0.0]), 3.0)
-    pose = believer(Scene([sighting(0.0, truth, bend)]), [])
+    pose = believer(Scene([detection(0.0, truth, bend)]), [])
     found = pose(state_at(0.0, bend))
     np.testing.assert_allclose(found.head_in_world_m[:2], (-1.1, 0.0), atol=4e-3)
 
@@ -157,9 +157,9 @@ def test_frames_that_cannot_be_used_are_bridged_and_told() -> None:
     bend = wave(0.3, 0.0)
     truth = pose_at(np.array([0.3, 0.3]), 0.4)
     nothing = np.full((101, 2), np.nan)
-    frames = [sighting(0.0, truth, bend)]
-    frames += [Sighting(k / 30.0, nothing, FrameStatus.CUT) for k in range(1, 20)]
-    frames += [sighting(k / 30.0, truth, bend) for k in range(20, 30)]
+    frames = [detection(0.0, truth, bend)]
+    frames += [LineDetection(k / 30.0, nothing, FrameStatus.CUT) for k in range(1, 20)]
+    frames += [detection(k / 30.0, truth, bend) for k in range(20, 30)]
     said: list[str] = []
     pose = believer(Scene(frames, start=frames[0]), said, heading=0.4)
     for k in range(50):
@@ -174,7 +174,7 @@ def test_frames_that_cannot_be_used_are_bridged_and_told() -> None:
 def test_something_else_than_the_robot_is_not_believed() -> None:
     bend = wave(0.4, 0.0)
     truth = pose_at(np.zeros(2), 0.0)
-    good = sighting(0.0, truth, bend)
+    good = detection(0.0, truth, bend)
     stick = replace(good, time_s=0.1, line_m=np.linspace((1.0, 1.0), (1.0, 2.2), 101))
     said: list[str] = []
     pose = believer(Scene([good, stick]), said)

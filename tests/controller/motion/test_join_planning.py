@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.gaits.cpg.course import FAINT
 from snakewalk.controller.gaits.cpg.oscillators import Cpg
 from snakewalk.controller.gaits.cpg.pattern import Pattern
+from snakewalk.controller.gaits.cpg.trajectory import NEGLIGIBLE
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.gaits.spine import SpineParameters, offset, spine_bends_rad
 from snakewalk.controller.motion.blend import DURATIONS_S, shortest_join_s
@@ -54,18 +54,18 @@ def test_no_time_is_long_enough_for_a_target_beyond_the_limits() -> None:
 @pytest.mark.parametrize("name", ["sidewinding", "concertina", "subcarangiform"])
 def test_a_course_is_judged_by_what_it_will_be(name: str) -> None:
     cpg = Cpg(np.linspace(-0.3, 0.3, 16))
-    cpg.become(Pattern.of(GAITS["rolling"](), ROBOT, 2.0), 3.0)
-    cpg.skip(0.7)
-    cpg.become(Pattern.of(GAITS[name](), ROBOT, 3.0), 2.0)
+    cpg.set_pattern(Pattern.of(GAITS["rolling"](), ROBOT, 2.0), 3.0)
+    cpg.advance(0.7)
+    cpg.set_pattern(Pattern.of(GAITS[name](), ROBOT, 3.0), 2.0)
     times_s = np.arange(0.0, 7.0, 0.02)
-    speed = cpg.ahead(times_s)[1]
+    speed = cpg.predict(times_s)[1]
     hard = np.abs(np.diff(speed, axis=0)).max(axis=0) / 0.02
     limits = LIMIT.speed_rad_s, LIMIT.acceleration_rad_s2
-    over, fast, hardest = cpg.judge(times_s, *limits, np.inf)
-    np.testing.assert_allclose(fast, np.abs(speed).max(axis=0), atol=FAINT * limits[0].min())
-    np.testing.assert_allclose(hardest, hard, atol=FAINT * limits[1].min())
+    over, fast, hardest = cpg.peak_share(times_s, *limits, np.inf)
+    np.testing.assert_allclose(fast, np.abs(speed).max(axis=0), atol=NEGLIGIBLE * limits[0].min())
+    np.testing.assert_allclose(hardest, hard, atol=NEGLIGIBLE * limits[1].min())
     assert over == max((fast / limits[0]).max(), (hardest / limits[1]).max())
-    half, least, _ = cpg.judge(times_s, *limits, 0.5 * over)
+    half, least, _ = cpg.peak_share(times_s, *limits, 0.5 * over)
     assert 0.5 * over < half <= over
     assert (least <= fast).all()
 

@@ -17,7 +17,7 @@ def test_a_crowd_replays_as_one_body_does(repertoire: Repertoire) -> None:
     scales = random.uniform(0.5, 2.0, size=20)
     which = random.integers(len(repertoire.segments), size=20)
     for body, start in enumerate(starts):
-        crowd.put(body, start, segment=int(which[body]), scale=float(scales[body]))
+        crowd.place(body, start, segment=int(which[body]), scale=float(scales[body]))
     crowd.step(40)
     for body, start in enumerate(starts):
         one = replay(repertoire.segments[which[body]], start, float(scales[body]))
@@ -35,7 +35,7 @@ def test_a_change_is_bridged_and_an_unseen_body_changes_at_once(repertoire: Repe
     crowd = Crowd(repertoire, 2)
     crowd.visible[1] = False
     for body in (0, 1):
-        crowd.put(body, start, segment=a)
+        crowd.place(body, start, segment=a)
     crowd.segment[:] = b
     for k in range(pair[0].frames + 20):
         crowd.step()
@@ -58,7 +58,7 @@ def test_far_bodies_follow_the_same_way_and_can_be_seen_again(repertoire: Repert
 
 def test_axes_stay_square_for_an_hour(repertoire: Repertoire) -> None:
     crowd = Crowd(repertoire, 1)
-    crowd.put(0, Frame.flat(0, 0, 0), segment=repertoire.index("left-sharp"))
+    crowd.place(0, Frame.flat(0, 0, 0), segment=repertoire.index("left-sharp"))
     crowd.visible[0] = False
     crowd.step(20_000)
     axes = crowd.rotation[0].reshape(3, 3)

@@ -23,10 +23,9 @@ from snakewalk.controller.app.studies.repertoire_planning import (
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.repertoire.motion import RepertoireMotion
-from snakewalk.controller.repertoire.moves import Moves, start_pose
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.replay import replay
-from snakewalk.controller.repertoire.search import search
+from snakewalk.controller.repertoire.search import MotionPrimitives, plane_pose, search
 from snakewalk.drivers.types import BodyPose
 
 
@@ -38,43 +37,46 @@ def file(repertoire: Repertoire, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 
 def test_the_search_predicts_what_replay_does(repertoire: Repertoire) -> None:
-    moves = Moves(repertoire)
-    route = search(moves, [0.0, 0.0, 0.3], [(2.0, 1.0), (3.0, -0.5)], 0.25)
+    primitives = MotionPrimitives(repertoire)
+    route = search(primitives, [0.0, 0.0, 0.3], [(2.0, 1.0), (3.0, -0.5)], 0.25)
     assert route.reached == 2
     at = Frame.flat(0.0, 0.0, 0.3)
     for action, pose in zip(route.actions, route.pose[1:], strict=True):
         at = replay(repertoire.segments[action], at).end
-        found = start_pose(at)
+        found = plane_pose(at)
         np.testing.assert_allclose(found[:2], pose[:2], atol=1e-4)
         assert np.cos(found[2] - pose[2]) == pytest.approx(1.0, abs=1e-6)
-    assert route.duration_s == pytest.approx(sum(moves.duration_s[list(route.actions)]))
+    assert route.duration_s == pytest.approx(sum(primitives.duration_s[list(route.actions)]))
 
 
 def test_a_wide_beam_finds_the_quickest_of_all_sequences(repertoire: Repertoire) -> None:
-    moves = Moves(repertoire)
+    primitives = MotionPrimitives(repertoire)
     goal, radius = np.array([1.6, 0.9]), 0.25
-    route = search(moves, [0.0, 0.0, 0.0], [tuple(goal)], radius, beam=10_000)
+    route = search(primitives, [0.0, 0.0, 0.0], [tuple(goal)], radius, beam=10_000)
     best = np.inf
     for length in (1, 2, 3):
-        for actions in itertools.product(range(len(moves.duration_s)), repeat=length):
+        for actions in itertools.product(range(len(primitives.duration_s)), repeat=length):
             pose, hit = np.zeros(3), False
             for action in actions:
                 c, s = np.cos(pose[2]), np.sin(pose[2])
-                way = moves.way[action, :, :2] @ np.array([[c, s], [-s, c]]) + pose[:2]
+                way = primitives.travel[action, :, :2] @ np.array([[c, s], [-s, c]]) + pose[:2]
                 hit = bool((np.hypot(*(way - goal).T) <= radius).any())
-                pose = moves.after(pose, action)
+                pose = primitives.after(pose, action)
             if hit:
-                best = min(best, float(moves.duration_s[list(actions)].sum()))
+                best = min(best, float(primitives.duration_s[list(actions)].sum()))
     assert route.reached == 1
     assert len(route.actions) <= 3
     assert route.duration_s == pytest.approx(best)
 
 
 def test_out_of_reach_the_best_so_far_is_returned(repertoire: Repertoire) -> None:
-    route = search(Moves(repertoire), np.zeros(3), [(90.0, 0.0)], 0.2, depth=3)
+    route = search(MotionPrimitives(repertoire), np.zeros(3), [(90.0, 0.0)], 0.2, depth=3)
     assert route.reached == 0
     assert len(route.actions) == 3
-    assert search(Moves(repertoire), np.zeros(3), [(1.0, 0.0)], 0.2, reached=1).actions == ()
+    assert (
+        search(MotionPrimitives(repertoire), np.zeros(3), [(1.0, 0.0)], 0.2, reached=1).actions
+        == ()
+    )
 
 
 def test_joints_go_from_action_to_action_within_the_limits(repertoire: Repertoire) -> None:

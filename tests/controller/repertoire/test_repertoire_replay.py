@@ -11,9 +11,14 @@ from numpy.typing import NDArray
 from snakewalk.config.errors import InputError
 from snakewalk.controller.kinematics.frame import Frame, body_frame
 from snakewalk.controller.repertoire.repertoire import Repertoire, load_repertoire
-from snakewalk.controller.repertoire.replay import replay, replay_all
+from snakewalk.controller.repertoire.replay import (
+    bridge,
+    bridge_frames,
+    replay,
+    replay_all,
+    tip_travel_m,
+)
 from snakewalk.controller.repertoire.segment import Segment, cut
-from snakewalk.controller.repertoire.warp import bridge, bridge_frames, tip_way_m
 
 Floats = NDArray[np.float64]
 
@@ -153,7 +158,7 @@ def test_between_recorded_actions_the_tail_never_goes_too_far(repertoire: Repert
     largest = 0.01
     found = replay_all([segments[1], segments[3], segments[0]], Frame.flat(1, 2, 0.3), 1.0, largest)
     expected = sum(
-        bridge_frames(tip_way_m(a.link_m[-1], b.link_m[0]), largest)
+        bridge_frames(tip_travel_m(a.link_m[-1], b.link_m[0]), largest)
         for a, b in ((segments[1], segments[3]), (segments[3], segments[0]))
     )
     assert expected > 5

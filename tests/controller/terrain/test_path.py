@@ -61,7 +61,7 @@ def test_followers_go_where_each_is_nearest_and_know_how_far_away() -> None:
     points = np.random.default_rng(3).uniform(0.0, 4.0, (20, 2))
     start_m = np.linspace(0.0, path.length_m, 20)
     at_m, gap_m = start_m.copy(), np.empty(20)
-    path.follow(points, at_m, gap_m)
+    path.project(points, at_m, gap_m)
     assert at_m.tolist() == [path.nearest(p, s) for p, s in zip(points, start_m, strict=True)]
     assert gap_m == pytest.approx(np.hypot(*(path.position(at_m) - points).T))
     table = np.arange(0.0, path.length_m, 0.001)

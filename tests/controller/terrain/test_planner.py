@@ -51,7 +51,7 @@ def test_on_level_ground_variance_ties_and_length_decides() -> None:
     graph = TerrainPlanner(field(lambda x, y: 0.0 * x), CONFIG).graph
     assert graph is not None
     a, b = graph.nearest(np.array([-1.5, -1.5])), graph.nearest(np.array([1.5, 0.0]))
-    way = graph.way(a, b)
+    way = graph.cheapest_path(a, b)
     length = np.hypot(*np.diff(way, axis=0).T).sum()
     assert length <= 1.03 * np.hypot(*(way[-1] - way[0]))  # the grid's own error; 16 neighbours
     assert len(straighten(way, graph)) == 2

@@ -86,7 +86,7 @@ def show_gait(
         rows = {
             key: {
                 "value": values[key], "default": span.default, "low": span.low, "high": span.high,
-                "description": span.said,
+                "description": span.description,
             }
             for key, span in spans.items()
         }  # fmt: skip
@@ -101,7 +101,7 @@ def show_gait(
         value = values[key]
         shown = str(value) if isinstance(value, bool | int) else f"{value:.4g}"
         least, most = ("", "") if span.kind is bool else (f"{span.low:.4g}", f"{span.high:.4g}")
-        table.add_row(key, shown, least, most, span.said)
+        table.add_row(key, shown, least, most, span.description)
     console.print()
     console.print(table)
 

@@ -42,7 +42,7 @@ def test_what_goes_elsewhere_is_another_gait() -> None:
     assert loss(ahead(0.0, 1.0), SPEED) > 0.0
 
 
-SPEED = Task("speed", "way", (1.0, 0.0), 0.5)
+SPEED = Task("speed", "advance", (1.0, 0.0), 0.5)
 
 
 def ahead(forward: float, left: float) -> Row:

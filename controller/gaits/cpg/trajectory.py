@@ -1,6 +1,6 @@
-"""The course of a pattern generator's joints, as loops: many are judged before a change.
+"""Joint trajectories of a pattern generator: many are checked before a change of pattern.
 
-All is known in closed form: every value is ``goal + (left + slope t) e^(-h t)`` (``Damped``). Rows
+All is in closed form: every value is ``goal + (left + slope t) e^(-h t)`` (``Damped``). Rows
 of such values: biases, offsets, then real and imaginary parts of the amplitudes, a row a harmonic.
 """
 
@@ -9,8 +9,8 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.drivers.compiling import compiled
 
-FAINT = 0.005
-"""Share of the acceleration limit that harmonics must add to be looked at in a judgement."""
+NEGLIGIBLE = 0.005
+"""Share of the acceleration limit that harmonics must add to be counted in a check."""
 _ROWS = "float64[:, ::1]"
 _ROW = "float64[::1]"
 _GIVEN = f"{_ROW}, {_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, {_ROW}, {_ROW}"
@@ -20,7 +20,7 @@ _GIVEN = f"{_ROW}, {_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, {_ROW}, {_ROW}"
     f"void(float64, int64, {_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, {_ROW}, {_ROW}, "
     f"float64[:, :, ::1], {_ROWS}, {_ROW}, {_ROW})"
 )
-def _moment(
+def _evaluate(
     t: float,
     count: int,
     clock: Floats,
@@ -28,8 +28,8 @@ def _moment(
     left: Floats,
     slope: Floats,
     h: float,
-    astray: Floats,
-    pull: Floats,
+    phase_error: Floats,
+    coupling: Floats,
     state: Floats,
     work: Floats,
     angle: Floats,
@@ -57,10 +57,10 @@ def _moment(
             rate[row, j] = (slope[row, j] - h * line) * fading
     c, s, c_one, s_one, turning = work[0], work[1], work[2], work[3], work[4]
     for j in range(len(angle)):
-        theta = phase + value[0, j] + astray[j]
+        theta = phase + value[0, j] + phase_error[j]
         c_one[j], s_one[j] = np.cos(theta), np.sin(theta)
         c[j], s[j] = 1.0, 0.0
-        turning[j] = omega + rate[0, j] + pull[j]
+        turning[j] = omega + rate[0, j] + coupling[j]
         angle[j], speed[j] = value[1, j], rate[1, j]
     re, im = value[2 : 2 + harmonics], value[2 + harmonics :]
     re_rate, im_rate = rate[2 : 2 + harmonics], rate[2 + harmonics :]
@@ -78,15 +78,15 @@ def _moment(
 
 
 @compiled(f"void({_GIVEN}, float64[:, ::1], float64[:, ::1])")
-def course(
+def trajectory(
     t_s: Floats,
     clock: Floats,
     goal: Floats,
     left: Floats,
     slope: Floats,
     h: float,
-    astray: Floats,
-    pull: Floats,
+    phase_error: Floats,
+    coupling: Floats,
     angle: Floats,
     speed: Floats,
 ) -> None:
@@ -100,24 +100,26 @@ def course(
         left: (rows, J) to the goal.
         slope: (rows, J)
         h: half of the gain.
-        astray: (J,) phases of the oscillators less the pattern's.
-        pull: (J,) how fast they change.
+        phase_error: (J,) phases of the oscillators less the pattern's.
+        coupling: (J,) how fast they change.
         angle: out.
         speed: out.
 
     """
     harmonics = (len(goal) - 2) // 2
-    state, work = np.empty((2, *goal.shape)), np.empty((5, len(astray)))
+    state, work = np.empty((2, *goal.shape)), np.empty((5, len(phase_error)))
     for i in range(len(t_s)):
-        _moment(
-            t_s[i], harmonics, clock, goal, left, slope, h, astray, pull,
+        _evaluate(
+            t_s[i], harmonics, clock, goal, left, slope, h, phase_error, coupling,
             state, work, angle[i], speed[i],
         )  # fmt: skip
 
 
 @compiled(f"int64({_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, float64)")
-def _heard(clock: Floats, goal: Floats, left: Floats, slope: Floats, h: float, faint: float) -> int:
-    """Harmonics that matter: those above them add less than ``faint`` to any acceleration."""
+def _relevant_harmonics(
+    clock: Floats, goal: Floats, left: Floats, slope: Floats, h: float, negligible: float
+) -> int:
+    """Harmonics that matter: those above them add less than ``negligible`` to any acceleration."""
     turning = 0.0
     for j in range(goal.shape[1]):
         turning = max(turning, abs(slope[0, j]) + h * abs(left[0, j]))
@@ -132,21 +134,21 @@ def _heard(clock: Floats, goal: Floats, left: Floats, slope: Floats, h: float, f
                 size += abs(goal[row, j]) + abs(left[row, j]) + abs(slope[row, j]) / (2.0 * h)
             most = max(most, size)
         added += most * (k * turning) ** 2
-        if added > faint:
+        if added > negligible:
             return k
     return 0
 
 
 @compiled(f"float64({_GIVEN}, float64[::1], float64[::1], float64, float64[::1], float64[::1])")
-def judged(
+def peak_share(
     t_s: Floats,
     clock: Floats,
     goal: Floats,
     left: Floats,
     slope: Floats,
     h: float,
-    astray: Floats,
-    pull: Floats,
+    phase_error: Floats,
+    coupling: Floats,
     speed_limit: Floats,
     acceleration_limit: Floats,
     enough: float,
@@ -158,15 +160,17 @@ def judged(
     Raises ``fast`` and ``hard`` (J,) to the largest speeds and accelerations; times are even.
     """
     count = len(fast)
-    harmonics = _heard(clock, goal, left, slope, h, FAINT * acceleration_limit.min())
+    harmonics = _relevant_harmonics(
+        clock, goal, left, slope, h, NEGLIGIBLE * acceleration_limit.min()
+    )
     state, work = np.empty((2, *goal.shape)), np.empty((5, count))
     rows, angle = np.zeros((2, count)), np.empty(count)
     step = t_s[1] - t_s[0]
     over = 0.0
     for i in range(len(t_s)):
         speed, before = rows[i % 2], rows[1 - i % 2]
-        _moment(
-            t_s[i], harmonics, clock, goal, left, slope, h, astray, pull,
+        _evaluate(
+            t_s[i], harmonics, clock, goal, left, slope, h, phase_error, coupling,
             state, work, angle, speed,
         )  # fmt: skip
         for j in range(count):
@@ -181,11 +185,11 @@ def judged(
 
 
 @compiled(f"void({_ROW}, float64, {_ROW})")
-def pulled(astray: Floats, coupling_per_s: float, pull: Floats) -> None:
+def coupling_rates(phase_error: Floats, coupling_per_s: float, coupling: Floats) -> None:
     """Write the coupling (J,) of neighbours along the body."""
-    for j in range(len(astray)):
-        pull[j] = 0.0
-    for j in range(len(astray) - 1):
-        between = coupling_per_s * np.sin(astray[j + 1] - astray[j])
-        pull[j] += between
-        pull[j + 1] -= between
+    for j in range(len(phase_error)):
+        coupling[j] = 0.0
+    for j in range(len(phase_error) - 1):
+        between = coupling_per_s * np.sin(phase_error[j + 1] - phase_error[j])
+        coupling[j] += between
+        coupling[j + 1] -= between
