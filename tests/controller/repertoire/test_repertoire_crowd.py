@@ -68,10 +68,10 @@ def test_axes_stay_square_for_an_hour(repertoire: Repertoire) -> None:
 def test_the_controller_picks_by_speed_and_by_turn(repertoire: Repertoire) -> None:
     control = SecondaryController(repertoire)
     names = [segment.name for segment in repertoire.segments]
-    assert names[control.wanted(0.35)] == "forward-medium"
-    assert names[control.wanted(9.0)] == "forward-fast"
-    assert names[control.wanted(0.6, 0.4)] == "left-gentle"
-    assert names[control.wanted(0.6, -2.0)] == "right-sharp"
+    assert names[control.nearest(0.35)] == "forward-medium"
+    assert names[control.nearest(9.0)] == "forward-fast"
+    assert names[control.nearest(0.6, 0.4)] == "left-gentle"
+    assert names[control.nearest(0.6, -2.0)] == "right-sharp"
 
 
 def test_a_segment_repeated_too_long_is_changed_for_one_alike(repertoire: Repertoire) -> None:
