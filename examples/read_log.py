@@ -26,7 +26,7 @@ def show(log: Path) -> None:
     for event in record.events:
         print(f"{event.time_s:6.2f} s  {event.kind}: {event.text}")
     numbers = sw.summary(record)
-    print(f"outcome: {numbers['outcome']}; speed {numbers['speed_m_s']} m/s")
+    print(f"outcome: {numbers.outcome}; speed {numbers.speed_m_s} m/s")
 
 
 def main() -> None:

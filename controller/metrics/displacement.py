@@ -17,7 +17,7 @@ SKIPPED_S = 1.5
 
 
 @dataclass(frozen=True, slots=True)
-class GaitWay:
+class GaitDisplacement:
     """Means over whole cycles at full rate; NaN where the log holds none."""
 
     cycles: int
@@ -33,7 +33,7 @@ class GaitWay:
     """Body lengths a cycle: what a climber is for."""
 
 
-def gait_way(record: RunRecord) -> GaitWay:
+def gait_displacement(record: RunRecord) -> GaitDisplacement:
     """Judge a gait run whose parameters did not change.
 
     Raises:
@@ -44,7 +44,7 @@ def gait_way(record: RunRecord) -> GaitWay:
     if config is None:
         raise InputError("the log is of no gait")
     hz = GaitCycle(make_gait(config.name, config.parameters), robot).frequency_hz
-    nothing = GaitWay(0, hz, *(float("nan"),) * 4)
+    nothing = GaitDisplacement(0, hz, *(float("nan"),) * 4)
     known = np.isfinite(pose.links_m).all(axis=(1, 2))
     if not known.any() or hz <= 0.0:
         return nothing
@@ -69,7 +69,7 @@ def gait_way(record: RunRecord) -> GaitWay:
     dx, dy = np.diff(centre, axis=0).T
     forward = np.cos(middle) * dx + np.sin(middle) * dy
     left = -np.sin(middle) * dx + np.cos(middle) * dy
-    return GaitWay(
+    return GaitDisplacement(
         count,
         hz,
         float(forward.mean()) / robot.length_m,

@@ -12,7 +12,7 @@ CLEAR_M = 0.005
 
 
 @dataclass(frozen=True, slots=True)
-class Footing:
+class GroundContact:
     """Over all cycles of a run."""
 
     roll_max_rad: float
@@ -21,11 +21,11 @@ class Footing:
     """Share of links in the air, mean."""
 
 
-def footing(record: RunRecord, ground: HeightField | None) -> Footing:
+def ground_contact(record: RunRecord, ground: HeightField | None) -> GroundContact:
     """Judge a run's poses; NaN where the log has none."""
     pose = record.pose
     if len(pose.time_s) == 0 or not np.isfinite(pose.links_m).all():
-        return Footing(float("nan"), float("nan"))
+        return GroundContact(float("nan"), float("nan"))
     x, y, z = np.moveaxis(pose.links_m, -1, 0)
     rest = np.zeros_like(z)
     if ground is not None:
@@ -35,4 +35,4 @@ def footing(record: RunRecord, ground: HeightField | None) -> Footing:
         rest = ground.elevation_m(x, y) + lean
     gap = z - rest - record.header.robot.body_radius_m
     roll = np.arcsin(np.clip(pose.rotation[:, 2, 1], -1.0, 1.0))
-    return Footing(float(np.abs(roll).max()), float((gap > CLEAR_M).mean()))
+    return GroundContact(float(np.abs(roll).max()), float((gap > CLEAR_M).mean()))

@@ -1,139 +1,174 @@
-"""The numbers of a run, as they go into ``summary.json``; None where the log cannot tell."""
+"""The numbers of a run, as they go into ``summary.json``."""
 
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.metrics.path import length_m, path_error_m, travelled_m, waypoint_times_s
+from snakewalk.controller.metrics.path_error import (
+    length_m,
+    path_error_m,
+    travelled_m,
+    waypoint_times_s,
+)
 from snakewalk.controller.metrics.timing import skipped_cycles, wire_use
 from snakewalk.controller.metrics.tracking import lag_s, tracking_error_rad
 from snakewalk.controller.runlog.record import RunRecord
 
-Summary = dict[str, Any]
+
+@dataclass(frozen=True, slots=True)
+class RunSummary:
+    """A run in numbers, SI units, six digits; None where the log cannot tell."""
+
+    run: str
+    motion: str
+    """Motion of the run; ``gait NAME`` for a gait."""
+    robot: str
+    world: str
+    backend: str
+    """``sim``, or the serial port."""
+    software: str
+    config_hash: str
+    """Digest of run, robot and world."""
+    seed: int
+    log_complete: bool
+    """Whether the log was closed properly."""
+    log_note: str
+    """What the log lacks; empty if nothing."""
+    outcome: str
+    """How the run ended, in words."""
+    waypoints: int
+    waypoints_reached: int
+    """Waypoints that the centre of mass came to, in order, by the log's poses."""
+    waypoints_counted: int
+    """Waypoints that the run itself counted."""
+    waypoint_times_s: tuple[float, ...]
+    duration_s: float | None
+    path_length_m: float | None
+    paths_laid_again: int
+    """How often the path was replanned."""
+    travelled_m: float | None
+    path_error_mean_m: float | None
+    path_error_max_m: float | None
+    speed_m_s: float | None
+    """Mean forward speed of the links while the pulse moves."""
+    predicted_speed_m_s: float | None
+    planned_speed_m_s: float | None
+    pulse_m_s: float | None
+    """Mean speed at which the shape travels along the body."""
+    eta: float | None
+    """Gain: speed over pulse speed."""
+    eta_predicted: float | None
+    peak_current_a: float | None
+    peak_torque_n_m: float | None
+    """Peak current times the torque constant."""
+    peak_joint_speed_rad_s: float | None
+    peak_temperature_c: float | None
+    lowest_voltage_v: float | None
+    tracking_rms_rad: float | None
+    tracking_max_rad: float | None
+    lag_s: float | None
+    """Delay of the measured behind the sent angles."""
+    failed_reads: int
+    """Joint states that a cycle failed to read."""
+    clamps: int
+    vetoes: int
+    trip: str | None
+    """Why safety stopped the run; None if it did not."""
+    alarms: int
+    cycles: int
+    missed_deadlines: int
+    lateness_max_s: float | None
+    wire_use_mean: float | None
+    """Share of the cycle that bytes were on the wire."""
+    wire_use_max: float | None
+    decisions: int
+    """Of the walk over the state library."""
+    states_visited: int
+    decisions_without_candidates: int
+    state_library: dict[str, int]
+    """Counts of recorded, random and refused states."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Keys and values of ``summary.json``."""
+        return asdict(self)
 
 
-def summary(record: RunRecord) -> Summary:
-    """Everything that counts, from the log alone."""
-    parts = (_identity, _outcome, _way, _speed, _servos, _safety, _timing, _walk)
-    return {key: value for part in parts for key, value in part(record).items()}
-
-
-def trip(record: RunRecord) -> str | None:
-    """Text of the first trip, if there was one."""
-    return next((e.text for e in record.events if e.kind == "trip"), None)
-
-
-def _identity(record: RunRecord) -> Summary:
-    h = record.header
-    return {
-        "run": h.run.name,
-        "motion": h.run.motion if h.run.gait is None else f"gait {h.run.gait.name}",
-        "robot": h.robot.name,
-        "world": h.world.name,
-        "backend": h.backend,
-        "software": h.software,
-        "config_hash": h.config_hash,
-        "seed": h.seed,
-        "log_complete": record.complete,
-        "log_note": record.note,
-    }
-
-
-def _outcome(record: RunRecord) -> Summary:
-    times = waypoint_times_s(record.pose, record.header.plan)
-    total, reached = len(record.header.plan.waypoints_m), len(times)
-    tripped = trip(record)
-    if tripped is not None:
-        outcome = f"stopped by safety: {tripped}"
-    elif total == 0:
-        outcome = "ran to its end"
-    elif reached == total:
-        outcome = "every waypoint reached"
-    else:
-        outcome = f"{reached} of {total} waypoints reached"
-    return {
-        "outcome": outcome,
-        "waypoints": total,
-        "waypoints_reached": reached,
-        "waypoints_counted": int(record.pose.target.max(initial=0)),
-        "waypoint_times_s": [_digits(t) for t in times],
-        "duration_s": _digits(record.end_s),
-    }
-
-
-def _way(record: RunRecord) -> Summary:
-    error = path_error_m(record)
-    return {
-        "path_length_m": _digits(length_m(record.header.plan.path_m)),
-        "paths_laid_again": len(record.paths) - 1,
-        "travelled_m": _digits(travelled_m(record.pose)),
-        "path_error_mean_m": _digits(_mean(error)),
-        "path_error_max_m": _digits(_peak(error)),
-    }
-
-
-def _speed(record: RunRecord) -> Summary:
-    pose = record.pose
+def summary(record: RunRecord) -> RunSummary:
+    """Return the numbers of a run, from its log alone."""
+    header, cycle, pose, walk = record.header, record.cycle, record.pose, record.walk
+    waypoints, times = len(header.plan.waypoints_m), waypoint_times_s(pose, header.plan)
+    tripped = next((e.text for e in record.events if e.kind == "trip"), None)
+    off_path = path_error_m(record)
     moving = pose.pulse_m_s > 0.0
     chosen = moving if moving.any() else np.ones(len(moving), dtype=bool)
     speed, predicted = _mean(pose.speed_m_s[chosen]), _mean(pose.predicted_speed_m_s[chosen])
     pulse = _mean(pose.pulse_m_s[moving])
-    return {
-        "speed_m_s": _digits(speed),
-        "predicted_speed_m_s": _digits(predicted),
-        "planned_speed_m_s": _digits(record.header.plan.predicted_speed_m_s),
-        "pulse_m_s": _digits(pulse),
-        "eta": _digits(speed / pulse),
-        "eta_predicted": _digits(predicted / pulse),
-    }
-
-
-def _servos(record: RunRecord) -> Summary:
-    cycle = record.cycle
-    error = tracking_error_rad(cycle)
+    tracking = tracking_error_rad(cycle)
     current = _peak(np.abs(cycle.current_a))
-    return {
-        "peak_current_a": _digits(current),
-        "peak_torque_n_m": _digits(current * record.header.torque_constant_n_m_a),
-        "peak_joint_speed_rad_s": _digits(_peak(np.abs(cycle.velocity_rad_s))),
-        "peak_temperature_c": _digits(_peak(record.slow.temperature_c)),
-        "lowest_voltage_v": _digits(-_peak(-record.slow.voltage_v)),
-        "tracking_rms_rad": _digits(float(np.sqrt(_mean(np.square(error))))),
-        "tracking_max_rad": _digits(_peak(np.abs(error))),
-        "lag_s": _digits(lag_s(cycle, record.period_s)),
-        "failed_reads": int(np.count_nonzero(~cycle.valid)),
-    }
-
-
-def _safety(record: RunRecord) -> Summary:
-    return {
-        "clamps": record.cycle.verdict.count("clamp"),
-        "vetoes": record.cycle.verdict.count("veto"),
-        "trip": trip(record),
-        "alarms": sum(e.kind == "alarm" for e in record.events),
-    }
-
-
-def _timing(record: RunRecord) -> Summary:
     use = wire_use(record)
-    return {
-        "cycles": len(record.cycle.time_s),
-        "missed_deadlines": int(skipped_cycles(record).sum()),
-        "lateness_max_s": _digits(_peak(record.cycle.lateness_s)),
-        "wire_use_mean": _digits(_mean(use)),
-        "wire_use_max": _digits(_peak(use)),
-    }
+    return RunSummary(
+        run=header.run.name,
+        motion=header.run.motion if header.run.gait is None else f"gait {header.run.gait.name}",
+        robot=header.robot.name,
+        world=header.world.name,
+        backend=header.backend,
+        software=header.software,
+        config_hash=header.config_hash,
+        seed=header.seed,
+        log_complete=record.complete,
+        log_note=record.note,
+        outcome=_outcome(waypoints, len(times), tripped),
+        waypoints=waypoints,
+        waypoints_reached=len(times),
+        waypoints_counted=int(pose.target.max(initial=0)),
+        waypoint_times_s=tuple(known for t in times if (known := _digits(t)) is not None),
+        duration_s=_digits(record.end_s),
+        path_length_m=_digits(length_m(header.plan.path_m)),
+        paths_laid_again=len(record.paths) - 1,
+        travelled_m=_digits(travelled_m(pose)),
+        path_error_mean_m=_digits(_mean(off_path)),
+        path_error_max_m=_digits(_peak(off_path)),
+        speed_m_s=_digits(speed),
+        predicted_speed_m_s=_digits(predicted),
+        planned_speed_m_s=_digits(header.plan.predicted_speed_m_s),
+        pulse_m_s=_digits(pulse),
+        eta=_digits(speed / pulse),
+        eta_predicted=_digits(predicted / pulse),
+        peak_current_a=_digits(current),
+        peak_torque_n_m=_digits(current * header.torque_constant_n_m_a),
+        peak_joint_speed_rad_s=_digits(_peak(np.abs(cycle.velocity_rad_s))),
+        peak_temperature_c=_digits(_peak(record.slow.temperature_c)),
+        lowest_voltage_v=_digits(-_peak(-record.slow.voltage_v)),
+        tracking_rms_rad=_digits(float(np.sqrt(_mean(np.square(tracking))))),
+        tracking_max_rad=_digits(_peak(np.abs(tracking))),
+        lag_s=_digits(lag_s(cycle, record.period_s)),
+        failed_reads=int(np.count_nonzero(~cycle.valid)),
+        clamps=cycle.verdict.count("clamp"),
+        vetoes=cycle.verdict.count("veto"),
+        trip=tripped,
+        alarms=sum(e.kind == "alarm" for e in record.events),
+        cycles=len(cycle.time_s),
+        missed_deadlines=int(skipped_cycles(record).sum()),
+        lateness_max_s=_digits(_peak(cycle.lateness_s)),
+        wire_use_mean=_digits(_mean(use)),
+        wire_use_max=_digits(_peak(use)),
+        decisions=len(walk.time_s),
+        states_visited=int(walk.visited.max(initial=0)),
+        decisions_without_candidates=int(np.count_nonzero(walk.candidates == 0)),
+        state_library=dict(header.plan.states or {}),
+    )
 
 
-def _walk(record: RunRecord) -> Summary:
-    walk = record.walk
-    return {
-        "decisions": len(walk.time_s),
-        "states_visited": int(walk.visited.max(initial=0)),
-        "decisions_without_candidates": int(np.count_nonzero(walk.candidates == 0)),
-        "state_library": dict(record.header.plan.states or {}),
-    }
+def _outcome(waypoints: int, reached: int, tripped: str | None) -> str:
+    if tripped is not None:
+        return f"stopped by safety: {tripped}"
+    if waypoints == 0:
+        return "ran to its end"
+    if reached == waypoints:
+        return "every waypoint reached"
+    return f"{reached} of {waypoints} waypoints reached"
 
 
 def _mean(values: Floats) -> float:

@@ -1,7 +1,8 @@
-"""What the commands share: options and the way a result is shown."""
+"""What the commands share: options, and how a result is shown."""
 
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,8 @@ from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from snakewalk.controller.app.report.artifacts import Left
+    from snakewalk.controller.app.report.artifacts import Artifacts
+    from snakewalk.controller.runlog.record import RunRecord
 
 console = Console(highlight=False)
 DEFAULT_RUN = "jacksboro-traverse"
@@ -32,33 +34,35 @@ TrackFile = Annotated[
 ]
 
 
-def show(found: dict[str, object], as_json: bool) -> None:
+def show(result: Mapping[str, object], as_json: bool) -> None:
     """Print a result as a table of two columns, or as JSON; in the table no value is a dash."""
     if as_json:
-        print(json.dumps(found))
+        print(json.dumps(result))
         return
     table = Table(box=None, show_header=False)
-    for key, value in found.items():
-        table.add_row(key.replace("_", " "), _said(value))
+    for key, value in result.items():
+        table.add_row(key.replace("_", " "), _text(value))
     console.print(table)
 
 
-def _said(value: object) -> str:
+def _text(value: object) -> str:
     """A value for a reader: no brackets and quotes, no ``None``."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, dict):
-        return ", ".join(f"{key} {_said(one)}" for key, one in value.items()) or "-"
+        return ", ".join(f"{key} {_text(one)}" for key, one in value.items()) or "-"
     if isinstance(value, list | tuple):
-        return ", ".join(_said(one) for one in value) or "-"
+        return ", ".join(_text(one) for one in value) or "-"
     return "-" if value is None else str(value)
 
 
-def leave(log: Path, folder: Path, *, film: bool, fine: bool = False) -> "Left":
-    """Make report and film of a run; what could not be made is said on standard error."""
-    from snakewalk.controller.app.report.artifacts import leave_report  # noqa: PLC0415  heavy; --help stays quick
+def write_artifacts(
+    record: "RunRecord", folder: Path, *, film: bool, fine: bool = False
+) -> "Artifacts":
+    """Make the report and the film of a run; print on standard error what could not be made."""
+    from snakewalk.controller.app.report.artifacts import make_artifacts  # noqa: PLC0415  heavy; --help stays quick
 
-    left = leave_report(log, folder, film=film, fine=fine)
-    for line in left.notes:
+    made = make_artifacts(record, folder, film=film, fine=fine)
+    for line in made.notes:
         print(f"snakewalk: {line}", file=sys.stderr)
-    return left
+    return made

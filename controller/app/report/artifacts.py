@@ -1,30 +1,31 @@
-"""What a run leaves behind beside its log: film, summary and page, made from the log alone."""
+"""Files made from a run's record: ``summary.json``, ``film.mp4`` and ``report.html``."""
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.report.build import build_report
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.app.progress import ProgressBar
 from snakewalk.controller.app.report.film import film_run
+from snakewalk.controller.app.report.page import film_html, page
 from snakewalk.controller.app.result_files import atomic_write
-from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.metrics.summary import RunSummary, summary
+from snakewalk.controller.runlog.record import RunRecord
 
-FILM, REPORT = "film.mp4", "report.html"
+FILM, REPORT, SUMMARY = "film.mp4", "report.html", "summary.json"
 
 
 @dataclass(frozen=True, slots=True)
-class Left:
-    """Files made; None for what could not be, and why in ``notes``."""
+class Artifacts:
+    """Files made; None for what could not be made, and why in ``notes``."""
 
     report: Path | None
     film: Path | None
     notes: tuple[str, ...]
     """One line each."""
 
-    def facts(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, str | None]:
         """Names of the files, for a command's answer."""
         return {
             "report": None if self.report is None else str(self.report),
@@ -32,47 +33,66 @@ class Left:
         }
 
 
-def leave_report(log: Path, folder: Path, *, film: bool = True, fine: bool = False) -> Left:
-    """Make ``folder/film.mp4``, ``folder/summary.json`` and ``folder/report.html`` from a log.
+def make_artifacts(
+    record: RunRecord, folder: Path, *, film: bool = True, fine: bool = False
+) -> Artifacts:
+    """Make ``folder/film.mp4``, ``folder/summary.json`` and ``folder/report.html`` from a record.
 
     What this machine cannot make (no simulator, no matplotlib, no OpenGL) is noted and left out: a
-    run that was made is not lost for want of its pictures. Shows progress on standard error.
-
-    Raises:
-        controller.runlog.reader.LogError: the log cannot be read.
-
+    run is not lost for want of its pictures. Shows progress on standard error.
     """
     notes: list[str] = []
-    shown = _film(log, folder / FILM, fine, notes) if film else None
+    made = _film(record, folder / FILM, fine, notes) if film else None
     report = None
     try:
-        report = build_report(log, folder, shown)
+        report = build_report(record, folder, made)
     except InputError as error:
         notes += [f"no report: {line}" for line in error.faults]
-    return Left(report, shown, tuple(notes))
+    return Artifacts(report, made, tuple(notes))
 
 
-def _film(log: Path, path: Path, fine: bool, notes: list[str]) -> Path | None:
-    record = read_log(log)
-    path.unlink(missing_ok=True)  # one of an earlier run would be taken for this one's
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-    ) as progress:
-        task = progress.add_task("film", total=None)
+def build_report(record: RunRecord, out_dir: Path, film: Path | None = None) -> Path:
+    """Make ``out_dir/report.html`` (returned) and ``out_dir/summary.json`` from a record alone.
+
+    Raises:
+        InputError: the film cannot be used, or matplotlib is not installed.
+
+    """
+    numbers = write_summary(record, out_dir)
+    film_on_page = "" if film is None else film_html(film, out_dir)
+    require_extra("the report needs", "matplotlib")
+    from snakewalk.controller.app.report.figures.all import sections  # noqa: PLC0415  an extra
+
+    header = record.header
+    config = {
+        "run": header.run.model_dump(mode="json"),
+        "robot": header.robot.model_dump(mode="json"),
+        "world": header.world.model_dump(mode="json"),
+    }
+    html = page(numbers, sections(record), film=film_on_page, events=record.events, config=config)
+    path = out_dir / REPORT
+    with atomic_write(path) as part:
+        part.write_text(html, encoding="utf-8")
+    return path
+
+
+def write_summary(record: RunRecord, out_dir: Path) -> RunSummary:
+    """Write ``out_dir/summary.json`` and return the numbers; needs no matplotlib."""
+    numbers = summary(record)
+    text = json.dumps(numbers.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
+    with atomic_write(out_dir / SUMMARY) as part:
+        part.write_text(text + "\n", encoding="utf-8")
+    return numbers
+
+
+def _film(record: RunRecord, path: Path, fine: bool, notes: list[str]) -> Path | None:
+    path.unlink(missing_ok=True)  # a film of an earlier run would be taken for this run's
+    with ProgressBar("film") as bar:
         try:
             with atomic_write(path) as part:
-                film_run(
-                    record,
-                    part,
-                    fine=fine,
-                    on_frame=lambda done, of: progress.update(task, completed=done, total=of),
-                )
+                film_run(record, part, fine=fine, on_progress=bar.update)
         except InputError as error:
-            progress.remove_task(task)
+            bar.hide()
             notes += [f"no film: {line}" for line in error.faults]
             return None
     return path

@@ -25,7 +25,7 @@ def film_run(
     path: Path,
     *,
     fine: bool = False,
-    on_frame: Callable[[int, int], None] | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
 ) -> int:
     """Draw the film of a run into ``path`` (.mp4); the number of its frames.
 
@@ -33,7 +33,7 @@ def film_run(
         record: the run.
         path: of the film; its folder is made.
         fine: larger, smoother, and eight times slower to draw.
-        on_frame: told (frames done, of).
+        on_progress: called with (frames done, of).
 
     Raises:
         InputError: the simulator or PyAV is not installed, nothing draws here without a screen, or
@@ -64,7 +64,7 @@ def film_run(
         path_m=plan.path_m[:, :2],
         title=header.run.name,
         fine=fine,
-        on_frame=on_frame,
+        on_frame=on_progress,
     )
 
 

@@ -3,16 +3,23 @@
 Everything that comes from the log is escaped.
 """
 
+import base64
 import json
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 from typing import Any, Final
+from urllib.parse import quote
 
-from snakewalk.controller.metrics.summary import Summary
+from snakewalk.config.errors import InputError
+from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.runlog.record import Event
 
 _EVENTS_SHOWN = 300
+INLINE_BYTES: Final = 8_000_000
+_TYPES: Final = {".mp4": "video/mp4", ".webm": "video/webm", ".gif": "image/gif"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,26 +33,26 @@ class Section:
 
 
 def page(
-    numbers: Summary,
+    numbers: RunSummary,
     sections: Sequence[Section],
     *,
     film: str,
     events: Sequence[Event],
     config: Mapping[str, Any],
 ) -> str:
-    """Whole page; ``film`` is HTML made by ``film.film_html``, or empty."""
-    title = f"{numbers['run']} on {numbers['backend']}"
-    note = f'<p class="note">{escape(numbers["log_note"])}</p>' if numbers["log_note"] else ""
+    """Whole page; ``film`` is HTML made by ``film_html``, or empty."""
+    title = f"{numbers.run} on {numbers.backend}"
+    note = f'<p class="note">{escape(numbers.log_note)}</p>' if numbers.log_note else ""
     body = [
-        f"<header><p class='kind'>snakewalk run</p><h1>{escape(str(numbers['run']))}</h1>",
-        f"<p class='{_mood(numbers)} outcome'>{escape(str(numbers['outcome']))}</p>{note}",
+        f"<header><p class='kind'>snakewalk run</p><h1>{escape(str(numbers.run))}</h1>",
+        f"<p class='{_mood(numbers)} outcome'>{escape(str(numbers.outcome))}</p>{note}",
         f"<p class='verdict'>{escape(_verdict(numbers))}</p>",
         f"<p class='facts'>{_facts(numbers)}</p></header>",
         f"<section class='tiles'>{''.join(_tiles(numbers))}</section>",
         film,
         *(_figure(s) for s in sections),
         _events(events),
-        _details("All numbers", numbers),
+        _details("All numbers", numbers.to_dict()),
         _details("Configuration", config),
     ]
     return (
@@ -57,26 +64,26 @@ def page(
     )
 
 
-def _mood(n: Summary) -> str:
-    if n["trip"] is not None:
+def _mood(n: RunSummary) -> str:
+    if n.trip is not None:
         return "bad"
-    return "good" if n["waypoints_reached"] == n["waypoints"] else "fair"
+    return "good" if n.waypoints_reached == n.waypoints else "fair"
 
 
-def _verdict(n: Summary) -> str:
+def _verdict(n: RunSummary) -> str:
     """One sentence: how far it came, how fast, how well it kept to its path, whether on time."""
-    where = "on the simulator" if n["backend"] == "sim" else f"on {n['backend']}"
-    late = n["missed_deadlines"]
+    where = "on the simulator" if n.backend == "sim" else f"on {n.backend}"
+    late = n.missed_deadlines
     missed = f"{_count(late, 'deadline') if late else 'no deadline'} missed."
-    if n["waypoints"] == 0:
+    if n.waypoints == 0:
         return (
-            f"{n['robot']} moved by {n['motion']} {where}: its centre of mass went "
-            f"{_fmt(n['travelled_m'], 1)} m in {_fmt(n['duration_s'], 1)} s, {missed}"
+            f"{n.robot} moved by {n.motion} {where}: its centre of mass went "
+            f"{_fmt(n.travelled_m, 1)} m in {_fmt(n.duration_s, 1)} s, {missed}"
         )
     return (
-        f"{n['robot']} reached {n['waypoints_reached']} of {_count(n['waypoints'], 'waypoint')} "
-        f"{where}: {_fmt(n['travelled_m'], 1)} m in {_fmt(n['duration_s'], 1)} s, "
-        f"{_centimetres(n['path_error_mean_m'])} from its path on average, {missed}"
+        f"{n.robot} reached {n.waypoints_reached} of {_count(n.waypoints, 'waypoint')} "
+        f"{where}: {_fmt(n.travelled_m, 1)} m in {_fmt(n.duration_s, 1)} s, "
+        f"{_centimetres(n.path_error_mean_m)} from its path on average, {missed}"
     )
 
 
@@ -84,42 +91,42 @@ def _centimetres(length_m: float | None) -> str:
     return "–" if length_m is None else f"{100.0 * length_m:.1f} cm"
 
 
-def _facts(n: Summary) -> str:
-    backend = "simulation" if n["backend"] == "sim" else n["backend"]
+def _facts(n: RunSummary) -> str:
+    backend = "simulation" if n.backend == "sim" else n.backend
     facts = (
-        ("robot", n["robot"]), ("ground", n["world"]), ("motion", n["motion"]),
-        ("bus", backend), ("seed", n["seed"]), ("configuration", n["config_hash"]),
-        ("snakewalk", n["software"]),
+        ("robot", n.robot), ("ground", n.world), ("motion", n.motion),
+        ("bus", backend), ("seed", n.seed), ("configuration", n.config_hash),
+        ("snakewalk", n.software),
     )  # fmt: skip
     return " ".join(f"<span><b>{k}</b> {escape(str(v))}</span>" for k, v in facts)
 
 
-def _tiles(n: Summary) -> list[str]:
-    wire = f"{_pct(n['wire_use_mean'])} of the wire" if n["wire_use_mean"] is not None else ""
-    torque = "" if n["peak_torque_n_m"] is None else f"{_fmt(n['peak_torque_n_m'], 2)} N m"
-    vetoes = _count(n["vetoes"], "veto", "vetoes")
-    missed = f"{n['missed_deadlines']} of {n['cycles']}"
-    took = f"in {_fmt(n['duration_s'], 1)} s"
+def _tiles(n: RunSummary) -> list[str]:
+    wire = f"{_pct(n.wire_use_mean)} of the wire" if n.wire_use_mean is not None else ""
+    torque = "" if n.peak_torque_n_m is None else f"{_fmt(n.peak_torque_n_m, 2)} N m"
+    vetoes = _count(n.vetoes, "veto", "vetoes")
+    missed = f"{n.missed_deadlines} of {n.cycles}"
+    took = f"in {_fmt(n.duration_s, 1)} s"
     tiles = [
-        _tile("Waypoints", f"{n['waypoints_reached']} of {n['waypoints']}",
-              f"in {_fmt(n['duration_s'], 1)} s"),
-        _tile("Path error", f"{_fmt(n['path_error_mean_m'], 3)} m",
-              f"at most {_fmt(n['path_error_max_m'], 3)} m"),
-        _tile("Speed", f"{_fmt(n['speed_m_s'], 3)} m/s",
-              f"predicted {_fmt(n['predicted_speed_m_s'], 3)}"),
-        _tile("Gain η", _fmt(n["eta"], 2), "speed over pulse speed"),
-        _tile("Travelled", f"{_fmt(n['travelled_m'], 2)} m",
-              f"path of {_fmt(n['path_length_m'], 2)} m"),
-        _tile("Tracking", f"{_fmt(n['tracking_rms_rad'], 3)} rad",
-              f"RMS; lag {_fmt(n['lag_s'], 3)} s"),
-        _tile("Peak current", f"{_fmt(n['peak_current_a'], 2)} A", torque),
-        _tile("Hottest servo", f"{_fmt(n['peak_temperature_c'], 0)} °C",
-              f"supply down to {_fmt(n['lowest_voltage_v'], 1)} V"),
+        _tile("Waypoints", f"{n.waypoints_reached} of {n.waypoints}",
+              f"in {_fmt(n.duration_s, 1)} s"),
+        _tile("Path error", f"{_fmt(n.path_error_mean_m, 3)} m",
+              f"at most {_fmt(n.path_error_max_m, 3)} m"),
+        _tile("Speed", f"{_fmt(n.speed_m_s, 3)} m/s",
+              f"predicted {_fmt(n.predicted_speed_m_s, 3)}"),
+        _tile("Gain η", _fmt(n.eta, 2), "speed over pulse speed"),
+        _tile("Travelled", f"{_fmt(n.travelled_m, 2)} m",
+              f"path of {_fmt(n.path_length_m, 2)} m"),
+        _tile("Tracking", f"{_fmt(n.tracking_rms_rad, 3)} rad",
+              f"RMS; lag {_fmt(n.lag_s, 3)} s"),
+        _tile("Peak current", f"{_fmt(n.peak_current_a, 2)} A", torque),
+        _tile("Hottest servo", f"{_fmt(n.peak_temperature_c, 0)} °C",
+              f"supply down to {_fmt(n.lowest_voltage_v, 1)} V"),
         _tile("Missed deadlines", missed, wire),
-        _tile("Safety", _count(n["clamps"], "clamp"), f"{vetoes}, {_count(n['alarms'], 'alarm')}"),
+        _tile("Safety", _count(n.clamps, "clamp"), f"{vetoes}, {_count(n.alarms, 'alarm')}"),
     ]  # fmt: skip
-    if n["waypoints"] == 0:  # a gait has no path, and its shape need not go along the body
-        return [_tile("Travelled", f"{_fmt(n['travelled_m'], 2)} m", took), *tiles[5:]]
+    if n.waypoints == 0:  # a gait has no path, and its shape need not go along the body
+        return [_tile("Travelled", f"{_fmt(n.travelled_m, 2)} m", took), *tiles[5:]]
     return tiles
 
 
@@ -149,6 +156,29 @@ def _events(events: Sequence[Event]) -> str:
     rest = len(events) - _EVENTS_SHOWN
     more = f"<p class='facts'>and {rest} more in the log</p>" if rest > 0 else ""
     return f"<section><h2>What happened</h2><table>{rows}</table>{more}</section>"
+
+
+def film_html(film: Path, out_dir: Path) -> str:
+    """HTML for a film; one above ``INLINE_BYTES`` is linked relative to ``out_dir``.
+
+    Raises:
+        InputError: there is no such file, or browsers do not play its type.
+
+    """
+    kind = _TYPES.get(film.suffix.lower())
+    if kind is None:
+        raise InputError(f"{film}: a film on the page is one of {', '.join(_TYPES)}")
+    if not film.is_file():
+        raise InputError(f"{film}: no such film")
+    if film.stat().st_size <= INLINE_BYTES:
+        source = f"data:{kind};base64," + base64.b64encode(film.read_bytes()).decode()
+    else:
+        source = quote(os.path.relpath(film.resolve(), out_dir.resolve()).replace(os.sep, "/"))
+    if kind.startswith("image"):
+        shown = f"<img src='{escape(source)}' alt='Film of the run'>"
+    else:
+        shown = f"<video controls autoplay muted loop playsinline src='{escape(source)}'></video>"
+    return f"<section><h2>Film</h2><figure>{shown}</figure></section>"
 
 
 def _details(title: str, values: Mapping[str, Any]) -> str:

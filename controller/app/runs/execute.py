@@ -4,10 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from snakewalk.controller.app.report.build import write_summary
+from snakewalk.controller.app.report.artifacts import write_summary
 from snakewalk.controller.app.runs.backend import metal, simulated
 from snakewalk.controller.app.runs.pose_provider import PoseProvider, pose_faults, pose_provider
 from snakewalk.controller.app.runs.prepared_run import PreparedRun
+from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
@@ -26,7 +27,7 @@ class Finished:
     log: Path
     record: RunRecord
     """The log, read back once: for the summary, the report and whoever asks more of it."""
-    summary: dict[str, object]
+    summary: RunSummary
     pose: PoseProvider
     """What measured the pose, and how well where this is known."""
     source: MotionSource
@@ -106,7 +107,7 @@ def execute(
             )
             outcome = drive.run()
     record = read_log(log_path)
-    return Finished(outcome, log_path, record, dict(write_summary(record, folder)), pose, source)
+    return Finished(outcome, log_path, record, write_summary(record, folder), pose, source)
 
 
 def _torque_constant_n_m_a(model: str) -> float:

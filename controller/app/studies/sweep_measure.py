@@ -12,7 +12,7 @@ from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait
 from snakewalk.controller.app.runs.gait_run import GaitRun
 from snakewalk.controller.app.studies.sweep_points import Point
-from snakewalk.controller.metrics.displacement import SKIPPED_S, gait_way
+from snakewalk.controller.metrics.displacement import SKIPPED_S, gait_displacement
 from snakewalk.controller.metrics.effort import Winding, effort
 from snakewalk.sim.servo.motor import MOTORS
 
@@ -52,7 +52,7 @@ def measure(point: Point, vary: int | None = None) -> Row:
     ramp_s = max(0.0, record.end_s - start_s - point.seconds - 1.0)
     motor = MOTORS.get(record.header.robot.servo.model)
     winding = Winding(motor.resistance_ohm, motor.back_emf_v_s) if motor else None
-    way, cost = gait_way(record), effort(record, start_s + ramp_s + SKIPPED_S, winding)
+    way, cost = gait_displacement(record), effort(record, start_s + ramp_s + SKIPPED_S, winding)
     numbers = finished.summary
     found = {
         "ended": finished.outcome.tripped or "ran to its end",
@@ -66,10 +66,10 @@ def measure(point: Point, vary: int | None = None) -> Row:
         "power_w": cost.power_w,
         "cost_of_transport": cost.cost_of_transport,
         "slip": cost.slip,
-        "peak_current_a": numbers["peak_current_a"],
-        "peak_torque_n_m": numbers["peak_torque_n_m"],
-        "peak_temperature_c": numbers["peak_temperature_c"],
-        "tracking_max_rad": numbers["tracking_max_rad"],
+        "peak_current_a": numbers.peak_current_a,
+        "peak_torque_n_m": numbers.peak_torque_n_m,
+        "peak_temperature_c": numbers.peak_temperature_c,
+        "tracking_max_rad": numbers.tracking_max_rad,
         "least_rate": finished.outcome.least_rate,
     }
     return {key: _digits(value) for key, value in found.items()}

@@ -15,7 +15,7 @@ from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.app.studies.pool import each
-from snakewalk.controller.metrics.ground_contact import footing
+from snakewalk.controller.metrics.ground_contact import ground_contact
 from snakewalk.controller.terrain.summary import path_relief
 
 
@@ -78,7 +78,7 @@ def run_trial(run: str, case: Case, seed: int, changes: Mapping[str, object]) ->
             finished = execute(prepared, Path(folder))
         except InputError as error:
             return Trial(case, seed, waypoints, slope_median_deg=slope_deg, refused=error.faults[0])
-        stood = footing(finished.record, prepared.ground)
+        stood = ground_contact(finished.record, prepared.ground)
     numbers, outcome = finished.summary, finished.outcome
     return Trial(
         case=case,
@@ -89,10 +89,10 @@ def run_trial(run: str, case: Case, seed: int, changes: Mapping[str, object]) ->
         missed=outcome.missed,
         duration_s=outcome.duration_s,
         slope_median_deg=slope_deg,
-        path_error_m=_number(numbers["path_error_mean_m"]),
-        eta=_number(numbers["eta"]),
-        lead_max_rad=_number(numbers["tracking_max_rad"]),
-        current_max_a=_number(numbers["peak_current_a"]),
+        path_error_m=_number(numbers.path_error_mean_m),
+        eta=_number(numbers.eta),
+        lead_max_rad=_number(numbers.tracking_max_rad),
+        current_max_a=_number(numbers.peak_current_a),
         roll_max_deg=float(np.degrees(stood.roll_max_rad)),
         in_air=stood.in_air,
         alarms=outcome.alarms,

@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 import av
 from PIL import Image
 
-from snakewalk.controller.app.report.artifacts import leave_report
+from snakewalk.controller.app.report.artifacts import make_artifacts
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait
 from snakewalk.controller.gaits.registry import GAITS
@@ -25,10 +25,10 @@ def gallery(folder: Path, names: list[str]) -> None:
         with TemporaryDirectory() as place:
             out = Path(place)
             finished = execute(prepare_gait(name, seconds=RUN_S), out)
-            left = leave_report(finished.log, out, film=True)
-            if left.film is None:
-                raise SystemExit(f"{name}: no film: {' '.join(left.notes)}")
-            pictures = _last(left.film)
+            made = make_artifacts(finished.record, out)
+            if made.film is None:
+                raise SystemExit(f"{name}: no film: {' '.join(made.notes)}")
+            pictures = _last(made.film)
         path = folder / f"{name}.webp"
         rest = {"save_all": True, "append_images": pictures[1:], "loop": 0}
         pictures[0].save(path, duration=1000 // RATE_HZ, quality=45, method=6, **rest)

@@ -19,7 +19,7 @@ from snakewalk.controller.app.runs.factory import prepare_gait, prepare_run, pre
 from snakewalk.controller.app.runs.gait_run import GaitRun
 from snakewalk.controller.app.studies.replay import differences, replay
 from snakewalk.controller.gaits.registry import GAITS
-from snakewalk.controller.metrics.displacement import gait_way
+from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.motion.operator import Operator
 from snakewalk.controller.runlog.reader import read_log
 
@@ -101,11 +101,11 @@ def sidewound(tmp_path_factory: pytest.TempPathFactory):
 def test_a_gait_runs_over_the_bus_without_clamp_or_miss_and_goes_its_way(sidewound) -> None:
     assert sidewound.outcome.tripped is None
     numbers = sidewound.summary
-    assert numbers["outcome"] == "ran to its end"
-    assert (numbers["clamps"], numbers["missed_deadlines"], numbers["failed_reads"]) == (0, 0, 0)
+    assert numbers.outcome == "ran to its end"
+    assert (numbers.clamps, numbers.missed_deadlines, numbers.failed_reads) == (0, 0, 0)
     record = read_log(sidewound.log)
     assert record.header.run.gait.name == "sidewinding"
-    way = gait_way(record)
+    way = gait_displacement(record)
     assert way.cycles >= 2
     assert way.left_bl > 0.25
     assert abs(way.forward_bl) < 0.1
@@ -166,7 +166,7 @@ def test_an_operators_keys_change_a_run_over_the_bus(tmp_path: Path) -> None:
         make_operator=lambda m, r, on_event: Operator(m, r, keys, on_event),
     )
     finished = execute(job, tmp_path, on_event=lambda kind, text: said.append(text))
-    assert finished.summary["clamps"] == 0
+    assert finished.summary.clamps == 0
     assert {"frequency_hz = 0.55", "mirror = True", "gait rolling"} <= set(said)
     kinds = [e.text for e in read_log(finished.log).events if e.kind == "operator"]
     assert kinds == [text for text in said if text in kinds]

@@ -29,10 +29,10 @@ def finished(tmp_path_factory: pytest.TempPathFactory):
 def test_the_waypoint_is_reached_without_a_trip_or_a_missed_deadline(finished) -> None:
     assert finished.outcome.complete(1)
     numbers = finished.summary
-    assert numbers["missed_deadlines"] == 0
-    assert numbers["failed_reads"] == 0
-    assert numbers["vetoes"] == 0
-    assert numbers["wire_use_max"] < 1.0
+    assert numbers.missed_deadlines == 0
+    assert numbers.failed_reads == 0
+    assert numbers.vetoes == 0
+    assert numbers.wire_use_max < 1.0
 
 
 def test_joints_follow_within_the_honest_lag_of_the_servos(finished) -> None:

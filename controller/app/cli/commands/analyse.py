@@ -5,8 +5,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import track as progress
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
@@ -34,18 +32,15 @@ def analyse(
     as_json: Json = False,
 ) -> None:
     """Analyse the animal's motion: pulse speed, sliding, wave, frequency, amplitudes, energy."""
+    from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.capture.analysis import analyse as measure  # noqa: PLC0415  heavy
     from snakewalk.controller.capture.readers.generated import EMBEDDED  # noqa: PLC0415
     from snakewalk.controller.capture.readers.load import load_track  # noqa: PLC0415
 
     files = _pictures(recordings, picture, force)
     found = []
-    for name, file in progress(
-        list(zip(recordings, files, strict=True)),
-        "recordings",
-        console=Console(stderr=True),
-        transient=True,
-    ):
+    pairs = list(zip(recordings, files, strict=True))
+    for name, file in show_progress(pairs, "recordings", len(pairs)):
         shipped = name in EMBEDDED
         one = measure(load_track(name, None if shipped else rate, None if shipped else min_score))
         if file is not None:

@@ -4,8 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import Progress
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.options import Force, Json, show
@@ -33,18 +31,17 @@ def film(
     as_json: Json = False,
 ) -> None:
     """Render a fish whose every angle is known, with marks, shadow, blur and noise."""
+    from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
     from snakewalk.controller.app.recordings.fish_film import render  # noqa: PLC0415  heavy; --help stays quick
 
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: is a file; give a folder")
     if folder.is_dir() and any(folder.iterdir()) and not force:
         raise InputError(f"{folder}: is not empty; --force writes into it")
-    with _bar() as bar:
-        task = bar.add_task("frames", total=None)
+    with ProgressBar("frames", transient=True) as bar:
         truth = render(
             folder, motion=motion, build=build, length_px=length_px, frames=frames, side=side,
-            seed=seed,
-            on_progress=lambda done, total: bar.update(task, completed=done, total=total),
+            seed=seed, on_progress=bar.update,
         )  # fmt: skip
     found: dict[str, object] = {
         "folder": str(folder),
@@ -80,6 +77,7 @@ def match(
     as_json: Json = False,
 ) -> None:
     """Lay a deformable fish over every frame: head, spine angles, and from the side its pitch."""
+    from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
     from snakewalk.controller.app.recordings.fish_matching import (  # noqa: PLC0415
         MIDLINES,
         match_footage,
@@ -99,12 +97,10 @@ def match(
             raise InputError(f"{footage}: midlines have no side view; --side goes with images")
         matched = read_midlines(footage, build, rate)
     else:
-        with _bar() as bar:
-            task = bar.add_task("frames", total=None)
+        with ProgressBar("frames", transient=True) as bar:
             matched = match_footage(
                 footage, side, background, side_background, build=build, rate_hz=rate,
-                length_m=length,
-                on_progress=lambda done, total: bar.update(task, completed=done, total=total),
+                length_m=length, on_progress=bar.update,
             )  # fmt: skip
     accuracy = None if known is None else compare(matched.postures, known)
     with atomic_write(output) as part:
@@ -186,7 +182,3 @@ def _points(words: list[str]) -> list[tuple[float, float]]:
             raise InputError(f"--through {word}: a control point is X,Y, as in 3,-1.5") from None
         found.append((x, y))
     return found
-
-
-def _bar() -> Progress:
-    return Progress(console=Console(stderr=True), transient=True)

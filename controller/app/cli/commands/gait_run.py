@@ -18,8 +18,8 @@ from snakewalk.controller.app.cli.options import (
     RunFolder,
     RunPort,
     World,
-    leave,
     show,
+    write_artifacts,
 )
 
 if TYPE_CHECKING:
@@ -55,10 +55,10 @@ def run_gait(
     as_json: Json = False,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.app.cli.progress import TimeBar  # noqa: PLC0415
+    from snakewalk.controller.app.progress import TimeBar  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_gait  # noqa: PLC0415
-    from snakewalk.controller.metrics.displacement import gait_way  # noqa: PLC0415
+    from snakewalk.controller.metrics.displacement import gait_displacement  # noqa: PLC0415
 
     if by not in {"blend", "cpg"}:
         raise InputError(f"--by {by}: expected blend or cpg")
@@ -82,7 +82,7 @@ def run_gait(
         paced = prepared.make_operator is not None and port is None
         on_progress = _in_real_time(bar.on_progress) if paced else bar.on_progress
         finished = execute(prepared, folder, port, on_progress=on_progress, on_event=bar.on_event)
-    left = leave(finished.log, folder, film=film)
+    artifacts = write_artifacts(finished.record, folder, film=film)
     found: dict[str, object] = {
         "gait": prepared.config.name,
         "robot": prepared.robot.name,
@@ -94,7 +94,7 @@ def run_gait(
     if prepared.config.then:
         found["then"] = [f"{change.name}@{change.at_s:g}" for change in prepared.config.then]
     if prepared.make_operator is None and not prepared.config.then and by == "blend":
-        way = gait_way(finished.record)
+        way = gait_displacement(finished.record)
         found |= {
             "frequency_hz": round(way.frequency_hz, 3),
             "cycles": way.cycles,
@@ -105,11 +105,11 @@ def run_gait(
             "speed_m_s": _digits(way.speed_m_s),
         }
     found |= {
-        "peak_current_a": finished.summary["peak_current_a"],
-        "peak_temperature_c": finished.summary["peak_temperature_c"],
+        "peak_current_a": finished.summary.peak_current_a,
+        "peak_temperature_c": finished.summary.peak_temperature_c,
         "log": str(finished.log),
         "summary": str(folder / "summary.json"),
-        **left.facts(),
+        **artifacts.to_dict(),
     }
     show(found, as_json)
     if finished.outcome.tripped is not None:

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.options import (
     DEFAULT_RUN,
     Force,
@@ -19,6 +20,7 @@ from snakewalk.controller.app.cli.options import (
     World,
     show,
 )
+from snakewalk.controller.app.result_files import refuse_to_overwrite
 
 
 def plan(
@@ -49,11 +51,9 @@ def plan(
     if with_ not in {None, "repertoire"}:
         raise InputError(f"--with {with_}: no such planner; there is: repertoire")
     if with_ is not None:
-        from snakewalk.controller.app.cli.commands.plan_repertoire import plan_with_repertoire  # noqa: PLC0415
-
         if motion is not None or track is not None or seed is not None:
             raise InputError("--with repertoire: takes no --motion, --track or --seed")
-        plan_with_repertoire(
+        _plan_with_repertoire(
             run, repertoire=repertoire, robot=robot, world=world, beam=beam, physics=physics,
             out=out, carry=carry, force=force, as_json=as_json,
         )  # fmt: skip
@@ -97,3 +97,48 @@ def plan(
         found["climb_m"] = round(relief.climb_m, 3)
         found["safe_nodes"] = f"{relief.safe_node_share:.0%}"
     show(found, as_json)
+
+
+def _plan_with_repertoire(
+    run: str,
+    *,
+    repertoire: Path | None,
+    robot: str | None,
+    world: str | None,
+    beam: int,
+    physics: int,
+    out: Path | None,
+    carry: bool,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Search, show, and where asked save, time on the physics, and run."""
+    from snakewalk.controller.app.cli.commands.repertoire import carry_out  # noqa: PLC0415
+    from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
+    from snakewalk.controller.app.studies.repertoire_planning import (  # noqa: PLC0415  heavy; --help stays quick
+        plan_facts,
+        plan_route,
+        save_plan,
+        search_cost,
+    )
+
+    refuse_to_overwrite([out], force)
+    if physics or carry:
+        require_extra("candidates and runs on the physics need", "mujoco")
+    job = plan_route(run, repertoire, robot=robot, world=world, beam=beam)
+    found = plan_facts(job)
+    if not as_json:
+        found["actions"] = ", ".join(job.action_names)
+    if physics:
+        with ProgressBar("candidates on the physics", physics) as bar:
+            cost = search_cost(job, physics, beam=beam, on_progress=bar.update)
+        found |= cost.facts()
+    if out is not None:
+        save_plan(job, out)
+        found["plan"] = str(out)
+    complete = True
+    if carry:
+        found["ran"], complete = carry_out(job, None, None, False, None)
+    show(found, as_json)
+    if not complete:
+        raise SystemExit(1)

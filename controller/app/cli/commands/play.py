@@ -13,8 +13,8 @@ from snakewalk.controller.app.cli.options import (
     RunFolder,
     RunPort,
     World,
-    leave,
     show,
+    write_artifacts,
 )
 
 
@@ -31,7 +31,7 @@ def play(
     as_json: Json = False,
 ) -> None:
     """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.app.cli.progress import TimeBar  # noqa: PLC0415
+    from snakewalk.controller.app.progress import TimeBar  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_playback  # noqa: PLC0415
 
@@ -41,7 +41,7 @@ def play(
         finished = execute(
             prepared, folder, port, on_progress=bar.on_progress, on_event=bar.on_event
         )
-    left = leave(finished.log, folder, film=film)
+    artifacts = write_artifacts(finished.record, folder, film=film)
     found: dict[str, object] = {
         "recording": track,
         "robot": prepared.robot.name,
@@ -49,10 +49,10 @@ def play(
         "speed": round(prepared.speed, 4),
         "duration_s": round(finished.outcome.duration_s, 2),
         "tripped": finished.outcome.tripped,
-        "peak_current_a": finished.summary["peak_current_a"],
+        "peak_current_a": finished.summary.peak_current_a,
         "log": str(finished.log),
         "summary": str(folder / "summary.json"),
-        **left.facts(),
+        **artifacts.to_dict(),
     }
     show(found, as_json)
     if finished.outcome.tripped is not None:

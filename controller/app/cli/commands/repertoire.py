@@ -5,8 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from snakewalk.config.extras import require_extra
@@ -17,8 +15,8 @@ from snakewalk.controller.app.cli.options import (
     RunFolder,
     RunPort,
     console,
-    leave,
     show,
+    write_artifacts,
 )
 from snakewalk.controller.app.result_files import atomic_write, check_picture, refuse_to_overwrite
 
@@ -41,6 +39,7 @@ def record(
 ) -> None:
     """Run forward, left and right actions on the physics and keep a settled cycle of each."""
     from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
     from snakewalk.controller.app.studies.repertoire_planning import default_file, flat  # noqa: PLC0415
     from snakewalk.controller.app.studies.repertoire_recording import ACTIONS, record  # noqa: PLC0415
 
@@ -50,17 +49,16 @@ def record(
     refuse_to_overwrite([file, picture], force)
     check_picture(picture)
     require_extra("recording needs", "mujoco")
-    with bar() as progress:
-        task = progress.add_task("record", total=float(len(ACTIONS)))
+    with ProgressBar("record", float(len(ACTIONS))) as bar:
         begun: list[str] = []
 
         def on_progress(name: str, share: float) -> None:
             if name not in begun:
                 begun.append(name)
-            progress.update(task, completed=len(begun) - 1 + share, description=name)
+            bar.update(len(begun) - 1 + share, description=name)
 
         repertoire = record(body, ground, on_progress=on_progress)
-        progress.update(task, completed=float(len(ACTIONS)), description="recorded")
+        bar.update(float(len(ACTIONS)), description="recorded")
     with atomic_write(file) as part:
         repertoire.save(part)
     if picture is not None:
@@ -116,7 +114,7 @@ def carry_out(
     job: "RepertoireRun", port: str | None, out: Path | None, film: bool, picture: Path | None
 ) -> tuple[dict[str, object], bool]:
     """Execute a job with a bar; what it did, and whether it reached every waypoint."""
-    from snakewalk.controller.app.cli.progress import TimeBar  # noqa: PLC0415
+    from snakewalk.controller.app.progress import TimeBar  # noqa: PLC0415
     from snakewalk.controller.app.runs.repertoire_run import default_folder, run_route  # noqa: PLC0415
 
     check_picture(picture)
@@ -124,22 +122,12 @@ def carry_out(
     with TimeBar(job.run.name, job.route.duration_s) as progress:
         ran = run_route(job, folder, port, progress.on_progress)
     log = ran.finished.log
-    left = leave(log, folder, film=film)
+    artifacts = write_artifacts(ran.finished.record, folder, film=film)
     if picture is not None:
         from snakewalk.controller.app.report.plots import repertoire as plots  # noqa: PLC0415
 
         plots.draw_way(job, ran.finished.record, picture)
-    return ran.facts() | {"log": str(log)} | left.facts(), ran.complete
-
-
-def bar() -> Progress:
-    """Return a bar on standard error."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-    )
+    return ran.facts() | {"log": str(log)} | artifacts.to_dict(), ran.complete
 
 
 def _show_actions(file: Path, repertoire: "Repertoire", as_json: bool) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.controller.app.cli.options import Json, leave, show
+from snakewalk.controller.app.cli.options import Json, show, write_artifacts
 
 
 def report(
@@ -21,17 +21,13 @@ def report(
     """Make report.html, summary.json and film.mp4 again from a log."""
     from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415  heavy; --help stays quick
 
-    note = read_log(log).note
-    if note:
-        print(f"snakewalk: {log}: {note}", file=sys.stderr)
-    left = leave(log, log.parent if out is None else out, film=film, fine=fine)
-    if left.report is None:
+    record = read_log(log)
+    if record.note:
+        print(f"snakewalk: {log}: {record.note}", file=sys.stderr)
+    folder = log.parent if out is None else out
+    artifacts = write_artifacts(record, folder, film=film, fine=fine)
+    if artifacts.report is None:
         raise SystemExit(2)
-    show(
-        {
-            "report": str(left.report),
-            "summary": str(left.report.parent / "summary.json"),
-            "film": None if left.film is None else str(left.film),
-        },
-        as_json,
-    )
+    files = artifacts.to_dict()
+    summary = str(folder / "summary.json")
+    show({"report": files["report"], "summary": summary, "film": files["film"]}, as_json)

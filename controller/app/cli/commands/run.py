@@ -18,8 +18,8 @@ from snakewalk.controller.app.cli.options import (
     Seed,
     TrackFile,
     World,
-    leave,
     show,
+    write_artifacts,
 )
 
 
@@ -39,7 +39,7 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.app.cli.progress import PathBar  # noqa: PLC0415
+    from snakewalk.controller.app.progress import PathBar  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_walk  # noqa: PLC0415
 
@@ -62,7 +62,7 @@ def run(
             on_event=bar.on_event,
         )
     outcome = finished.outcome
-    left = leave(finished.log, folder, film=film)
+    artifacts = write_artifacts(finished.record, folder, film=film)
     show(
         {
             "run": name,
@@ -74,7 +74,7 @@ def run(
             **finished.pose.facts(),
             "log": str(finished.log),
             "summary": str(folder / "summary.json"),
-            **left.facts(),
+            **artifacts.to_dict(),
         },
         as_json,
     )

@@ -5,8 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich import progress
-from rich.console import Console
 from rich.table import Table
 
 from snakewalk.config.extras import require_extra
@@ -50,6 +48,7 @@ def sweep(
     as_json: Json = False,
 ) -> None:
     """Measure gaits over their parameters: speed, cost of transport, torque, heat, slip."""
+    from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.studies.pool import each  # noqa: PLC0415
     from snakewalk.controller.app.studies.sweep_measure import measure  # noqa: PLC0415
     from snakewalk.controller.app.studies.sweep_points import plan_sweep  # noqa: PLC0415
@@ -64,12 +63,12 @@ def sweep(
     table = Sweep(out)
     missing = table.missing(planned.points)
     with table:
-        for point, row in progress.track(
+        for point, row in show_progress(
             each(measure, missing, workers=workers, dask=dask),
-            total=len(planned.points),
-            completed=len(planned.points) - len(missing),
-            description=str(out),
-            console=Console(stderr=True),
+            str(out),
+            len(planned.points),
+            done=len(planned.points) - len(missing),
+            transient=False,
         ):
             table.add(point, row)
     rows = digest(read_table(out))

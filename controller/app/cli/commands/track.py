@@ -5,8 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import track as progress
 from rich.table import Table
 
 from snakewalk.controller.app.cli.options import Json, console
@@ -32,6 +30,7 @@ def track(
     as_json: Json = False,
 ) -> None:
     """Examine recordings: wave, bends, states this robot can use, slowing for its servos."""
+    from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.recordings.recording import examine  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.capture.readers.generated import EMBEDDED  # noqa: PLC0415
 
@@ -39,7 +38,7 @@ def track(
     names = recordings or list(EMBEDDED)
     found = [
         examine(name, robot, world, None if name in EMBEDDED else rate)
-        for name in progress(names, "recordings", console=Console(stderr=True), transient=True)
+        for name in show_progress(names, "recordings", len(names))
     ]
     if picture is not None:
         from snakewalk.controller.app.report.plots.recording import draw  # noqa: PLC0415

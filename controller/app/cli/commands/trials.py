@@ -5,8 +5,6 @@ from dataclasses import asdict
 from typing import Annotated
 
 import typer
-from rich import progress
-from rich.console import Console
 from rich.table import Table
 
 from snakewalk.config.extras import require_extra
@@ -59,6 +57,7 @@ def trials(
     as_json: Json = False,
 ) -> None:
     """Simulate a job over seeds, motions, robots and relief; tabulate what was reached and why."""
+    from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.studies import trials as study  # noqa: PLC0415  heavy; --help stays quick
 
     require_extra("trials need", "mujoco")
@@ -73,11 +72,8 @@ def trials(
     for case in cases:
         study.prepare_case(run, case, 0, changes)  # refuse bad input before any process starts
     found = []
-    for done in progress.track(
-        study.trials(run, cases, seeds, workers, changes),
-        total=len(cases) * seeds,
-        description=run,
-        console=Console(stderr=True),
+    for done in show_progress(
+        study.trials(run, cases, seeds, workers, changes), run, len(cases) * seeds, transient=False
     ):
         found.append(done)
     rows = study.table(found, cases)

@@ -5,8 +5,6 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich import progress
-from rich.console import Console
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
@@ -32,6 +30,7 @@ def tune(
     as_json: Json = False,
 ) -> None:
     """Search a gait's parameters for speed or efficiency, and compare with the defaults."""
+    from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
     from snakewalk.controller.app.studies import tune as search  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.gaits.registry import make_gait  # noqa: PLC0415
 
@@ -40,9 +39,7 @@ def tune(
     refuse_to_overwrite([out], force)
     require_extra("tuning needs", "mujoco")
     body = robot or ("alternating16" if make_gait(gait).needs.pitch else "yaw16")
-    bar = progress.Progress(console=Console(stderr=True))
-    with bar:
-        task = bar.add_task(f"{gait} for {aim}", total=budget)
+    with ProgressBar(f"{gait} for {aim}", budget) as bar:
         found = search.tune(
             gait,
             body,
@@ -52,9 +49,9 @@ def tune(
             seconds=seconds,
             seed=seed,
             workers=workers,
-            on_progress=lambda done: bar.update(task, completed=done),
+            on_progress=bar.update,
         )
-        bar.update(task, completed=budget)
+        bar.update(budget)
     facts: dict[str, object] = {
         "gait": gait,
         "robot": body,

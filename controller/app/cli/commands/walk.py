@@ -5,8 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import track as progress
 from rich.table import Table
 
 from snakewalk.controller.app.cli.options import Json, console
@@ -38,6 +36,7 @@ def walk(
     as_json: Json = False,
 ) -> None:
     """Walk graphs of states until all are seen: how many steps, and how soon states come again."""
+    from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.studies.graph_study import graph_source, run_study  # noqa: PLC0415
     from snakewalk.controller.shape.walks import RULES, check_rule  # noqa: PLC0415
 
@@ -50,7 +49,7 @@ def walk(
     cases = [(spec, name) for spec in dict.fromkeys(graphs) for name in dict.fromkeys(rules)]
     found = [
         run_study(spec, name, repeats, seed)
-        for spec, name in progress(cases, "walks", console=Console(stderr=True), transient=True)
+        for spec, name in show_progress(cases, "walks", len(cases))
     ]
     if picture is not None:
         from snakewalk.controller.app.report.plots.walk import draw  # noqa: PLC0415

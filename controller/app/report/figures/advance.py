@@ -12,7 +12,7 @@ from snakewalk.controller.app.report.figures.style import (
     mark_waypoints,
     trace,
 )
-from snakewalk.controller.metrics.path import path_error_m, waypoint_times_s
+from snakewalk.controller.metrics.path_error import path_error_m, waypoint_times_s
 from snakewalk.controller.runlog.record import RunRecord
 
 

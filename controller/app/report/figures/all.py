@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from snakewalk.controller.app.report.figures.advance import advance_figure
 from snakewalk.controller.app.report.figures.effort import effort_figure
 from snakewalk.controller.app.report.figures.joints import joints_figure
-from snakewalk.controller.app.report.figures.path import way_figure
+from snakewalk.controller.app.report.figures.path import path_figure
 from snakewalk.controller.app.report.figures.safety import safety_figure
 from snakewalk.controller.app.report.figures.style import data_uri, style
 from snakewalk.controller.app.report.figures.timing import timing_figure
@@ -21,7 +21,7 @@ _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] =
         "The way",
         "Seen from above. A waypoint's disc is its radius: green when the centre of mass has come "
         "inside it in its turn, orange when not. The body grows darker with time.",
-        way_figure,
+        path_figure,
     ),
     (
         "Speed and path",

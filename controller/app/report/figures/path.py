@@ -18,14 +18,14 @@ from snakewalk.controller.app.report.figures.style import (
     WIDTH_IN,
     legend_above,
 )
-from snakewalk.controller.metrics.path import waypoint_times_s
+from snakewalk.controller.metrics.path_error import waypoint_times_s
 from snakewalk.controller.runlog.record import RunRecord
 
 _BODY_SPACING = 1.3  # body lengths between the bodies drawn
 _MARGIN_M = 0.35
 
 
-def way_figure(record: RunRecord) -> Figure | None:
+def path_figure(record: RunRecord) -> Figure | None:
     """Map in the horizontal plane; None without a pose."""
     pose = record.pose
     if len(pose.time_s) == 0:

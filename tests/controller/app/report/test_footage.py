@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.report import artifacts as leave
+from snakewalk.controller.app.report import artifacts
 from snakewalk.controller.app.report.film import body_qpos, film_run, speed_up
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import QposTable, RunRecord
@@ -61,17 +61,17 @@ def test_a_film_is_never_longer_than_half_a_minute() -> None:
 def test_film_and_page_come_from_the_log_alone(make: Make, tmp_path: Path) -> None:
     av = pytest.importorskip("av")
     log = make(tmp_path / "run.mcap", seconds=1.5, ground="hills")
-    left = leave.leave_report(log, tmp_path / "out")
-    if left.film is None:
-        pytest.skip(left.notes[0])
-    assert left.notes == ()
-    with av.open(str(left.film)) as film:
+    made = artifacts.make_artifacts(read_log(log), tmp_path / "out")
+    if made.film is None:
+        pytest.skip(made.notes[0])
+    assert made.notes == ()
+    with av.open(str(made.film)) as film:
         frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
     assert len(frames) in (22, 23)
     assert frames[0].shape == (450, 800, 3)
     assert frames[0].std() > 10.0, "not a black picture"
-    assert left.report is not None
-    assert "data:video/mp4;base64," in left.report.read_text(encoding="utf-8")
+    assert made.report is not None
+    assert "data:video/mp4;base64," in made.report.read_text(encoding="utf-8")
 
 
 def test_what_cannot_be_drawn_is_said_in_a_line(
@@ -80,14 +80,14 @@ def test_what_cannot_be_drawn_is_said_in_a_line(
     def nothing_draws(*_: object, **__: object) -> int:
         raise InputError("films need an OpenGL that draws without a screen")
 
-    monkeypatch.setattr(leave, "film_run", nothing_draws)
+    monkeypatch.setattr(artifacts, "film_run", nothing_draws)
     (tmp_path / "film.mp4").write_bytes(b"of an earlier run")
-    left = leave.leave_report(make(tmp_path / "run.mcap", seconds=1.0), tmp_path)
-    assert left.notes == ("no film: films need an OpenGL that draws without a screen",)
-    assert left.film is None
+    made = artifacts.make_artifacts(read_log(make(tmp_path / "run.mcap", seconds=1.0)), tmp_path)
+    assert made.notes == ("no film: films need an OpenGL that draws without a screen",)
+    assert made.film is None
     assert not (tmp_path / "film.mp4").exists()
-    assert left.report is not None
-    assert "<video" not in left.report.read_text(encoding="utf-8")
+    assert made.report is not None
+    assert "<video" not in made.report.read_text(encoding="utf-8")
 
 
 def test_a_log_without_poses_has_no_film(make: Make, tmp_path: Path) -> None:

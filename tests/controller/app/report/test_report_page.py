@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.report import film_on_page as film_module
-from snakewalk.controller.app.report.build import build_report
+from snakewalk.controller.app.report import page as page_module
+from snakewalk.controller.app.report.artifacts import build_report
 from snakewalk.controller.app.report.figures.path import body_outline_m
 from snakewalk.controller.app.report.figures.style import thin
 from snakewalk.controller.app.report.page import page
 from snakewalk.controller.metrics.summary import summary
+from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import Event, RunRecord
 
 Make = Callable[..., Path]
@@ -48,7 +49,7 @@ def parsed(html: str) -> Sources:
 
 def test_the_page_stands_alone(make: Make, tmp_path: Path) -> None:
     log = make(tmp_path / "run.mcap", seconds=12.0, ground="hills")
-    first = build_report(log, tmp_path / "a")
+    first = build_report(read_log(log), tmp_path / "a")
     log.rename(tmp_path / "b.mcap")
     html = first.read_text(encoding="utf-8")
     sources = parsed(html).sources
@@ -60,13 +61,13 @@ def test_the_page_stands_alone(make: Make, tmp_path: Path) -> None:
     assert "<script" not in html
     assert "waypoint 1 reached" in html
     assert (tmp_path / "a" / "summary.json").is_file()
-    again = build_report(tmp_path / "b.mcap", tmp_path / "c")
+    again = build_report(read_log(tmp_path / "b.mcap"), tmp_path / "c")
     assert again.read_bytes() == first.read_bytes(), "no date, no path, no chance in it"
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.02, 0.1])
 def test_a_run_that_hardly_began_has_a_page(make: Make, tmp_path: Path, seconds: float) -> None:
-    page_path = build_report(make(tmp_path / "run.mcap", seconds=seconds), tmp_path)
+    page_path = build_report(read_log(make(tmp_path / "run.mcap", seconds=seconds)), tmp_path)
     assert "0 of 4" in page_path.read_text(encoding="utf-8")
 
 
@@ -82,15 +83,15 @@ def test_film_inside_or_beside(make: Make, tmp_path: Path, monkeypatch: pytest.M
     film = tmp_path / "out" / "my film.mp4"
     film.parent.mkdir()
     film.write_bytes(b"\0" * 1000)
-    small = film_module.film_html(film, tmp_path / "out")
+    small = page_module.film_html(film, tmp_path / "out")
     assert re.search(r"src='data:video/mp4;base64,A{20}", small)
-    monkeypatch.setattr(film_module, "INLINE_BYTES", 999)
-    assert "src='my%20film.mp4'" in film_module.film_html(film, tmp_path / "out")
-    assert "src='../out/my%20film.mp4'" in film_module.film_html(film, tmp_path / "other")
+    monkeypatch.setattr(page_module, "INLINE_BYTES", 999)
+    assert "src='my%20film.mp4'" in page_module.film_html(film, tmp_path / "out")
+    assert "src='../out/my%20film.mp4'" in page_module.film_html(film, tmp_path / "other")
     with pytest.raises(InputError, match="no such film"):
-        film_module.film_html(tmp_path / "gone.mp4", tmp_path)
+        page_module.film_html(tmp_path / "gone.mp4", tmp_path)
     with pytest.raises(InputError, match=r"\.mp4, \.webm"):
-        film_module.film_html(tmp_path / "film.avi", tmp_path)
+        page_module.film_html(tmp_path / "film.avi", tmp_path)
 
 
 def test_thinning_keeps_the_peaks_and_the_mean() -> None:

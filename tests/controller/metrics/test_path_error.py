@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from snakewalk.controller.metrics.path import (
+from snakewalk.controller.metrics.path_error import (
     distance_m,
     length_m,
     path_error_m,
