@@ -1,1 +1,1 @@
-"""bus."""
+"""Requests to servos and their replies, one result for each servo."""

@@ -1,1 +1,1 @@
-"""port."""
+"""Bytes out and bytes in on a line, with a clock."""

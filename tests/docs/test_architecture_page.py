@@ -64,3 +64,12 @@ def test_a_way_of_data_is_short_and_true(heading: str) -> None:
 
 def test_no_way_is_left_unchecked() -> None:
     assert set(ways()) == set(LONGEST)
+
+
+def test_every_room_says_in_a_sentence_what_it_is() -> None:
+    rooms = {
+        file.parent.relative_to(ROOT): str(ast.get_docstring(ast.parse(file.read_text())))
+        for top in ORDER
+        for file in (ROOT / top).rglob("__init__.py")
+    }
+    assert {room for room, says in rooms.items() if len(says.split()) < 5} == set()

@@ -1,1 +1,1 @@
-"""plots."""
+"""Pictures that commands draw, one file a command."""
