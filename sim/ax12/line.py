@@ -19,17 +19,16 @@ from snakewalk.sim.ax12.protocol1 import (
     frame,
 )
 from snakewalk.sim.ax12.table import TABLE_BYTES
-from snakewalk.sim.line.bus_contention import bus_contention
+from snakewalk.sim.line.bus_contention import Reply, bus_contention
 from snakewalk.sim.line.clock import SimClock
-from snakewalk.sim.line.instruction_handler import Reply
 from snakewalk.sim.line.wire import Wire
 
 BAUD_CLOCK = 2_000_000
 """Baud Rate(4): 2 000 000 / (value + 1), e-manual."""
 BAUD_TOLERANCE = 0.03
-"""The manual's own: 3 % off is still heard."""
-ANSWERED_FROM: dict[int, int] = {Instruction1.PING: 0, Instruction1.READ: 1}
-"""Least Status Return Level(16) at which an instruction is answered; 2 for all others."""
+"""A servo still receives at a rate that is off by 3 % (e-manual)."""
+REPLY_LEVELS: dict[int, int] = {Instruction1.PING: 0, Instruction1.READ: 1}
+"""Least Status Return Level(16) at which servos reply to an instruction; 2 for all others."""
 _ID_AT = 2
 
 
@@ -52,26 +51,26 @@ class Ax12Line(Wire):
         self._muted = np.zeros(len(servos), bool)
         self.setBaudRate(baud)
 
-    # what a fault file needs
+    # for a fault file
 
     def ids(self) -> list[int]:
         """The ID of each row."""
         return [int(each) for each in self.servos["ID"]]
 
-    def senders(self, answer: bytes) -> Collection[int]:
-        """Who has written an answer."""
-        return (answer[_ID_AT],)
+    def senders(self, reply: bytes) -> Collection[int]:
+        """ID of the servo that sent a reply."""
+        return (reply[_ID_AT],)
 
     def rename(self, row: int, servo_id: int) -> None:
         """Give a servo another ID."""
         self.servos["ID"][row] = servo_id
 
     def mute(self, rows: NDArray[np.intp], on: bool) -> None:
-        """Let servos fall silent, or speak again; they hear and obey."""
+        """Stop servos from replying, or let them reply again; they still receive and obey."""
         self._muted[rows] = on
 
     def refresh_ids(self) -> None:
-        """Nothing is remembered: who is there is asked anew for every packet."""
+        """Nothing to do: the IDs are looked up anew for every packet."""
 
     def shown(self, register: str) -> NDArray[np.unsignedinteger]:
         """(S,) values of a register as a read now would show them; a copy."""
@@ -87,7 +86,7 @@ class Ax12Line(Wire):
         self._reader.reset()
 
     def _on_baud_change(self, baud: int) -> None:
-        del baud  # asked anew for every packet
+        del baud  # looked up anew for every packet
 
     def _split(self, data: bytes) -> Sequence[bytes]:
         frames, at = [], 0
@@ -99,15 +98,15 @@ class Ax12Line(Wire):
             at = end
         return [*frames, data[at:]]
 
-    def _receive(self, data: bytes, end_s: float) -> list[Reply]:
+    def _execute(self, data: bytes, end_s: float) -> list[Reply]:
         return [
             answer
             for piece in self._instruction_with_faults(data, end_s)
             for packet in self._reader.feed(piece)
-            for answer in self._execute(packet)
+            for answer in self._execute_packet(packet)
         ]
 
-    def _hearing(self, servo_id: int) -> list[int]:
+    def _addressed(self, servo_id: int) -> list[int]:
         servos, rate = self.servos, self.getBaudRate()
         return [
             row
@@ -117,36 +116,38 @@ class Ax12Line(Wire):
             and abs(BAUD_CLOCK / (int(servos["Baud Rate"][row]) + 1) / rate - 1.0) <= BAUD_TOLERANCE
         ]
 
-    def _execute(self, packet: Packet1) -> list[Reply]:
+    def _execute_packet(self, packet: Packet1) -> list[Reply]:
         code, params = packet.instruction, packet.params
         if code == Instruction1.SYNC_WRITE:
             return self._sync_write(packet)
         replies = []
-        for row in self._hearing(packet.servo_id):
+        for row in self._addressed(packet.servo_id):
             own = int(self.servos["ID"][row])
             delay_s = int(self.servos["Return Delay Time"][row]) * RETURN_DELAY_UNIT_S
             level = int(self.servos["Status Return Level"][row])
             error, data = Error1.CHECKSUM.value, b""
             if packet.intact:
-                error, data = self._one(row, code, params)
-            asked = ANSWERED_FROM.get(code, 2)
+                error, data = self._execute_one(row, code, params)
+            asked = REPLY_LEVELS.get(code, 2)
             if packet.servo_id == BROADCAST_ID and code != Instruction1.PING:
                 continue
             if level >= asked and not self._muted[row]:
                 shown = error | int(self.servos.protection.shown[row])
-                replies.append((own, delay_s, frame(own, shown, data)))
+                replies.append((own, Reply(delay_s, frame(own, shown, data))))
         replies.sort(key=lambda reply: reply[0])  # to a broadcast ping, IDs answer in turn
-        return [self._respond(list(each)) for _, each in groupby(replies, lambda reply: reply[0])]
+        return [
+            self._respond([reply for _, reply in each])
+            for _, each in groupby(replies, lambda reply: reply[0])
+        ]
 
-    def _respond(self, replies: list[tuple[int, float, bytes]]) -> Reply:
-        """What is heard of the servos with one ID."""
-        timed = [(delay_s, data) for _, delay_s, data in replies]
-        delay_s, data, garbled = bus_contention(timed, BITS_PER_BYTE / self.getBaudRate())
+    def _respond(self, replies: list[Reply]) -> Reply:
+        """Bytes on the wire of the servos with one ID."""
+        reply, garbled = bus_contention(replies, BITS_PER_BYTE / self.getBaudRate())
         self.collisions += garbled
-        return Reply(delay_s, data)
+        return reply
 
-    def _one(self, row: int, code: int, params: bytes) -> tuple[int, bytes]:
-        """Error bits and parameters of the answer."""
+    def _execute_one(self, row: int, code: int, params: bytes) -> tuple[int, bytes]:
+        """Error bits and parameters of the reply."""
         servos = self.servos
         if code == Instruction1.PING and not params:
             return 0, b""
@@ -172,6 +173,6 @@ class Ax12Line(Wire):
         if packet.intact and packet.servo_id == BROADCAST_ID and len(params) >= 2:
             address, size = params[0], params[1]
             for at in range(2, len(params) - size, size + 1):
-                for row in self._hearing(params[at]):
+                for row in self._addressed(params[at]):
                     self.servos.write(row, address, params[at + 1 : at + 1 + size])
         return []

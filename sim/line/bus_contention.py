@@ -1,23 +1,29 @@
-"""What is left when several servos speak at once: the bus is wired, and a zero wins."""
+"""Bus contention: several servos reply at once on one wire, where a zero wins."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 
-def bus_contention(
-    replies: Sequence[tuple[float, bytes]], byte_s: float
-) -> tuple[float, bytes, bool]:
-    """Start, bytes and whether they were garbled, of ``replies`` (start in s, bytes).
+class Reply(NamedTuple):
+    """Bytes on the wire after a silence."""
 
-    Voices that say the same at the same time are one reply, as on metal. Otherwise bits are ANDed
-    where they overlap, in whole bytes.
+    delay_s: float
+    data: bytes
+
+
+def bus_contention(replies: Sequence[Reply], byte_s: float) -> tuple[Reply, bool]:
+    """Bytes on the wire when ``replies`` to one packet meet, and whether they are garbled.
+
+    Equal replies at the same time are one reply, as on metal. Otherwise bits are ANDed where they
+    overlap, in whole bytes of ``byte_s``.
     """
-    start_s, first = min(replies)
-    if all(reply == (start_s, first) for reply in replies):
-        return start_s, first, False
+    first = min(replies)
+    if all(reply == first for reply in replies):
+        return first, False
     mixed = bytearray()
-    for begin_s, data in replies:
-        at = round((begin_s - start_s) / byte_s)
+    for delay_s, data in replies:
+        at = round((delay_s - first.delay_s) / byte_s)
         mixed += b"\xff" * (at + len(data) - len(mixed))
         for k, byte in enumerate(data, at):
             mixed[k] &= byte
-    return start_s, bytes(mixed), True
+    return Reply(first.delay_s, bytes(mixed)), True

@@ -1,8 +1,9 @@
-"""The two packets of a control cycle for all servos at once: a slice and one CRC pass.
+"""Group fast path: the two packets of a control cycle for all servos at once.
 
-Same bytes as ``sim.line.instruction_handler`` gives servo by servo (a test holds them together), at
-a cost that hardly grows with the number of servos. What is not plain, such as stuffing, a missing
-ID or a silent servo, goes the general way.
+A slice of the control tables and one CRC pass give the same bytes as
+``sim.line.instruction_handler`` does servo by servo (a test compares them), at a cost that hardly
+grows with the number of servos. What is not plain, such as stuffing, a missing ID or a silent
+servo, is left to the handler.
 """
 
 from abc import ABC, abstractmethod
@@ -15,7 +16,8 @@ from snakewalk.drivers.protocol.crc import crc16
 from snakewalk.drivers.protocol.frames import crc_of
 from snakewalk.drivers.protocol.packet import HEADER, STATUS, Instruction, fast_head, stuff
 from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
-from snakewalk.sim.line.instruction_handler import InstructionHandler, Reply
+from snakewalk.sim.line.bus_contention import Reply
+from snakewalk.sim.line.instruction_handler import InstructionHandler
 from snakewalk.sim.servo.servo_loops import fill_replies
 
 MOTION = range(126, 136)
@@ -23,7 +25,7 @@ MOTION = range(126, 136)
 
 
 class GroupRead(ABC):
-    """One kind of group read: a template of its answer, and how to fill in the rest.
+    """One kind of group read: a template of its reply, and how to fill in the rest.
 
     ``status`` is the address of Hardware Error Status, which the alert in the error byte follows.
     """
@@ -48,14 +50,14 @@ class GroupRead(ABC):
         self._share = frames.shape[1]
         self._shape = np.array([len(head), self._share, error_at, data_at])
 
-    def answers(self, table: Bytes, whole: bool) -> list[Reply]:
-        """Packets with the table's present bytes."""
+    def replies(self, table: Bytes, whole: bool) -> list[Reply]:
+        """Replies with the table's present bytes."""
         fill_replies(self._packet, self._shape, table, self._rows, self._block)
         return self._cut(self._packet.tobytes(), whole)
 
     @abstractmethod
     def _cut(self, raw: bytes, whole: bool) -> list[Reply]:
-        """Cut the answer into the packets that it is."""
+        """Cut the reply into its packets."""
 
     @abstractmethod
     def _template(self, ids: Bytes, length: int) -> tuple[bytes, Bytes, int, int]:
@@ -105,7 +107,7 @@ _GOALS = b"\x74\x00\x04\x00"
 """Address 116 and length 4, as a sync write begins."""
 
 
-class GroupPath:
+class GroupFastPath:
     """Vectorised sync write of goal positions and (fast) sync read of any block."""
 
     def __init__(self, handler: InstructionHandler) -> None:
@@ -118,7 +120,7 @@ class GroupPath:
         self._goals: tuple[bytes, bytes, NDArray[np.intp]] | None = None
 
     def execute(self, raw: bytes, now_s: float, whole: bool) -> list[Reply] | None:
-        """Carry out ``raw`` if it is plain, else return None and leave all as it was.
+        """Execute ``raw`` if it is plain, else return None and change nothing.
 
         ``whole`` joins packets that follow each other without a gap into one piece.
         """
@@ -141,7 +143,7 @@ class GroupPath:
             self._firmware.refresh_motion()
         else:
             self._firmware.refresh(read.address, read.length)
-        return read.answers(self._bank.table, whole)
+        return read.replies(self._bank.table, whole)
 
     def _write_goals(self, raw: bytes, now_s: float) -> list[Reply] | None:
         head, ids = raw[:12], raw[12:-2:5]

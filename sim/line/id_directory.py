@@ -1,4 +1,4 @@
-"""Who on the bus hears which ID, and who of them will answer."""
+"""The ID directory: which servos an ID reaches, and which of them reply to it."""
 
 from collections import defaultdict
 
@@ -14,19 +14,19 @@ _SECONDARY_OFF = 253
 
 
 class IdDirectory:
-    """The servos with power at the line's baud rate, by primary and by secondary ID."""
+    """The powered servos at the line's baud rate, by primary and by secondary ID."""
 
     def __init__(self, bank: ServoBank) -> None:
         self._bank = bank
         self.mute = np.zeros(len(bank), bool)
-        """(S,) servos that hear and obey but cannot be heard."""
+        """(S,) servos that receive and obey but whose replies are lost."""
         self.rows = np.full(256, NOBODY, np.intp)
-        """(256,) row of each ID in the plain case: one servo, which answers."""
+        """(256,) row of each ID that belongs to one servo, which replies; else a constant above."""
         self._first: dict[int, list[int]] = {}
         self._second: dict[int, list[int]] = {}
 
-    def call(self, baud: int, powered: NDArray[np.bool_]) -> None:
-        """Look up who is there after IDs, baud rates or power have changed."""
+    def refresh(self, baud: int, powered: NDArray[np.bool_]) -> None:
+        """Look up the servos again, after IDs, baud rates or power have changed."""
         bank = self._bank
         first, second = defaultdict(list), defaultdict(list)
         for row in bank.tuned_to(baud):
@@ -45,11 +45,11 @@ class IdDirectory:
             self.rows[each] = SPECIAL
 
     def present(self) -> list[int]:
-        """Rows of all servos that hear."""
+        """Rows of all servos that receive."""
         return sorted(row for rows in self._first.values() for row in rows)
 
     def ids(self) -> list[int]:
-        """Primary IDs that somebody has, ascending."""
+        """Primary IDs in use, ascending."""
         return sorted(self._first)
 
     def primary(self, servo_id: int) -> list[int]:
@@ -57,9 +57,9 @@ class IdDirectory:
         return self._first.get(servo_id, [])
 
     def secondary(self, servo_id: int) -> list[int]:
-        """Rows of the servos that share this secondary ID: they obey, and never answer."""
+        """Rows of the servos that share this secondary ID: they obey, and never reply."""
         return self._second.get(servo_id, [])
 
     def replying(self, servo_id: int) -> list[int]:
-        """Rows that answer to this ID."""
+        """Rows that reply to this ID."""
         return [row for row in self.primary(servo_id) if not self.mute[row]]

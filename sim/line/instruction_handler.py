@@ -1,10 +1,8 @@
-"""How the servos of a bus answer one instruction packet, any of them, one servo at a time.
+"""The servos' replies to any instruction packet, one servo at a time.
 
-The two packets of a control cycle have a vectorised way in ``sim.line.group_fast_path`` with the
-same result.
+``sim.line.group_fast_path`` gives the same replies to the two packets of a control cycle, for all
+servos at once.
 """
-
-from typing import NamedTuple
 
 from snakewalk.drivers.protocol.packet import (
     BITS_PER_BYTE,
@@ -17,24 +15,17 @@ from snakewalk.drivers.protocol.packet import (
     encode_status,
 )
 from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
-from snakewalk.sim.line.bus_contention import bus_contention
+from snakewalk.sim.line.bus_contention import Reply, bus_contention
 from snakewalk.sim.line.id_directory import IdDirectory
 from snakewalk.sim.line.instructions import Instructions, word
 from snakewalk.sim.servo.firmware import Firmware
 
-LONGEST = 0xFFFF
-"""What the length field of a packet ends at."""
-
-
-class Reply(NamedTuple):
-    """Bytes on the wire after a silence."""
-
-    delay_s: float
-    data: bytes
+MAX_LENGTH = 0xFFFF
+"""Greatest value of a packet's length field."""
 
 
 class InstructionHandler:
-    """Executes instruction packets on a firmware and composes the answers."""
+    """Executes instruction packets on a firmware and composes the replies."""
 
     def __init__(self, firmware: Firmware, baud: int) -> None:
         self.firmware = firmware
@@ -42,23 +33,23 @@ class InstructionHandler:
         self.baud = baud
         self.directory = IdDirectory(self.bank)
         self.version = 0
-        """Grows whenever registers were written, so that others know what to look up again."""
+        """Grows whenever registers were written: what others have looked up may have changed."""
         self.collisions = 0
-        """Answers that were garbled because servos spoke at once."""
+        """Replies that were garbled because several servos replied at once."""
         self.refresh_ids()
         self._instructions = Instructions(firmware)
 
     def refresh_ids(self) -> None:
-        """Look up again who listens at the line's baud rate, under which ID."""
-        self.directory.call(self.baud, self.firmware.powered)
+        """Look up again which servos the line's baud rate reaches, and by which ID."""
+        self.directory.refresh(self.baud, self.firmware.powered)
         self.version += 1
 
     def delay_s(self, row: int) -> float:
-        """Silence that a servo keeps before it answers."""
+        """Silence that a servo keeps before it replies."""
         return int(self.bank["Return Delay Time"][row]) * RETURN_DELAY_UNIT_S
 
     def execute(self, packet: InstructionPacket, now_s: float) -> list[Reply]:
-        """Carry out a valid packet that ended at ``now_s``; the firmware is already there."""
+        """Execute a valid packet that ended at ``now_s``; the firmware is already there."""
         if not self.directory.present():
             return []
         self.firmware.on_instruction(now_s)
@@ -85,31 +76,31 @@ class InstructionHandler:
             level, delay_s = int(self.bank["Status Return Level"][row]), self.delay_s(row)
             error = self._one(row, code, params)
             if level == 2 and not self.directory.mute[row]:
-                replies.append((delay_s, self._status(row, servo_id, error, b"")))
+                replies.append(Reply(delay_s, self._status(row, servo_id, error, b"")))
         for row in self.directory.secondary(servo_id):
             self._one(row, code, params, ram_only=True)
         return self._respond(replies)
 
-    def _respond(self, replies: list[tuple[float, bytes]]) -> list[Reply]:
+    def _respond(self, replies: list[Reply]) -> list[Reply]:
         if not replies:
             return []
-        delay_s, data, garbled = bus_contention(replies, BITS_PER_BYTE / self.baud)
+        reply, garbled = bus_contention(replies, BITS_PER_BYTE / self.baud)
         self.collisions += garbled
-        return [Reply(delay_s, data)]
+        return [reply]
 
     def _status(self, row: int, servo_id: int, error: int, data: bytes) -> bytes:
         return encode_status(StatusPacket(servo_id, error | int(self.bank.alert(row)), data))
 
     def _ping(self, servo_id: int) -> list[Reply]:
-        answers = []
+        sent = []
         for each in self.directory.ids() if servo_id == BROADCAST_ID else (servo_id,):
             replies = []
             for row in self.directory.replying(each):
                 model, firmware = self.bank["Model Number"][row], self.bank["Firmware Version"][row]
                 data = int(model).to_bytes(2, "little") + bytes((int(firmware),))
-                replies.append((self.delay_s(row), self._status(row, each, 0, data)))
-            answers += self._respond(replies)
-        return answers
+                replies.append(Reply(self.delay_s(row), self._status(row, each, 0, data)))
+            sent += self._respond(replies)
+        return sent
 
     def _block(self, row: int, address: int, length: int) -> tuple[int, bytes]:
         if not self.bank.readable(address, length):
@@ -125,7 +116,7 @@ class InstructionHandler:
             error, data = ResultError.DATA_LENGTH.value, b""
             if len(params) == 4:
                 error, data = self._block(row, word(params, 0), word(params, 2))
-            replies.append((self.delay_s(row), self._status(row, servo_id, error, data)))
+            replies.append(Reply(self.delay_s(row), self._status(row, servo_id, error, data)))
         return self._respond(replies)
 
     def _sync_read(self, params: bytes, *, fast: bool) -> list[Reply]:
@@ -140,14 +131,14 @@ class InstructionHandler:
         return self._group_read(asked, fast)
 
     def _group_read(self, asked: list[tuple[int, int, int]], fast: bool) -> list[Reply]:
-        """Servos answer in the order asked; each waits for the one before.
+        """Servos reply in the order of the request; each waits for the one before.
 
-        So after one that is silent, the rest is silent too (ROBOTIS on the SDK's issue tracker).
+        So behind a silent one all are silent (ROBOTIS on the SDK's issue tracker).
         """
-        if fast and sum(length + 4 for _, _, length in asked) + 1 > LONGEST:
-            return []  # no length field could announce the common answer
+        if fast and sum(length + 4 for _, _, length in asked) + 1 > MAX_LENGTH:
+            return []  # no length field could announce the common reply
         self.firmware.refresh()
-        answers: list[Reply] = []
+        sent: list[Reply] = []
         parts: list[tuple[int, int, bytes]] = []
         first_s, garbled = 0.0, False
         for servo_id, address, length in asked:
@@ -161,16 +152,16 @@ class InstructionHandler:
             blocks = [self._block(row, address, length) for row in rows]
             if fast:
                 first_s = first_s if parts else min(self.delay_s(row) for row in rows)
-                said = [
+                shares = [
                     (error | int(self.bank.alert(row)), servo_id, data.ljust(length, b"\0"))
                     for row, (error, data) in zip(rows, blocks, strict=True)
                 ]
-                garbled |= any(part != said[0] for part in said)
-                parts.append(said[0])
+                garbled |= any(part != shares[0] for part in shares)
+                parts.append(shares[0])
             else:
-                answers += self._respond(
+                sent += self._respond(
                     [
-                        (self.delay_s(row), self._status(row, servo_id, error, data))
+                        Reply(self.delay_s(row), self._status(row, servo_id, error, data))
                         for row, (error, data) in zip(rows, blocks, strict=True)
                     ]
                 )
@@ -178,8 +169,8 @@ class InstructionHandler:
             whole = sum(length + 4 for _, _, length in asked)
             data = encode_fast(parts, whole)
             self.collisions += garbled
-            answers.append(Reply(first_s, data[:-2] + b"\0\0" if garbled else data))
-        return answers
+            sent.append(Reply(first_s, data[:-2] + b"\0\0" if garbled else data))
+        return sent
 
     def _sync_write(self, params: bytes) -> list[Reply]:
         address, length = word(params, 0), word(params, 2)
@@ -206,7 +197,7 @@ class InstructionHandler:
             self._instructions.write(row, address, data, ram_only=True)
 
     def _one(self, row: int, code: int, params: bytes, *, ram_only: bool = False) -> int:
-        error = self._instructions.carry_out(row, code, params, ram_only=ram_only)
+        error = self._instructions.execute(row, code, params, ram_only=ram_only)
         self._written()
         return int(error)
 

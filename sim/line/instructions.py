@@ -1,4 +1,4 @@
-"""What one servo is told to do: write, register, act, reboot, reset, clear, back up."""
+"""Instructions to one servo: write, register, act, reboot, reset, clear, back up."""
 
 from collections.abc import Callable
 
@@ -19,14 +19,14 @@ RESET_KEEPS = {0xFF: (), 0x01: ("ID",), 0x02: ("ID", "Baud Rate")}
 
 
 class Instructions:
-    """Instructions to a single servo that answer with an error number and nothing else."""
+    """Executes instructions whose reply is an error number and nothing else."""
 
     def __init__(self, firmware: Firmware) -> None:
         self.firmware = firmware
         self.bank = firmware.bank
         goals = [self.bank.register(name) for name in GOALS if name in self.bank]
         self._goals = range(min(g.address for g in goals), max(g.address + g.size for g in goals))
-        self._work: dict[int, Callable[[int, bytes], int]] = {
+        self._by_code: dict[int, Callable[[int, bytes], int]] = {
             Instruction.ACTION: self._action,
             Instruction.REBOOT: self._reboot,
             Instruction.FACTORY_RESET: self._factory_reset,
@@ -34,8 +34,8 @@ class Instructions:
             Instruction.CONTROL_TABLE_BACKUP: self._back_up,
         }
 
-    def carry_out(self, row: int, code: int, params: bytes, *, ram_only: bool = False) -> int:
-        """Error number of the answer; unknown instructions are an instruction error."""
+    def execute(self, row: int, code: int, params: bytes, *, ram_only: bool = False) -> int:
+        """Execute one; returns the reply's error number, an instruction error if it is unknown."""
         if code == Instruction.WRITE:
             if len(params) < 3:
                 return ResultError.DATA_LENGTH
@@ -44,13 +44,13 @@ class Instructions:
             if len(params) < 3:
                 return ResultError.DATA_LENGTH
             return self.bank.register_write(row, word(params, 0), params[2:], ram_only=ram_only)
-        work = self._work.get(code)
+        action = self._by_code.get(code)
         if ram_only and code in (Instruction.FACTORY_RESET, Instruction.CONTROL_TABLE_BACKUP):
             return ResultError.ACCESS
-        return int(work(row, params) if work is not None else ResultError.INSTRUCTION)
+        return int(action(row, params) if action is not None else ResultError.INSTRUCTION)
 
     def write(self, row: int, address: int, data: bytes, *, ram_only: bool = False) -> int:
-        """Write, and wake a servo that goals wake."""
+        """Write, and switch on a servo whose torque a new goal enables."""
         error = self.bank.write(row, address, data, ram_only=ram_only)
         if not error and address + len(data) > self._goals.start and address < self._goals.stop:
             self.firmware.enable_by_goal(np.array([row]))

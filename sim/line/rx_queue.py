@@ -1,4 +1,4 @@
-"""Bytes on their way to the host, each with the time at which it will have arrived."""
+"""Bytes on the way to the host, each with the time at which it will have arrived."""
 
 from collections import deque
 
@@ -19,7 +19,7 @@ class RxQueue:
         return bool(self._packets)
 
     def add(self, start_s: float, data: bytes) -> float:
-        """Put a packet on the wire at ``start_s``; when its last byte will have arrived."""
+        """Put a packet on the wire at ``start_s``; returns when its last byte will have arrived."""
         packets = self._packets
         if not packets or packets[-1][0] <= start_s:
             packets.append((start_s, data))

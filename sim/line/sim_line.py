@@ -1,4 +1,4 @@
-"""Servos of Protocol 2.0 on the wire: ``sim.line.wire`` with a bank of servos behind it."""
+"""A ``sim.line.wire`` with servos of Protocol 2.0 on it."""
 
 from collections.abc import Callable, Collection, Sequence
 
@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from snakewalk.drivers.protocol.packet import BROADCAST_ID, HEADER, Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
+from snakewalk.sim.line.bus_contention import Reply
 from snakewalk.sim.line.clock import SimClock
-from snakewalk.sim.line.group_fast_path import GroupPath
+from snakewalk.sim.line.group_fast_path import GroupFastPath
 from snakewalk.sim.line.id_directory import IdDirectory
-from snakewalk.sim.line.instruction_handler import InstructionHandler, Reply
+from snakewalk.sim.line.instruction_handler import InstructionHandler
 from snakewalk.sim.line.wire import Wire
 from snakewalk.sim.plant import Plant
 from snakewalk.sim.servo.bank import ServoBank
@@ -18,7 +19,7 @@ from snakewalk.sim.servo.firmware import Firmware
 from snakewalk.sim.servo.protection import SupplyAndAmbient
 
 Tamper = Callable[[bytes], Sequence[bytes]]
-"""What becomes of one answer on the wire: itself, nothing, or other packets, in order."""
+"""Changes one reply on the wire: returns the packets that arrive instead, in order."""
 _ID_AT, _CODE_AT = 4, 7
 
 
@@ -44,31 +45,31 @@ class SimLine(Wire):
         self.bank = bank
         self.tamper = tamper
         self._handler = InstructionHandler(self.firmware, baud)
-        self._group = GroupPath(self._handler)
+        self._group = GroupFastPath(self._handler)
         self._reader = PacketParser()
         self._asked = b""
         self.setBaudRate(baud)
 
     @property
     def directory(self) -> IdDirectory:
-        """Who hears which ID."""
+        """Which servos an ID reaches."""
         return self._handler.directory
 
-    # what a fault file needs
+    # for a fault file
 
     @property
     def servos(self) -> Firmware:
-        """Those on the line, by row."""
+        """The servos on the line, by row."""
         return self.firmware
 
     def ids(self) -> list[int]:
         """The ID of each row."""
         return [int(each) for each in self.bank["ID"]]
 
-    def senders(self, answer: bytes) -> Collection[int]:
-        """Who has written an answer: one servo, or all that a fast read has asked."""
-        if answer[_ID_AT] != BROADCAST_ID:
-            return (answer[_ID_AT],)
+    def senders(self, reply: bytes) -> Collection[int]:
+        """IDs of the servos that sent a reply: one, or all that a fast read has asked."""
+        if reply[_ID_AT] != BROADCAST_ID:
+            return (reply[_ID_AT],)
         fast_bulk = self._asked[_CODE_AT] == Instruction.FAST_BULK_READ
         return self._asked[8:-2:5] if fast_bulk else self._asked[12:-2]
 
@@ -77,11 +78,11 @@ class SimLine(Wire):
         self.bank["ID"][row] = servo_id
 
     def mute(self, rows: NDArray[np.intp], on: bool) -> None:
-        """Let servos fall silent, or speak again; they hear and obey."""
+        """Stop servos from replying, or let them reply again; they still receive and obey."""
         self.directory.mute[rows] = on
 
     def refresh_ids(self) -> None:
-        """Take note that IDs, power or replies have changed by other means than a packet."""
+        """Look up the IDs again, after they, power or muting have changed without a packet."""
         self._handler.refresh_ids()
 
     def shown(self, register: str) -> NDArray[np.signedinteger]:
@@ -101,25 +102,25 @@ class SimLine(Wire):
         self._handler.baud = baud
         self._handler.refresh_ids()
 
-    def _receive(self, data: bytes, end_s: float) -> list[Reply]:
-        """Let the servos hear what the host has sent."""
+    def _execute(self, data: bytes, end_s: float) -> list[Reply]:
+        """Execute what the host has sent."""
         self._asked = data
         if self._script is None:
             apart = self.tamper is not None or bool(self.taps)
             quick = self._group.execute(data, end_s, whole=not apart)
             return self._one_by_one(data, end_s) if quick is None else quick
-        answers: list[Reply] = []
+        replies: list[Reply] = []
         for piece in self._instruction_with_faults(data, end_s):
             quick = self._group.execute(piece, end_s, whole=False)
-            answers += self._one_by_one(piece, end_s) if quick is None else quick
-        return answers
+            replies += self._one_by_one(piece, end_s) if quick is None else quick
+        return replies
 
     def _one_by_one(self, data: bytes, end_s: float) -> list[Reply]:
         return [
-            answer
+            reply
             for packet in self._reader.feed(data)
             if isinstance(packet, InstructionPacket)
-            for answer in self._handler.execute(packet, end_s)
+            for reply in self._handler.execute(packet, end_s)
         ]
 
     def _reply_with_faults(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:

@@ -1,7 +1,7 @@
 """The wire: a half-duplex bus as a byte port that owns simulated time.
 
-Bytes take ten bit times each; an instruction counts when its last byte has arrived; answers come
-after the servos' return delays. Nothing happens by itself: what was written is carried out when
+A byte takes ten bit times. An instruction takes effect when its last byte has arrived, and replies
+come after the servos' return delays. Nothing happens by itself: what was written is executed when
 the host reads, waits, or writes again, and only reads and time-outs move the clock, as far as
 needed. So a run needs no thread and no sleep, and repeats bit for bit.
 
@@ -17,25 +17,25 @@ from collections.abc import Callable, Iterable, Sequence
 
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
+from snakewalk.sim.line.bus_contention import Reply
 from snakewalk.sim.line.clock import SimClock
-from snakewalk.sim.line.instruction_handler import Reply
 from snakewalk.sim.line.noise import FaultScript
 from snakewalk.sim.line.rx_queue import RxQueue
 
 LATENCY_S = 0.016
 """The SDK's allowance for the adapter's latency timer; a packet may take two of them and 2 ms."""
 GAP_S = 5e-3
-"""After such a silence the servos take what follows for a new packet (ours)."""
+"""After such a silence the servos take the next byte for the start of a packet (ours)."""
 INSTANT_S = 1e-9
 """Times closer than this are the same."""
-PATIENT_S = 0.01
-"""An answer that is slower than this does not hold up the servos behind it (ours)."""
+HOLD_UP_MAX_S = 0.01
+"""A reply that is later than this does not hold up the servos behind it (ours)."""
 PacketTap = Callable[[float, bool, bytes], None]
-"""A listener on the wire: time of a packet's end, whether the host sent it, its bytes."""
+"""Called with every packet on the wire: time of its end, whether the host sent it, its bytes."""
 
 
 class Wire(ABC):
-    """A line of ``baud`` without anybody on it: subclasses say who hears and what they answer.
+    """A bus without servos: subclasses put servos on it, and reply for them.
 
     Reading and writing a closed port raise ``PortError``.
     """
@@ -43,9 +43,9 @@ class Wire(ABC):
     def __init__(self, clock: SimClock, usb_latency_s: float = 0.0) -> None:
         self.clock = clock
         self.usb_latency_s = usb_latency_s
-        """By how much the host's adapter hands on bytes later than they are on the wire."""
+        """Delay of the host's adapter between the wire and the host."""
         self.taps: list[PacketTap] = []
-        """Told of every packet on the wire: time of its end, from the host or not, bytes."""
+        """Callbacks for every packet on the wire."""
         self._script: FaultScript | None = None
         self._disconnected = False
         self.is_using = False
@@ -53,48 +53,48 @@ class Wire(ABC):
         self.busy_s = 0.0
         """Time during which bytes were on the wire."""
         self.collisions = 0
-        """Packets that the host began while servos were still answering."""
+        """Packets that the host began while servos were still replying."""
         self._sent: deque[tuple[float, bytes]] = deque()
         self._rx_queue = RxQueue()
         self._sent_until_s = self._quiet_s = self.clock.now_s()
-        self._deadline_s = self._heard_until_s = self.clock.now_s()
+        self._deadline_s = self._delivered_s = self.clock.now_s()
 
-    # who is on it
+    # the servos on it
 
     @abstractmethod
     def _advance(self, until_s: float) -> None:
         """Bring servos and physics to a time."""
 
     @abstractmethod
-    def _receive(self, data: bytes, end_s: float) -> list[Reply]:
-        """Let the servos hear what the host has sent."""
+    def _execute(self, data: bytes, end_s: float) -> list[Reply]:
+        """Execute what the host has sent by ``end_s``; returns the servos' replies."""
 
     @abstractmethod
     def _reset_parser(self) -> None:
-        """The line was quiet: a packet that has begun will not go on."""
+        """Forget a partial packet: the line was quiet, so its rest will not come."""
 
     @abstractmethod
     def _on_baud_change(self, baud: int) -> None:
-        """The host's side has another baud rate."""
+        """Adapt to another baud rate of the host."""
 
     @abstractmethod
     def _split(self, data: bytes) -> Sequence[bytes]:
-        """Cut what is sent at once into packets, each of which counts when its own end arrives."""
+        """Cut one write into packets, each of which takes effect when its own end arrives."""
 
-    # what goes wrong on it
+    # faults
 
     def attach(self, script: FaultScript) -> None:
-        """Let a fault file act on this line."""
+        """Let a fault file act on this line from now on."""
         self._script = script
 
     def _instruction_with_faults(self, data: bytes, now_s: float) -> Sequence[bytes]:
-        """What the servos hear of one packet that ends at ``now_s``."""
+        """Packets that the servos receive of one instruction that ends at ``now_s``."""
         if self._script is None or not self._script.noise.any:
             return (data,)
         return self._script.noise.instruction(data, now_s)
 
     def _reply_with_faults(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:
-        """What becomes of one answer that begins at ``now_s``, and by how much it is slow."""
+        """Packets that arrive of a reply that begins at ``now_s``, and by how much each is late."""
         if self._script is None or not self._script.noise.any:
             return ((0.0, data),)
         return self._script.noise.reply(data, now_s)
@@ -110,7 +110,7 @@ class Wire(ABC):
         self.is_open = False
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Retune the host's side; servos at another rate no longer hear it."""
+        """Retune the host's side; servos at another rate no longer receive."""
         self._baud = baudrate
         self._byte_s = self._rx_queue.byte_s = BITS_PER_BYTE / baudrate
         self.tx_time_per_byte = self._byte_s * 1e3
@@ -123,13 +123,13 @@ class Wire(ABC):
     def clearPort(self) -> None:
         """Drop what has arrived by now; bytes still under way will arrive all the same."""
         now_s = self.clock.now_s()
-        self._carry_out(now_s)
+        self._deliver(now_s)
         if self._rx_queue:
             self._rx_queue.take(1 << 30, now_s)
 
     def getBytesAvailable(self) -> int:
         """Bytes that have arrived by now."""
-        self._carry_out(self.clock.now_s())
+        self._deliver(self.clock.now_s())
         return self._rx_queue.count(self.clock.now_s())
 
     def writePort(self, packet: bytes | list[int]) -> int:
@@ -163,14 +163,14 @@ class Wire(ABC):
         return "simulated line"
 
     def write(self, data: bytes) -> None:
-        """Put bytes on the wire behind those already there; returns at once."""
-        self._wait_for_host()
+        """Send bytes behind those already on the wire; returns at once."""
+        self._resume_host()
         start_s = max(self.clock.now_s(), self._sent_until_s)
         if self._sent:
-            self._carry_out(start_s)
+            self._deliver(start_s)
         clear = self._quiet_s <= start_s + INSTANT_S
         if not clear:
-            self._collide(start_s)
+            self._cut_replies(start_s)
         end_s = start_s
         for frame in self._split(data):
             end_s += len(frame) * self._byte_s
@@ -182,7 +182,7 @@ class Wire(ABC):
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Up to ``count`` bytes; the clock moves to the last of them, or to ``deadline_s``."""
         clock, rx_queue, sent = self.clock, self._rx_queue, self._sent
-        self._wait_for_host()
+        self._resume_host()
         limit_s = max(deadline_s, clock.now_s())
         while count > 0:
             due_s = rx_queue.due_s(count) if rx_queue else None
@@ -192,19 +192,19 @@ class Wire(ABC):
             if not sent or sent[0][0] > limit_s:
                 clock.sleep_until_s(limit_s)
                 break
-            self._carry_out(sent[0][0])
+            self._deliver(sent[0][0])
         self._must_be_open()
         return rx_queue.take(count, clock.now_s())
 
     def drain_until_quiet(self, quiet_s: float) -> int:
-        """Throw bytes away until none has come for ``quiet_s``; the number thrown away."""
-        thrown, seen_s = 0, self.clock.now_s()
+        """Discard bytes until none has come for ``quiet_s``; returns their number."""
+        discarded, seen_s = 0, self.clock.now_s()
         while True:
             byte = self.read_until(1, seen_s + quiet_s)
             if not byte:
-                return thrown
+                return discarded
             seen_s = self.clock.now_s()
-            thrown += 1 + len(self._rx_queue.take(1 << 30, self.clock.now_s()))
+            discarded += 1 + len(self._rx_queue.take(1 << 30, self.clock.now_s()))
 
     # the wire
 
@@ -214,7 +214,7 @@ class Wire(ABC):
         self._rx_queue.clear()
 
     def reconnect(self) -> None:
-        """Give the port back; the host has to open it."""
+        """Give the port back; the host still has to open it."""
         self._disconnected = False
 
     @property
@@ -222,8 +222,8 @@ class Wire(ABC):
         """Whether the port has vanished."""
         return self._disconnected
 
-    def _wait_for_host(self) -> None:
-        """Let a host go on that wants to use the port, when and if it can."""
+    def _resume_host(self) -> None:
+        """Wait until a paused host goes on, and check that the port is open."""
         if self._script is not None:
             self.clock.sleep_until_s(self._script.host_resumes_s(self.clock.now_s()))
             self._must_be_open()
@@ -241,7 +241,7 @@ class Wire(ABC):
     def settle(self) -> None:
         """Bring servos and physics to the clock's present time."""
         now_s = self.clock.now_s()
-        self._carry_out(now_s)
+        self._deliver(now_s)
         self._advance(now_s)
 
     def next_event_s(self) -> float | None:
@@ -249,38 +249,38 @@ class Wire(ABC):
         times = [self._rx_queue.due_s(1), self._sent[0][0] if self._sent else None]
         return min((time_s for time_s in times if time_s is not None), default=None)
 
-    def _carry_out(self, until_s: float) -> None:
-        """Deliver the packets whose last byte has arrived by ``until_s``."""
+    def _deliver(self, until_s: float) -> None:
+        """Deliver to the servos the packets whose last byte has arrived by ``until_s``."""
         while self._sent and self._sent[0][0] <= until_s + INSTANT_S:
             end_s, data = self._sent.popleft()
             self._advance(end_s)
-            if end_s - len(data) * self._byte_s > self._heard_until_s + GAP_S:
+            if end_s - len(data) * self._byte_s > self._delivered_s + GAP_S:
                 self._reset_parser()
-            self._heard_until_s = end_s
+            self._delivered_s = end_s
             for tap in self.taps:
                 tap(end_s, True, data)
-            answers = self._receive(data, end_s)
-            if not answers:
+            replies = self._execute(data, end_s)
+            if not replies:
                 continue
-            if self._sent and end_s + answers[0].delay_s < self._sent_until_s:
+            if self._sent and end_s + replies[0].delay_s < self._sent_until_s:
                 self.collisions += 1  # the host has already begun its next packet
                 self._sent.clear()
                 continue
-            self._answer(end_s, answers)
+            self._send_replies(end_s, replies)
 
-    def _answer(self, time_s: float, answers: Iterable[Reply]) -> None:
-        for answer in answers:
-            time_s += answer.delay_s
-            for slow_s, data in self._reply_with_faults(answer.data, time_s):
-                end_s = self._rx_queue.add(time_s + slow_s + self.usb_latency_s, data)
-                time_s = max(time_s, end_s - self.usb_latency_s - slow_s * (slow_s > PATIENT_S))
+    def _send_replies(self, time_s: float, replies: Iterable[Reply]) -> None:
+        for reply in replies:
+            time_s += reply.delay_s
+            for late_s, data in self._reply_with_faults(reply.data, time_s):
+                end_s = self._rx_queue.add(time_s + late_s + self.usb_latency_s, data)
+                time_s = max(time_s, end_s - self.usb_latency_s - late_s * (late_s > HOLD_UP_MAX_S))
                 self.busy_s += len(data) * self._byte_s
                 for tap in self.taps:
                     tap(end_s - self.usb_latency_s, False, data)
             self._quiet_s = time_s
 
-    def _collide(self, start_s: float) -> None:
-        """Two talk at once: what the servos had not said by then is lost, and so is the packet."""
+    def _cut_replies(self, start_s: float) -> None:
+        """Host and servos send at once: the rest of the replies is lost, and so is the packet."""
         self.collisions += 1
         self._rx_queue.cut(start_s)
         self._quiet_s = start_s
