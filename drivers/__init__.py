@@ -1,6 +1,5 @@
-"""Radians to bytes: from a vetted ``JointCommand`` down to Protocol 2.0 packets and back.
+"""Drivers: from a vetted ``JointCommand`` to Protocol 2.0 packets, and back to a ``JointState``.
 
-Commands go down (safety -> chain -> bus -> byte port), a ``JointState`` comes back. The vocabulary
-(`types`, `clock`, `link`, `errors`; `compiling` for its loops) is what the controller may import;
-the rest is plumbing.
+Commands go down (safety, chain, bus, byte port); a state comes back up. The controller may import
+only `types`, `clock`, `link`, `errors` and `compiling`.
 """

@@ -1,4 +1,4 @@
-"""Time as a thing that is handed in: the only module that reads the wall clock."""
+"""The clock interface and the wall clock, which no other module reads."""
 
 import time
 from typing import Protocol

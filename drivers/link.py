@@ -1,4 +1,4 @@
-"""The joint link: the one door between whatever decides motion and whatever moves."""
+"""The joint link: the interface between the controller and the joints."""
 
 from types import TracebackType
 from typing import Protocol, Self
@@ -33,11 +33,11 @@ class JointLink(Protocol):
 
 
 class CommandOutcome(Protocol):
-    """What became of one command."""
+    """Outcome of one command."""
 
     @property
     def goal_rad(self) -> Floats:
-        """(J,) goals that were sent; the last ones again where there was a veto."""
+        """(J,) goals that were sent; on a veto the previous ones."""
         ...
 
     @property
@@ -47,20 +47,20 @@ class CommandOutcome(Protocol):
 
 
 class VettedLink(JointLink, Protocol):
-    """A joint link that vets every command, and switches torque off when it is left."""
+    """A joint link that vets every command and switches torque off at the end of its context."""
 
     @property
     def tripped(self) -> str | None:
-        """Why nothing passes any more, one line; None: all is well."""
+        """Why no command passes any more, one line; None while commands pass."""
         ...
 
     @property
     def last_verdict(self) -> CommandOutcome | None:
-        """On the newest command; None before the first."""
+        """Outcome of the newest command; None before the first."""
         ...
 
     def __enter__(self) -> Self:
-        """Leave it with torque off, whatever happens."""
+        """Enter the context; torque is off when it ends, also after an exception."""
         ...
 
     def __exit__(

@@ -1,4 +1,4 @@
-"""The vocabulary between controller and servos: read-only arrays in SI units, head first.
+"""Commands, states and poses between controller and servos: read-only arrays, SI units, head first.
 
 Named tuples: several are made in every cycle, and a frozen dataclass takes five times as long.
 """
@@ -12,7 +12,7 @@ from snakewalk.config.arrays import Bools, Floats
 
 
 class JointCommand(NamedTuple):
-    """What the joints shall do now."""
+    """Goal positions of all joints."""
 
     time_s: float
     """Clock time for which it was made."""
@@ -21,7 +21,7 @@ class JointCommand(NamedTuple):
 
 
 class JointState(NamedTuple):
-    """What the servos last said; a failed read keeps the old value and ages: never a zero."""
+    """Newest known state of all joints; after a failed read the old value stays and ages."""
 
     time_s: float
     """Clock time at the end of the read."""
@@ -46,7 +46,7 @@ class JointState(NamedTuple):
 
 
 class BodyPose(NamedTuple):
-    """Where the head link is, by whatever measures it (simulator, camera)."""
+    """Pose of the head link, as a simulator or a camera measures it."""
 
     time_s: float
     head_in_world_m: Floats

@@ -1,12 +1,11 @@
-"""The bus: service work, with the DYNAMIXEL SDK where it is right and around it where it is not.
+"""The DYNAMIXEL bus: pings, registers, reboots, and the group codecs of a chain.
 
-What is guarded, with dynamixel-sdk 4.1.0:
+Defects of dynamixel-sdk 4.1.0 that are avoided here:
 
-- It never stuffs what it sends, and what it unstuffs is not always what was stuffed. A status
-  packet with an error and without data counts as success, and of one that is too short the CRC
-  counts as data. So registers are read and written by this package's own strict codec; the SDK
-  finds servos and reboots them.
-- An exception in the port leaves it busy for ever: it is freed again.
+- The SDK never stuffs what it sends, and its unstuffing is not the inverse of stuffing. It takes a
+  status packet with an error and without data for success, and the CRC of a short packet for data.
+  So registers are read and written by our own strict codec; the SDK pings and reboots only.
+- An exception in the port leaves the SDK's port busy for ever: it is freed again.
 - A broadcast ping waits 0.8 s for 252 servos: ``find`` pings the expected ones.
 
 The control cycle does not go through the SDK: see ``drivers.bus.control_cycle``.
@@ -39,15 +38,15 @@ _PING_BYTES = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """A servo that answered a ping."""
+class PingReply:
+    """Reply of one servo to a ping."""
 
     servo_id: int
     model_number: int
     firmware: int | None
-    """None where only the ping was asked."""
+    """None where the SDK does not return it."""
     alert: bool
-    """It reports a hardware error (register 70)."""
+    """Whether it reports a hardware error (register 70)."""
 
 
 class DynamixelBus:
@@ -69,25 +68,25 @@ class DynamixelBus:
         self._pending = PendingReplies(port.clock)
         self._sdk = sdk.PacketHandler(2.0)
 
-    def ping(self, servo_id: int) -> Found:
-        """Ask one servo who it is.
+    def ping(self, servo_id: int) -> PingReply:
+        """Ping one servo.
 
         Raises:
             NoAnswerError: nobody answered.
 
         """
 
-        def once() -> Found:
+        def once() -> PingReply:
             number, result, error = self._sdk.ping(self.port, servo_id)
             if result != sdk.COMM_SUCCESS:
                 self._pending.add([servo_id], _PING_BYTES, fast=False)
-            self._came(result, servo_id, "ping")
-            return Found(servo_id, number, None, bool(error & ALERT))
+            self._check_result(result, servo_id, "ping")
+            return PingReply(servo_id, number, None, bool(error & ALERT))
 
         return self._retry(once)
 
-    def find(self, servo_ids: Iterable[int]) -> dict[int, Found]:
-        """Ping each; those that answered."""
+    def find(self, servo_ids: Iterable[int]) -> dict[int, PingReply]:
+        """Ping each servo; returns those that replied."""
         found = {}
         for servo_id in servo_ids:
             try:
@@ -96,17 +95,17 @@ class DynamixelBus:
                 continue
         return found
 
-    def scan(self) -> dict[int, Found]:
+    def scan(self) -> dict[int, PingReply]:
         """All servos at the port's baud rate, by a broadcast ping; takes most of a second."""
         replies, _ = self._guarded(lambda: self._sdk.broadcastPing(self.port))
         return {
-            servo_id: Found(servo_id, number, firmware, False)
+            servo_id: PingReply(servo_id, number, firmware, False)
             for servo_id, (number, firmware) in sorted(replies.items())
         }
 
-    def probe(self, servo_id: int, asked: int = 5) -> Probe:
-        """Ping and receive to the end: finds two servos of one ID, which a ping does not."""
-        return probe(self.port, servo_id, asked, self.latency_s)
+    def probe(self, servo_id: int, pings: int = 5) -> Probe:
+        """Ping several times until quiet: finds two servos of one ID, which a ping does not."""
+        return probe(self.port, servo_id, pings, self.latency_s)
 
     def read(self, servo_id: int, name: str) -> int:
         """Value of a register by its name.
@@ -141,7 +140,7 @@ class DynamixelBus:
         )
 
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
-        """Write one value to all at once; nobody confirms it.
+        """Write one value to all servos at once, without confirmation.
 
         Raises:
             ControlTableError: no such register, or the value does not fit it.
@@ -155,7 +154,7 @@ class DynamixelBus:
         self.port.write(encode_instruction(packet))
 
     def write_verified(self, servo_id: int, name: str, value: int) -> None:
-        """Write a register if it differs, and read it back: EEPROM wears, and writes get lost.
+        """Write a register if it differs, and read it back: EEPROM wears out, and writes get lost.
 
         Raises:
             BusError: it does not read back as written.
@@ -173,13 +172,13 @@ class DynamixelBus:
 
         def once() -> None:
             result, error = self._sdk.reboot(self.port, servo_id)
-            self._came(result, servo_id, "reboot")
+            self._check_result(result, servo_id, "reboot")
             check_accepted(servo_id, "reboot", error)
 
         self._retry(once)
 
     def cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> ControlCycle:
-        """Codec of the control cycle for these servos: Goal Position out, current to position in.
+        """Control cycle of these servos: writes Goal Position, reads the state block.
 
         Raises:
             ControlTableError: the model lacks one of the registers.
@@ -188,7 +187,7 @@ class DynamixelBus:
         return self.block(servo_ids, "Present Current", "Present Position", fast=fast)
 
     def slow_cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> ControlCycle:
-        """Codec that reads voltage and temperature.
+        """Group read of the slow state block: voltage and temperature.
 
         Raises:
             ControlTableError: the model lacks one of the registers.
@@ -199,7 +198,7 @@ class DynamixelBus:
     def block(
         self, servo_ids: Sequence[int], first: str, last: str, *, fast: bool = True
     ) -> ControlCycle:
-        """Codec that reads the registers from ``first`` to ``last``, both included.
+        """Group read of the registers from ``first`` to ``last``, both included.
 
         Raises:
             ControlTableError: the model lacks one of the registers.
@@ -218,13 +217,13 @@ class DynamixelBus:
         )
 
     def _retry(self, once: Callable[[], T]) -> T:
-        """Run an exchange, again after silence or damage; what the servo refuses is final."""
-        for left in range(self._tries - 1, -1, -1):
+        """Run a transaction, and again after silence or damage; a refusal is final."""
+        for remaining in range(self._tries - 1, -1, -1):
             try:
                 return self._guarded(once)
             except NoAnswerError:
-                self.port.drain_until_quiet(self.latency_s)  # it may come late
-                if not left:
+                self.port.drain_until_quiet(self.latency_s)  # the reply may be late
+                if not remaining:
                     raise
         raise AssertionError("tries is at least 1")
 
@@ -234,9 +233,9 @@ class DynamixelBus:
         finally:
             self.port.is_using = False
 
-    def _came(self, result: int, servo_id: int, what: str) -> None:
+    def _check_result(self, result: int, servo_id: int, what: str) -> None:
         if result != sdk.COMM_SUCCESS:
-            said = self._sdk.getTxRxResult(result).removeprefix("[TxRxResult] ")
+            reason = self._sdk.getTxRxResult(result).removeprefix("[TxRxResult] ")
             raise NoAnswerError(
-                f"servo {servo_id}: {what}: {said} at {self.port.getBaudRate()} baud"
+                f"servo {servo_id}: {what}: {reason} at {self.port.getBaudRate()} baud"
             )

@@ -27,7 +27,7 @@ class Probe:
     """Result of pinging one ID several times."""
 
     servo_id: int
-    asked: int
+    pings: int
     answered: int
     """Pings with at least one good reply."""
     doubled: int
@@ -36,8 +36,8 @@ class Probe:
     """Pings after which bytes arrived that are no packet: two servos, or a bad line."""
 
 
-def probe(port: BytePort, servo_id: int, asked: int, latency_s: float) -> Probe:
-    """Ping ``servo_id`` ``asked`` times, each time until the line has fallen quiet.
+def probe(port: BytePort, servo_id: int, pings: int, latency_s: float) -> Probe:
+    """Ping ``servo_id`` ``pings`` times, each time until the line has fallen quiet.
 
     Raises:
         PortError: the port is gone.
@@ -46,7 +46,7 @@ def probe(port: BytePort, servo_id: int, asked: int, latency_s: float) -> Probe:
     packet = encode_instruction(InstructionPacket(servo_id, Instruction.PING))
     answered = total = damaged = 0
     wait_s = (len(packet) + 2 * _REPLY_BYTES) * BITS_PER_BYTE / port.getBaudRate()
-    for _ in range(asked):
+    for _ in range(pings):
         port.clearPort()
         port.write(packet)
         deadline_s = port.clock.now_s() + wait_s + _SETTLE_S + latency_s
@@ -58,4 +58,4 @@ def probe(port: BytePort, servo_id: int, asked: int, latency_s: float) -> Probe:
         answered += replies > 0
         total += replies
         damaged += reader.dropped_bytes + reader.pending > 0
-    return Probe(servo_id, asked, answered, max(0, total - asked), damaged)
+    return Probe(servo_id, pings, answered, max(0, total - pings), damaged)

@@ -1,1 +1,1 @@
-"""Protocol 2.0 as pure functions and one parser, used by the host and by the simulated servos."""
+"""Protocol 2.0: packets, parser, control tables and registers, for host and servo."""

@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 from snakewalk.drivers.errors import ControlTableError
 
-# The files name four signed registers; the e-manual's two's complement registers of the X, MX(2.0),
-# P and PRO series (columns "Range" with negative values) are these.
+# The files mark only four registers as signed. These are all two's complement registers of the X,
+# MX(2.0), P and PRO series in the e-manual (negative values in the column "Range").
 _SIGNED = frozenset(
     {
         *("Homing Offset", "Goal PWM", "Goal Current", "Goal Velocity", "Goal Position"),
@@ -24,7 +24,7 @@ _SIGNED = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Register:
-    """Where one value lies."""
+    """Name, address and format of one register."""
 
     name: str
     address: int
@@ -54,7 +54,7 @@ class Register:
 
 @dataclass(frozen=True, slots=True)
 class ControlTable:
-    """Registers of one model, and the scales that its file gives."""
+    """Registers of one model, and the scales in its file."""
 
     model: str
     """As printed on the servo: ``XM430-W350``."""
@@ -64,7 +64,7 @@ class ControlTable:
     """Raw position of 0 rad: straight."""
     rad_per_position: float
     rad_s_per_velocity: float | None
-    """None where the file has none."""
+    """None where the file gives none."""
 
     def register(self, name: str) -> Register:
         """Look a register up by the SDK's name, ``Present Position``.
@@ -92,7 +92,7 @@ class ControlTable:
 
 @cache
 def model_numbers() -> Mapping[int, str]:
-    """Model number to name, of all servos that the SDK knows."""
+    """Names of all servos that the SDK knows, by model number."""
     lines = (_folder() / "dynamixel.model").read_text(encoding="utf-8").splitlines()[1:]
     numbers = (line.split("\t") for line in lines if line.strip())
     return MappingProxyType({int(n): _printed(file.strip()) for n, file in numbers})
@@ -119,12 +119,12 @@ def load_control_table(model: str) -> ControlTable:
         ControlTableError: the SDK has no table of that name, or is not installed.
 
     """
-    wanted = _printed(model)
-    number = next((n for n, name in model_numbers().items() if name == wanted), None)
+    printed = _printed(model)
+    number = next((n for n, name in model_numbers().items() if name == printed), None)
     if number is None:
         shown = ", ".join(sorted(model_numbers().values()))
         raise ControlTableError(f"{model}: no such servo; the SDK has tables of {shown}")
-    path = _folder() / f"{wanted.lower().replace('-', '_')}.model"
+    path = _folder() / f"{printed.lower().replace('-', '_')}.model"
     sections = _sections(path.read_text(encoding="utf-8"))
     info = {row[0]: float(row[1]) for row in sections["type info"]}
     units = {row[0]: float(row[1]) for row in sections["unit info"]}
@@ -132,10 +132,10 @@ def load_control_table(model: str) -> ControlTable:
     for address, size, name, *_ in sections["control table"]:
         registers.setdefault(name, Register(name, int(address), int(size), name in _SIGNED))
     zero = int(info["value_of_zero_radian_position"])
-    # The lowest value is -pi exactly, in steps; the highest is one step short of +pi on some models
+    # the lowest value is exactly -pi; on some models the highest is one step below +pi
     steps = zero - int(info["value_of_min_radian_position"])
     return ControlTable(
-        model=wanted,
+        model=printed,
         model_number=number,
         registers=MappingProxyType(registers),
         zero_position=zero,
@@ -163,7 +163,7 @@ def _sections(text: str) -> dict[str, list[list[str]]]:
 
 @cache
 def _folder() -> Path:
-    package = find_spec("dynamixel_easy_sdk")  # finds the folder without importing it
+    package = find_spec("dynamixel_easy_sdk")  # without importing it
     if package is None or package.origin is None:
         raise ControlTableError("the DYNAMIXEL SDK is not installed: pip install dynamixel-sdk")
     return Path(package.origin).parent / "control_table"

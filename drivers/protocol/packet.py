@@ -17,13 +17,13 @@ BITS_PER_BYTE = 10
 BROADCAST_ID = 0xFE
 MAX_ID = 0xFC
 STATUS = 0x55
-"""What stands in the instruction field of a status packet."""
+"""Instruction field of a status packet."""
 ALERT = 0x80
 """Bit of the error byte: register 70 (Hardware Error Status) is not zero."""
 
 
 class Instruction(IntEnum):
-    """What a host may ask."""
+    """Instructions of the host."""
 
     PING = 0x01
     READ = 0x02
@@ -68,11 +68,11 @@ class InstructionPacket:
 
 @dataclass(frozen=True, slots=True)
 class StatusPacket:
-    """Servo to host; with id 0xFE the answer to a fast read, ``params`` then all behind ``error``.
+    """Servo to host; from ID 0xFE it is the common reply to a fast read.
 
-    A fast read's answer is one packet that the servos say in turn: for each an error byte, its id,
-    its data and the CRC of everything so far; the last CRC is the packet's. ``error`` is that of
-    the first servo, and ``params`` lacks the last CRC.
+    The servos write the reply to a fast read one after the other: each adds an error byte, its ID,
+    its data and the CRC of everything so far. The last CRC is that of the packet. Then ``error`` is
+    the first servo's, and ``params`` is everything behind it except the last CRC.
     """
 
     servo_id: int
@@ -82,7 +82,7 @@ class StatusPacket:
 
     @property
     def result(self) -> int:
-        """Error code without the alert bit; a ``ResultError`` if the servo keeps to the manual."""
+        """Error code without the alert bit; a ``ResultError`` according to the e-manual."""
         return self.error & ~ALERT
 
     @property
@@ -105,7 +105,7 @@ def encode_instruction(packet: InstructionPacket) -> bytes:
 
 
 def encode_status(packet: StatusPacket) -> bytes:
-    """Bytes of a status packet; stuffed unless it is a fast read's answer (id 0xFE).
+    """Bytes of a status packet; stuffed unless it is the reply to a fast read (ID 0xFE).
 
     Raises:
         ProtocolError: an id or a length that the protocol does not have.
@@ -134,7 +134,7 @@ _STUFFED = b"\xff\xff\xfd\xfd"
 
 
 def stuff(params: bytes) -> bytes:
-    """Add ``FD`` behind every ``FF FF FD``; ``params`` is all between instruction and CRC."""
+    """Add ``FD`` behind every ``FF FF FD``; ``params``: everything from instruction to CRC."""
     return params.replace(_HEADER, _STUFFED)
 
 
@@ -152,17 +152,17 @@ def unstuff(params: bytes) -> bytes:
 
 
 def fast_head(parts_bytes: int) -> bytes:
-    """Header, length and instruction byte of a fast answer with ``parts_bytes``, CRCs included."""
+    """Header to instruction byte of a fast reply with ``parts_bytes``, CRCs included."""
     head = HEADER + bytes((BROADCAST_ID,))
     return head + (parts_bytes + 1).to_bytes(2, "little") + bytes((STATUS,))
 
 
 def encode_fast(parts: Iterable[tuple[int, int, bytes]], parts_bytes: int | None = None) -> bytes:
-    """Joint answer of servos to a fast sync or bulk read, with ``parts`` (error, ID, data).
+    """Common reply of servos to a fast sync or bulk read, from ``parts`` (error, ID, data).
 
-    One status packet from the broadcast ID that the servos write one after the other: each adds
-    error, ID, data, and the CRC of *everything* on the wire so far, earlier CRCs included. It is
-    not stuffed. ``parts_bytes`` is what the header announces where servos are missing at the end.
+    It is one status packet from the broadcast ID that the servos write one after the other: each
+    adds error, ID, data, and the CRC of *everything* on the wire so far, earlier CRCs included. It
+    is not stuffed. ``parts_bytes`` is the announced length where servos are missing at the end.
     """
     bodies = [bytes((error, servo_id)) + data for error, servo_id, data in parts]
     announced = sum(len(body) + 2 for body in bodies) if parts_bytes is None else parts_bytes

@@ -1,4 +1,4 @@
-"""Bytes to packets, through noise, cuts and false headers."""
+"""The packet parser: a byte stream to packets, despite noise, truncation and false headers."""
 
 from snakewalk.drivers.errors import StuffingError
 from snakewalk.drivers.protocol.crc import crc16
@@ -17,36 +17,36 @@ _FIXED = 7  # header, id and length field, in front of what the length counts
 
 
 class PacketParser:
-    """Cuts a byte stream into packets; what is not one is skipped and counted.
+    """Cuts a byte stream into packets; other bytes are skipped and counted.
 
-    A header whose length or CRC is wrong costs only its first byte: the search goes on right
-    behind it, so a damaged packet never hides the good one that follows. Memory is bounded by one
-    longest packet plus what is fed at once.
+    After a wrong length or CRC the search continues one byte behind the false header, so a damaged
+    packet never hides the good one that follows. Memory is bounded by one longest packet plus the
+    bytes fed at once.
     """
 
     def __init__(self, max_length: int = 4096) -> None:
         self.max_length = max_length
-        """Largest length field believed; more is taken for noise."""
+        """Largest length field accepted; a larger one is noise."""
         self.crc_errors = 0
-        """Candidates with a whole frame but a wrong CRC."""
+        """Complete frames with a wrong CRC."""
         self.stuffing_errors = 0
-        """Frames with a right CRC whose payload no strict sender can have made."""
+        """Frames with a right CRC but malformed stuffing."""
         self.dropped_bytes = 0
         """Bytes that belonged to no packet."""
         self._buffer = bytearray()
 
     @property
     def pending(self) -> int:
-        """Bytes held of a packet that is not yet whole."""
+        """Bytes of a packet that is not yet complete."""
         return len(self._buffer)
 
     def reset(self) -> None:
-        """Forget a partial packet: the line has gone quiet, the rest will not come."""
+        """Drop a partial packet whose rest will not arrive."""
         self.dropped_bytes += len(self._buffer)
         self._buffer.clear()
 
     def feed(self, data: bytes) -> list[Packet]:
-        """Take bytes in; return the packets that they complete, in order."""
+        """Append bytes; returns the packets that they complete, in order."""
         buffer = self._buffer
         buffer += data
         packets: list[Packet] = []
@@ -85,7 +85,7 @@ class PacketParser:
         return at + 1
 
     def _next_header(self, at: int) -> int:
-        """Index of the next header at or behind ``at``, or of where one may have begun."""
+        """Index of the next header at or behind ``at``, or of a header cut off at the end."""
         found = self._buffer.find(HEADER, at)
         if found >= 0:
             return found

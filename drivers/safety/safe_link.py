@@ -1,4 +1,4 @@
-"""The only joint link that is handed out: every command vetted, torque off whatever happens."""
+"""The safe link: a joint link that vets every command and switches torque off in every case."""
 
 import signal
 import threading
@@ -24,8 +24,8 @@ class SafeLink:
     operator and a new ``enable`` let it move again. Inside the context SIGTERM, SIGINT and SIGHUP
     unwind the program through the exit; if it is killed, the servos' bus watchdog stops them.
 
-    With a ``recovery`` a line or servo that went away does not latch at once: the chain holds, and
-    goes on from where it stands if the recovery's policy lets it.
+    With a ``recovery`` it does not latch at once when the line or a servo goes away: the chain
+    holds, and goes on from where it stands if the policy of the recovery allows it.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class SafeLink:
         self.last_verdict: Verdict | None = None
         """Of the last command."""
         self.recoveries = 0
-        """Interruptions after which it went on."""
+        """Interruptions that were recovered from."""
         self._link = link
         self._recovery = recovery
         self._limits = limits
@@ -64,7 +64,7 @@ class SafeLink:
         trace: TracebackType | None,
     ) -> None:
         for number in self._handlers:
-            signal.signal(number, signal.SIG_IGN)  # nothing may interrupt switching torque off
+            signal.signal(number, signal.SIG_IGN)  # switching torque off must not be interrupted
         try:
             if self._touched:
                 self.disable()
@@ -126,9 +126,9 @@ class SafeLink:
         return state
 
     def write(self, command: JointCommand) -> None:
-        """Vet a command against the last state read and send what may pass.
+        """Vet a command against the newest state and send what passes.
 
-        After an interruption that was mended in this call, nothing is sent: the joints hold.
+        After a recovery in this call nothing is sent: the joints hold.
 
         Raises:
             SafetyTrippedError: latched, before or by this command.
@@ -175,7 +175,7 @@ class SafeLink:
         self._stop_requested = None
 
     def _recover(self, reason: str, fault: DriverError | None) -> JointState:
-        """Let the recovery mend what broke; else latch and raise."""
+        """Recover from an interruption; else latch and raise."""
         state = None
         if self._recovery is not None and self._memory is not None:
             try:
@@ -212,7 +212,7 @@ class SafeLink:
 
 
 def _unwind(number: int, frame: FrameType | None) -> None:
-    """Turn a signal into an exception, so that every ``with`` on the way is left properly."""
+    """Turn a signal into an exception, so that every context ends properly."""
     if number == signal.SIGINT:
         raise KeyboardInterrupt
     raise SystemExit(128 + number)

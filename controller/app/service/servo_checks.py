@@ -101,7 +101,7 @@ def duplicates(probes: Sequence[Probe]) -> Finding:
             f"answers of {_ids(damaged)} come damaged: two servos with this ID, or a bad line",
             "connect it alone: if it is well then, another servo has its ID; if not, the cable",
         )
-    return Finding("duplicate IDs", "ok", f"none in {sum(p.asked for p in probes)} pings")
+    return Finding("duplicate IDs", "ok", f"none in {sum(p.pings for p in probes)} pings")
 
 
 def models(servos: Sequence[ServoReport], wrong: Sequence[str], model: str) -> Finding:
