@@ -33,7 +33,7 @@ from snakewalk.drivers.compiling import compiled
 
 DURATIONS_S = np.geomspace(0.25, 32.0, 36)
 BRAKE_SHARE = 0.4
-"""Of the acceleration limit, for the brake of the error's speed."""
+"""Share of the acceleration limit for the brake of the error's speed."""
 LEAST_BRAKE_S = 0.02
 TOLERANCE = 0.02
 """A target at its limits and the last of an error add up to a little more than a limit."""
@@ -90,12 +90,12 @@ def _within(
         dr = (1.0 - rate) * shapes[2, i] / duration
         dp, ddp = shapes[3, i] / duration, shapes[4, i] / duration**2
         y = min(shapes[0, i] * duration / brake, 1.0)
-        left, dleft = 1.0 - cubic(y), -cubic_slope(y) / brake
+        rest, drest = 1.0 - cubic(y), -cubic_slope(y) / brake
         for j in range(len(error)):
             total = error[j] + 0.5 * brake * error_speed[j]
-            if r * speed[j] + abs(error_speed[j] * left - total * dp) > limits[0, j]:
+            if r * speed[j] + abs(error_speed[j] * rest - total * dp) > limits[0, j]:
                 return False
-            hard = abs(error_speed[j] * dleft - total * ddp)
+            hard = abs(error_speed[j] * drest - total * ddp)
             if dr * speed[j] + r * r * acceleration[j] + hard > limits[1, j]:
                 return False
     return True
@@ -115,8 +115,8 @@ def _shortest(
 
 RATES = (1.0, 0.7, 0.4, 0.0)
 """Rates at which the target may start; slower ones are tried where faster ones take too long."""
-PATIENCE_S = (0.5, 1.0, 1.6, np.inf)
-"""How long a join may take for each."""
+LONGEST_JOIN_S = (0.5, 1.0, 1.6, np.inf)
+"""Longest join that is accepted at each rate, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,19 +147,19 @@ class Join:
         return float(self.rate + cubic(y, 1.0 - self.rate))
 
     def error_at(self, t_s: float) -> tuple[Floats, Floats]:
-        """(J,) what is left of the error in angle and in speed."""
+        """(J,) remaining error in angle and in speed."""
         if t_s >= self.duration_s:
             zero = np.zeros(len(self.error_rad))
             return zero, zero
         x = t_s / self.duration_s
         y = min(t_s / self.brake_s, 1.0)
         braked_s = min(t_s, self.brake_s) - self.brake_s * cubic_sum(y)
-        left = 1.0 - cubic(y)
+        rest = 1.0 - cubic(y)
         total = self.error_rad + 0.5 * self.brake_s * self.error_rad_s
         dp = quintic_slope(x) / self.duration_s
         return (
             self.error_rad + self.error_rad_s * braked_s - total * quintic(x),
-            self.error_rad_s * left - total * dp,
+            self.error_rad_s * rest - total * dp,
         )
 
 
@@ -172,18 +172,18 @@ def plan_join(angle_rad: Floats, speed_rad_s: Floats, target: MotionSource, limi
     """
     error = angle_rad - target.goal_rad()
     velocity, pace = target.velocity_rad_s(), target.pace()
-    for rate, patience_s in zip(RATES, PATIENCE_S, strict=True):
+    for rate, longest_s in zip(RATES, LONGEST_JOIN_S, strict=True):
         error_speed = speed_rad_s - rate * velocity
         if rate == 1.0 and max(np.abs(error).max(), np.abs(error_speed).max()) < 1e-9:
             return Join(1.0, 0.0, 0.0, error, error_speed)
         duration_s, brake_s = shortest_join_s(rate, error, error_speed, pace, limit)
-        if duration_s <= patience_s:
+        if duration_s <= longest_s:
             return Join(rate, duration_s, brake_s, error, error_speed)
     raise ValueError("a motion cannot be joined: it asks for more than the robot's limits")
 
 
 class Blend:
-    """A target while it is being joined, and after."""
+    """A motion source: a target while it is joined to the joints' motion, and afterwards."""
 
     def __init__(
         self, angle_rad: Floats, speed_rad_s: Floats, target: MotionSource, limit: Pace
@@ -200,7 +200,7 @@ class Blend:
 
     @property
     def over(self) -> bool:
-        """Whether only the target is left."""
+        """Whether the join is over and only the target runs."""
         return self._t_s >= self.join.duration_s
 
     def goal_rad(self) -> Floats:

@@ -16,17 +16,17 @@ from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.source import Pace
 
 GAINS = np.geomspace(10.0, 0.5, 10)
-"""Of amplitudes, 1/s, fastest first."""
+"""Gains of the amplitudes, 1/s, fastest first."""
 LEAST_DIRECT = 1.5
-"""Gains below this are for a change in two steps only."""
+"""Smallest gain of a direct change; smaller ones serve a change in two steps only."""
 CLOCK_GAIN = 6.0
 CRAWL = 0.2
-"""Of the slower of two gaits: in a change in two steps amplitudes change at this frequency."""
+"""Share of the slower gait's frequency at which the amplitudes change in a change in two steps."""
 TOLERANCE = 0.02
 WIDER = 0.05
-"""By which the limits are widened where no change stays within them; twice that the next time."""
+"""Share by which the limits are widened where no change keeps them; doubled each time."""
 SETTLE = 14.0
-"""Times 1 / gain: how long a change is looked at; 0.7 % of it are left then."""
+"""Duration of a change that is evaluated, in units of 1 / gain; 0.7 % of it remain then."""
 SAMPLE_S = 0.02
 MOST_SAMPLES = 600
 
@@ -37,9 +37,9 @@ class Part:
 
     pattern: Pattern
     gain: float
-    """Of amplitudes, 1/s."""
+    """Gain of the amplitudes, 1/s."""
     clock_gain: float
-    """Of the frequency, 1/s."""
+    """Gain of the frequency, 1/s."""
 
     @property
     def time_s(self) -> float:
@@ -55,34 +55,36 @@ def quickest_change(cpg: Cpg, pattern: Pattern, limit: Pace) -> tuple[tuple[Part
     """Choose the fastest change that stays within the limits: each is known in closed form.
 
     Where a wide slow gait becomes a narrow fast one, or back, amplitude times frequency would pass
-    its limits on the way: then the oscillators slow down, change, and speed up again.
+    its limits in between: then the oscillators slow down, change, and speed up again.
 
     Returns:
-        the parts of the change, one after the other, and the largest speeds on the way.
+        the parts of the change, one after the other, and the largest speeds in between.
 
     """
     start = cpg.state()
     slow = CRAWL * min(cpg.pattern.omega_rad_s or np.inf, pattern.omega_rad_s or np.inf)
     crawl = replace(pattern, omega_rad_s=slow if np.isfinite(slow) else 0.0)
-    ways: list[tuple[Part, ...]] = [(Part(pattern, g, g),) for g in GAINS if g >= LEAST_DIRECT]
-    ways += [(Part(crawl, g, CLOCK_GAIN), Part(pattern, g, CLOCK_GAIN)) for g in GAINS]
+    candidates: list[tuple[Part, ...]] = [
+        (Part(pattern, g, g),) for g in GAINS if g >= LEAST_DIRECT
+    ]
+    candidates += [(Part(crawl, g, CLOCK_GAIN), Part(pattern, g, CLOCK_GAIN)) for g in GAINS]
     enough, wider = 1.0 + TOLERANCE, WIDER
     while True:
-        for way in ways:
-            excess, pace = _judge(cpg, start, way, limit, enough)
+        for parts in candidates:
+            excess, pace = _evaluate(cpg, start, parts, limit, enough)
             if excess <= enough:
                 cpg.restore(start)
-                return way, pace
+                return parts, pace
         enough, wider = enough * (1.0 + wider), 2.0 * wider
 
 
-def _judge(
-    cpg: Cpg, start: CpgState, way: tuple[Part, ...], limit: Pace, enough: float
+def _evaluate(
+    cpg: Cpg, start: CpgState, parts: tuple[Part, ...], limit: Pace, enough: float
 ) -> tuple[float, Pace]:
-    """Largest share of a limit, and largest values; no more is looked at once it is ``enough``."""
+    """Return the largest share of a limit, and the largest values; stop once above ``enough``."""
     cpg.restore(start)
     over, fast, hard = 0.0, np.zeros(cpg.joints), np.zeros(cpg.joints)
-    for part in way:
+    for part in parts:
         step_s = max(SAMPLE_S, part.time_s / MOST_SAMPLES)
         part.begin(cpg)
         times_s = np.arange(0.0, part.time_s, step_s)
@@ -102,14 +104,14 @@ DONE_RAD, DONE_RAD_S = 0.01, 0.02
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A change that has been computed: nothing is left to do but to begin it."""
+    """A change of gait, computed and ready to begin."""
 
     at_s: float
-    """On the motion's own time."""
+    """Start, in the motion's own time."""
     parts: tuple[Part, ...]
     needs: Needs
     settled: Pace
-    """Of what it leads to."""
+    """Pace of the gait that it leads to."""
     under_way: Pace
     stops: bool
 
@@ -128,12 +130,12 @@ class CpgMotion:
         self._settled = self._change
         self._now_s = self._left_s = self._part_s = 0.0
         self._next: tuple[Part, ...] = ()
-        self._due: tuple[Change, ...] = ()
+        self._scheduled: tuple[Change, ...] = ()
 
     @property
     def done(self) -> bool:
         """Whether it has been stopped and lies still."""
-        if not self._stopping or self._due:
+        if not self._stopping or self._scheduled:
             return False
         far = np.abs(self.goal_rad() - self.cpg.pattern.offset_rad).max()
         return bool(far < DONE_RAD and np.abs(self.velocity_rad_s()).max() < DONE_RAD_S)
@@ -155,8 +157,8 @@ class CpgMotion:
         """Take up gaits, or rest for None, at rising times from now; returns when the last is over.
 
         All is computed here: the course of the oscillators on the motion's own time is known ahead,
-        so that nothing is left to choose while the motion runs. ``become`` and ``stop`` after this
-        put the rest of the schedule off.
+        so that nothing remains to be chosen while the motion runs. A later ``become`` or ``stop``
+        cancels the rest of the schedule.
 
         Raises:
             InputError: joints are missing, or do not bend so far; nothing changes then.
@@ -169,7 +171,7 @@ class CpgMotion:
             twin._advance(begin_s + after_s - twin._now_s)
             planned.append(twin._plan(gait))
             over_s = after_s + twin._begin(planned[-1])
-        self._due = tuple(planned)
+        self._scheduled = tuple(planned)
         return over_s
 
     def _plan(self, gait: Gait | None) -> Change:
@@ -186,7 +188,7 @@ class CpgMotion:
 
     def _begin(self, change: Change) -> float:
         """Begin a change; returns how long it takes, s."""
-        self._due = ()
+        self._scheduled = ()
         change.parts[0].begin(self.cpg)
         self._next = change.parts[1:]
         self.needs, self._stopping = change.needs, change.stops
@@ -204,8 +206,8 @@ class CpgMotion:
         return self.cpg.velocity_rad_s()
 
     def pace(self) -> Pace:
-        """Largest of the gait, of the change under way, and of those that are due."""
-        ahead = [self._settled, *(p for c in self._due for p in (c.under_way, c.settled))]
+        """Largest pace of the gait, of the change under way, and of those that are scheduled."""
+        ahead = [self._settled, *(p for c in self._scheduled for p in (c.under_way, c.settled))]
         if self._left_s > 0.0:
             ahead.append(self._change)
         return Pace(
@@ -218,24 +220,24 @@ class CpgMotion:
         return self._advance(dt_s)
 
     def _advance(self, dt_s: float) -> Floats:
-        """Go on; what begins on the way begins at its own time, however the time is cut up."""
+        """Go on by ``dt_s``; a change begins at its own time, whatever the lengths of the steps."""
         end_s = self._now_s + dt_s
         while True:
-            due_s = self._due[0].at_s if self._due else np.inf
+            due_s = self._scheduled[0].at_s if self._scheduled else np.inf
             part_s = self._now_s + self._part_s if self._next else np.inf
             if min(due_s, part_s) > end_s:
-                return self._turn(end_s - self._now_s)
-            self._turn(max(min(due_s, part_s) - self._now_s, 0.0))
+                return self._turn_phase(end_s - self._now_s)
+            self._turn_phase(max(min(due_s, part_s) - self._now_s, 0.0))
             if due_s <= part_s:
-                change, *later = self._due
+                change, *later = self._scheduled
                 self._begin(change)
-                self._due = tuple(later)
+                self._scheduled = tuple(later)
             else:
                 part, *rest = self._next
                 part.begin(self.cpg)
                 self._part_s, self._next = part.time_s, tuple(rest)
 
-    def _turn(self, dt_s: float) -> Floats:
+    def _turn_phase(self, dt_s: float) -> Floats:
         self._now_s += dt_s
         self._left_s -= dt_s
         self._part_s -= dt_s

@@ -34,7 +34,7 @@ class GaitCycle:
         speed = HEADROOM * robot.joint_speed_limit_rad_s / max(float(slope.max()), 1e-9)
         hard = HEADROOM * robot.joint_acceleration_limit_rad_s2 / max(float(bend.max()), 1e-9)
         self.rate_rad_s = min(TURN * gait.params.frequency_hz, speed, float(np.sqrt(hard)))
-        """Of the phase."""
+        """Rate of the phase."""
         self._pace = Pace(slope * self.rate_rad_s, bend * self.rate_rad_s**2)
 
     @property

@@ -45,7 +45,7 @@ class GaitMotion:
 
     @property
     def phase_rad(self) -> float:
-        """Of the gait, 0 to 2 pi."""
+        """Phase of the gait, 0 to 2 pi."""
         return self._cycle.phase_rad
 
     @property
@@ -123,7 +123,7 @@ class GaitSequence:
     def __init__(self, motion: GaitMotion, changes: Sequence[tuple[float, Gait]]) -> None:
         """Take gaits at rising times on the motion's own time; all suit its robot."""
         self.motion = motion
-        self._due = list(changes)
+        self._changes = list(changes)
         self._now_s = 0.0
 
     @property
@@ -150,7 +150,7 @@ class GaitSequence:
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Change gait if it is time to, then go on by ``dt_s``."""
-        while self._due and self._now_s >= self._due[0][0] - 1e-9:
-            self.motion.become(self._due.pop(0)[1])
+        while self._changes and self._now_s >= self._changes[0][0] - 1e-9:
+            self.motion.become(self._changes.pop(0)[1])
         self._now_s += dt_s
         return self.motion.step(dt_s, view)

@@ -15,7 +15,7 @@ from snakewalk.controller.motion.source import MotionSource, Pace
 LEAD_S = 0.12
 """How far the swing of the body is foreseen: the lag of the servos and of the rate limiter."""
 RANGE_SHARE = 0.9
-"""Of the neck joints' range."""
+"""Share of the neck joints' range that is used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class HeadTarget:
     point_m: tuple[float, float] | None = None
 
     def heading_from(self, head_m: Floats) -> float:
-        """Heading wanted of a head at (2,) or (3,)."""
+        """Heading for a head at (2,) or (3,)."""
         if self.point_m is not None:
             x, y = self.point_m
             return float(np.arctan2(y - head_m[1], x - head_m[0]))
@@ -61,7 +61,7 @@ class HeadSteering:
 
     @property
     def done(self) -> bool:
-        """Whether the body is done."""
+        """Whether the body's source is done."""
         return self.source.done
 
     def goal_rad(self) -> Floats:
@@ -89,8 +89,8 @@ class HeadSteering:
             share = min(1.0, dt_s / 0.06)
             self._swing_rad_s += share * (turn / dt_s - self._swing_rad_s)
         self._last_rad = shoulders
-        wanted = float(wrap(self.target.heading_from(view.link_m[0]) - shoulders))
-        each = (wanted - LEAD_S * self._swing_rad_s) / len(self._neck)
+        heading = float(wrap(self.target.heading_from(view.link_m[0]) - shoulders))
+        each = (heading - LEAD_S * self._swing_rad_s) / len(self._neck)
         each = min(max(each, -self._reach), self._reach)
         angles = self._limiter.step(dt_s, np.full(len(self._neck), each))
         return self._with_neck(goal, angles)

@@ -83,13 +83,13 @@ class Operator:
         return Pace.limit(self._robot)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Do what the keys say, then go on by ``dt_s``."""
+        """Carry out the keys pressed, then go on by ``dt_s``."""
         for key in self._keys():
             self._press(key)
         change = dt_s / HALT_S
         before = self._rate
-        wanted = 0.0 if self._halted and not self.motion.stopping else 1.0
-        self._rate += min(max(wanted - self._rate, -change), change)
+        target = 0.0 if self._halted and not self.motion.stopping else 1.0
+        self._rate += min(max(target - self._rate, -change), change)
         return self.motion.step(0.5 * (before + self._rate) * dt_s, view)
 
     def _press(self, key: str) -> None:

@@ -16,7 +16,7 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.types import JointState
 
 LEAST = 0.25
-"""Of the rate; a motion that stands still looks like one that hangs."""
+"""Lowest rate; a motion that stands still looks like one that hangs."""
 HEAT_BAND_C = 10.0
 """From so far below the limit on, down to ``HEAT_EDGE_C`` below it."""
 HEAT_EDGE_C = 2.0

@@ -1,4 +1,4 @@
-"""A run on paper: the pilot steers a quasi-static body, so that a plan is judged before torque.
+"""A run on paper: the pilot steers a quasi-static body, so that a plan is checked before torque.
 
 Each step asks the pilot for joint goals, lets the shape change, and finds the rigid velocity that
 balances Coulomb friction and the pull of the slope under each link

@@ -1,8 +1,8 @@
 """The angle track: tangent angles along the path of the head, extended piece by piece.
 
-[PT] 2.6.4 looks the angles up again and again, a fraction of a point at a time, which blurs them.
-Here the samples stay untouched and one accumulated shift says where the head is on them, so with
-no sliding every point of the body passes through the angles of the head exactly.
+[PT] 2.6.4 interpolates the angles again and again, a fraction of a point at a time, which blurs
+them. Here the samples stay untouched and one accumulated shift gives the head's place on them. So
+with no sliding every point of the body passes through the angles of the head exactly.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""The angle track as this robot's joints see it: goals along the head's way, smooth to one order.
+"""Joint track: joint goals along the path of the head, with a continuous first derivative.
 
 Joint angles are known at whole heads, where the skeleton falls on the samples; between them a
 quadratic B-spline runs, so that slope is continuous and the second derivative is known everywhere.

@@ -43,9 +43,9 @@ def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -
 
 _OFF_PATH_BODIES = 0.5
 
-# Segments of track left when the next piece is decided: the time law must see beyond the head.
+# Segments of track that remain when the next piece is decided: the time law looks ahead.
 _LOOKAHEAD_SEGMENTS = 6.0
-_LIFT_S = 0.1
+_PITCH_SMOOTHING_S = 0.1
 
 # Shorter steps are saved up: they are too short to measure a speed.
 _SHORTEST_STEP_S = 1e-5
@@ -195,14 +195,16 @@ class Pilot:
     def _on_ground(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:
         """Add to yaw goals (J,) the pitch that fits the body to the ground under it.
 
-        The pitch is smoothed over ``_LIFT_S``, because the ground is known in facets.
+        The pitch is smoothed over ``_PITCH_SMOOTHING_S``, because the ground is known in facets.
         """
         if self._pitch_fitter is None:
             return goal_rad
-        wanted = self._pitch_fitter(view.link_m[0], view.headings_rad).goal_rad
+        target = self._pitch_fitter(view.link_m[0], view.headings_rad).goal_rad
         if self._pitch_rad is None:
-            self._pitch_rad = wanted
-        self._pitch_rad = self._pitch_rad + min(1.0, dt_s / _LIFT_S) * (wanted - self._pitch_rad)
+            self._pitch_rad = target
+        self._pitch_rad = self._pitch_rad + min(1.0, dt_s / _PITCH_SMOOTHING_S) * (
+            target - self._pitch_rad
+        )
         return goal_rad + self._pitch_rad
 
     def _count(self, centre_m: Floats, head_m: Floats) -> None:
@@ -217,14 +219,14 @@ class Pilot:
             self.missed += 1
             self._fall_back(True)
             self._replan_after = self.head + _REPLAN_AFTER_BODIES * self._chooser.track.points
-            with suppress(InputError):  # from here no safe way leads back: the old path stays
+            with suppress(InputError):  # no safe path leads back from here: the old one stays
                 self._plan_path(head_m, self.reached)
 
     def _is_off_path(self, centre_m: Floats) -> bool:
-        """Whether the next waypoint has been passed by, or the path been left by half a body."""
+        """Whether the next waypoint was passed by, or the body is half its length off the path."""
         path, end_m = self.path, self.path.length_m
         along_m, gap_m = float(self._along_m[0]), float(self._gap_m[0])
-        if along_m >= end_m - 1e-6:  # how far beyond the end, the way that the path led there
+        if along_m >= end_m - 1e-6:  # distance beyond the end, along the path's last direction
             last = path.position([end_m - 0.05, end_m])
             ahead = (last[1] - last[0]) / 0.05
             along_m += float((centre_m - last[1]) @ ahead)
@@ -243,7 +245,7 @@ class Pilot:
             at = self._passed_m[k] = self.path.first_pass(self._waypoints_m[k], at)
 
     def _aim(self, view: BodyView) -> tuple[float, float]:
-        """Offset from track to world, and the direction wanted there."""
+        """Offset from track to world, and the direction of the aim there."""
         offset, head_m, centre_m = self._measured(view)
         if self._start is None:
             self._start = (head_m, offset)
@@ -252,7 +254,7 @@ class Pilot:
             return offset, float(np.arctan2(*(target - centre_m)[::-1]))
         if not self._feedback:
             offset = self._start[1]
-            head_m = self._believed(self._start[0], offset)
+            head_m = self._dead_reckoned(self._start[0], offset)
             along_m = self.path.nearest(head_m, self.along_m)
             return offset, aim_rad(self.path, head_m, along_m, self._carrot_m)
         # The piece begins where the track ends now: aim from where the head will be by then.
@@ -268,7 +270,7 @@ class Pilot:
         believed = np.interp(at, np.arange(len(body)), body)
         return offset_rad(view.headings_rad, believed), view.link_m[0, :2], view.centre_m[:2]
 
-    def _believed(self, start_m: Floats, offset: float) -> Floats:
+    def _dead_reckoned(self, start_m: Floats, offset: float) -> Floats:
         """Head of a body that never slipped since the first decision."""
         track = self._chooser.track
         return start_m + self._segment_m * track.displacement(

@@ -42,7 +42,7 @@ class Serpenoid:
         self.track = track or AngleTrack(self._wave(np.arange(points))[::-1])
 
     def take_over(self) -> None:
-        """Go on from a track that others have grown: at its last angle, bending the same way."""
+        """Go on from the end of a track made by others: at its last angle, bending the same way."""
         p, track = self._p, self.track
         recent = track.at_rad(np.arange(track.end - self._points, track.end, dtype=float))
         phase = np.arcsin(np.clip((recent[-1] - recent.mean()) / p.amplitude_rad, -0.95, 0.95))

@@ -170,10 +170,10 @@ def _points(
     head_m: tuple[float, float],
 ) -> Floats:
     """(T, N + 1, 2): ``P(0)`` is the head, ``P(n) = P(n - 1) - r [cos Theta, sin Theta]``."""
-    way = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1)
+    direction = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1)
     points = np.zeros((*angles_rad.shape[:1], angles_rad.shape[1] + 1, 2))
-    points[:, 1:] = -segment_m * np.cumsum(way, axis=1)
-    moved = way[:, 0] * (speed_m_s * dt_s)[:, None]
+    points[:, 1:] = -segment_m * np.cumsum(direction, axis=1)
+    moved = direction[:, 0] * (speed_m_s * dt_s)[:, None]
     moved[0] = head_m
     points += np.cumsum(moved, axis=0)[:, None]
     return points

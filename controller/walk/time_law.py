@@ -1,7 +1,7 @@
-"""How fast the head may travel along the track: joint speed and acceleration are the limits.
+"""Time law: how fast the head may travel along the track within joint speed and acceleration.
 
-Retimed by joint speed alone, ``u = min(u0, limit / max |dq/dS|)``, a shape that bends
-quickly then asks for a jump of speed. Here half of the acceleration limit is left to the bending
+Joint speed alone, ``u = min(u0, limit / max |dq/dS|)``, would make the head's speed jump where the
+shape bends quickly. Here half of the acceleration limit is left to the bending
 (``q'' u^2``) and half to speeding up and braking (``q' du/dt``), and the brake looks ahead over all
 of the track that is known.
 """
@@ -21,26 +21,26 @@ class TimeLaw:
     def __init__(
         self,
         joints: JointTrack,
-        wanted_segments_s: float,
+        cruise_segments_s: float,
         *,
         speed_limit_rad_s: float,
         acceleration_limit_rad_s2: float,
         ramp_time_s: float = 1.0,
     ) -> None:
-        """Start at rest on the first head of ``joints``; ``ramp_time_s`` to the wanted speed."""
+        """Start at rest on the first head of ``joints``; ``ramp_time_s`` to the cruise speed."""
         self.joints = joints
         self.head = float(joints.first)
         """Segments travelled."""
         self.speed_segments_s = 0.0
-        self._wanted = wanted_segments_s
+        self._cruise = cruise_segments_s
         self._speed_limit = speed_limit_rad_s
         self._half_acceleration = 0.5 * acceleration_limit_rad_s2
-        self._slew = wanted_segments_s / ramp_time_s
+        self._slew = cruise_segments_s / ramp_time_s
         self._stopping = False
         self._first = joints.first
-        self._allowed = np.array([wanted_segments_s])
+        self._allowed = np.array([cruise_segments_s])
         self._slope = np.zeros(1)
-        self._least = wanted_segments_s
+        self._least = cruise_segments_s
 
     def stop(self) -> None:
         """Slow down to rest from now on."""
@@ -74,7 +74,7 @@ class TimeLaw:
         by_speed = self._speed_limit / np.maximum(slope, _TINY)
         by_bend = np.sqrt(self._half_acceleration / np.maximum(turn, _TINY))
         self._slope = slope
-        here = np.minimum(np.minimum(by_speed, by_bend), self._wanted)
+        here = np.minimum(np.minimum(by_speed, by_bend), self._cruise)
         # least of three neighbours: between two places no limit is missed, and none is a step
         around = np.pad(here, 1, mode="edge")
         allowed = np.minimum(np.minimum(around[:-2], around[2:]), here)

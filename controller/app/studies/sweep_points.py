@@ -16,7 +16,7 @@ from snakewalk.controller.gaits.registry import GAITS
 
 SLOWEST_HZ = 0.2
 _TRIES = 64
-"""Draws for each point wanted before it is given up: a robot may refuse most of a range."""
+"""Most draws for each point: a robot may refuse most of a range."""
 
 
 @dataclass(frozen=True, slots=True)

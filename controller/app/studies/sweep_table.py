@@ -25,7 +25,7 @@ COLUMNS = (*_PLACE, *MEASURED, *_PARAMETERS)
 
 
 def read_table(path: Path) -> list[dict[str, str]]:
-    """Read the whole rows of a table; a last line that was cut off is left out.
+    """Read the whole rows of a table; a torn last line is dropped.
 
     Raises:
         InputError: no table of a sweep.

@@ -35,7 +35,7 @@ class Task:
     aim: Aim
     goal: Goal
     toward: tuple[float, float] = (1.0, 0.0)
-    """Unit vector, forward and left: where the defaults go. Another way is another gait."""
+    """Unit vector, forward and left, along which the defaults go; another one is another gait."""
     least: float = 0.0
     """Pace of the defaults."""
 
@@ -48,8 +48,8 @@ def pace(row: Row, task: Task) -> float:
         return abs(_value(row, "turn_rad_cycle")) * _value(row, "ran_hz")
     if task.goal == "climb":
         return abs(_value(row, "climb_m_s"))
-    way = _value(row, "forward_bl_cycle"), _value(row, "left_bl_cycle")
-    share = (way[0] * task.toward[0] + way[1] * task.toward[1]) / max(math.hypot(*way), 1e-12)
+    moved = _value(row, "forward_bl_cycle"), _value(row, "left_bl_cycle")
+    share = (moved[0] * task.toward[0] + moved[1] * task.toward[1]) / max(math.hypot(*moved), 1e-12)
     return max(0.0, _value(row, "speed_m_s") * share)
 
 
@@ -92,7 +92,7 @@ _GENERATION = 8
 
 @dataclass(frozen=True, slots=True)
 class Tuned:
-    """What was found, beside the defaults; tables over the seeds of ``compare``."""
+    """Parameters found, compared with the defaults over several seeds."""
 
     gait: str
     robot: str
@@ -149,16 +149,16 @@ def tune(
 
         def rate(work: Callable[[Floats], float], units: Iterable[Floats]) -> Sequence[float]:
             nonlocal done
-            found = []
+            losses = []
             for value in pool.map(work, units):
                 done += 1
                 on_progress(done)
-                found.append(value)
-            return found
+                losses.append(value)
+            return losses
 
         dimensions = len(space.spans)
         people = max(5, _GENERATION)
-        found = differential_evolution(
+        best = differential_evolution(
             partial(_rated, start=start, task=task),
             Bounds([0.0] * dimensions, [1.0] * dimensions),
             x0=space.unit(default),
@@ -172,7 +172,7 @@ def tune(
             rng=np.random.default_rng(seed),
             tol=0.0,
         )
-        values = space.values(found.x)
+        values = space.values(best.x)
         tuned = replace(start, number=1, parameters=values)
         others = range(seed + 1, seed + 1 + seeds)
         one = partial(_scored, task=task)
