@@ -1,4 +1,4 @@
-"""Names of the array types, once for all rooms."""
+"""Array types by name, for all rooms."""
 
 import numpy as np
 from numpy.typing import NDArray

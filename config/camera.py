@@ -1,4 +1,4 @@
-"""What an overhead camera is: where it hangs, what it shows, and how often it looks."""
+"""Schema of an overhead camera: its place, its image and its frame rate."""
 
 from typing import Literal, Self
 

@@ -64,9 +64,9 @@ def _tables(title: str, model: type[BaseModel]) -> list[str]:
                 inner += _tables(_title(title, name, one, len(nested)), one)
             continue
         default = "required" if field.is_required() else f"`{_text(field.default)}`"
-        said = field.description or ""
+        description = field.description or ""
         lines.append(
-            f"| `{name}` | {_kind(field.annotation)}{_bounds(field)} | {default} | {said} |"
+            f"| `{name}` | {_kind(field.annotation)}{_bounds(field)} | {default} | {description} |"
         )
     return [*lines, "", *inner]
 

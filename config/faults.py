@@ -1,4 +1,4 @@
-"""What goes wrong on a simulated bus, and when: the schema of a fault file.
+"""Schema of a fault file: what goes wrong on a simulated bus, and when.
 
 A file has a ``seed`` and any number of ``[[fault]]`` tables. Every fault has a ``kind``, begins
 ``at_s`` seconds after the start, and most last ``for_s`` seconds (to the end, if not given).

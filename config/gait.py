@@ -1,4 +1,4 @@
-"""Which gait moves, with what parameters: a run's table, and the shipped sets of parameters."""
+"""Schemas of gaits: a run's table, and the shipped sets of parameters."""
 
 from typing import Literal, Self
 

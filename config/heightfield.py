@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class HeightField:
         rows, columns = self.z_m.shape
         return (columns - 1) * self.spacing_m, (rows - 1) * self.spacing_m
 
-    def contains(self, x_m: ArrayLike, y_m: ArrayLike) -> NDArray[np.bool_]:
+    def contains(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points lie on the field."""
         x, y = np.asarray(x_m, float), np.asarray(y_m, float)
         w, h = self.size_m

@@ -104,7 +104,7 @@ class BackboneFit:
 def fit_backbone(
     robot: RobotConfig, curve_m: ArrayLike, roll_rad: float = 0.0, *, refine: bool = True
 ) -> BackboneFit:
-    """Lay the chain on a curve given by points (N, 3) from the head backwards.
+    """Fit the chain to a curve given by points (N, 3) from the head backwards.
 
     Args:
         robot: its joints decide what can be met: yaw joints alone a plane curve only.

@@ -1,4 +1,4 @@
-"""What a gait is: joint angles over a phase, what it needs of a robot, and where it comes from."""
+"""Base of the gaits: joint angles over a phase, the joints that they need, and their source."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ Aim = Literal["advance", "climb", "turn"]
 
 @dataclass(frozen=True, slots=True)
 class Needs:
-    """What a motion asks of the robot."""
+    """The joints that a motion needs."""
 
     yaw: bool = False
     pitch: bool = False
@@ -50,7 +50,7 @@ Frequency = Annotated[float, Field(ge=0.0, le=2.0, description="cycles a second"
 
 
 class GaitParameters(Strict):
-    """What every gait has."""
+    """Parameters of every gait."""
 
     frequency_hz: Frequency = 0.5
     mirror: bool = Field(False, description="left and right exchanged")
@@ -69,7 +69,7 @@ class Gait(ABC):
     """Who described it."""
     needs: ClassVar[Needs]
     world: ClassVar[str] = "isotropic"
-    """Shipped world that it is run in where none is asked for."""
+    """Shipped world of its runs, where none is given."""
     p_gain: ClassVar[int | None] = None
     """Register 84 of every servo where the robot's own would squeeze too hard."""
     aim: ClassVar[Aim] = "advance"

@@ -63,7 +63,7 @@ Backward = Annotated[bool, Field(description="tail first")]
 
 
 class HelixPoleParameters(GaitParameters):
-    """What is held, and how tightly."""
+    """The pole, and how tightly it is held."""
 
     frequency_hz: Turns = 0.2
     pole_radius_m: float = Field(0.09, ge=0.02, le=1.0, description="of the pole")
@@ -75,7 +75,7 @@ class HelixPoleParameters(GaitParameters):
 
 
 class HelixPipeParameters(GaitParameters):
-    """What is pressed against, and how hard."""
+    """The pipe, and how hard the body presses."""
 
     frequency_hz: Turns = 0.2
     pipe_radius_m: float = Field(0.15, ge=0.04, le=1.0, description="inner")

@@ -37,7 +37,7 @@ class Retarget:
         return np.asarray(np.diff(at_edges, axis=-1) / np.diff(self._at))
 
     def joints_rad(self, skeleton_rad: Floats) -> Floats:
-        """(..., J) joint angles; pitch joints are 0, the ground step is theirs."""
+        """(..., J) joint angles; pitch joints are 0; the pitch fit sets them."""
         headings = self.group_headings_rad(np.asarray(skeleton_rad, dtype=float))
         joints = np.zeros((*headings.shape[:-1], self._joints))
         joints[..., self._yaw] = headings[..., :-1] - headings[..., 1:]

@@ -1,4 +1,4 @@
-"""What the joints must hold against the ground: torque from the Coulomb friction of the links."""
+"""Joint loads: torque that the joints hold against the Coulomb friction of the links."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Which shapes push: predicted gain eta_q, forward speed of the links over pulse speed."""
+"""Traction of shapes: predicted gain eta_q, forward speed of the links over pulse speed."""
 
 import numpy as np
 

@@ -2,14 +2,12 @@
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats, Int32s
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.replay import bridge_frames, tip_travel_m
 
-Ints32 = NDArray[np.int32]
 LANES = 8
 """Links are padded to a multiple of this, so that a vector unit takes them without a rest."""
 
@@ -49,22 +47,22 @@ class Crowd:
         """(N, 3)"""
         self.scale: Floats = np.ones(bodies)
         """(N,) size over that of the recorded body."""
-        self.visible: NDArray[np.bool_] = np.ones(bodies, dtype=np.bool_)
+        self.visible: Bools = np.ones(bodies, dtype=np.bool_)
         """(N,)"""
-        self.segment: Ints32 = np.zeros(bodies, dtype=np.int32)
+        self.segment: Int32s = np.zeros(bodies, dtype=np.int32)
         """(N,) requested: begins when the cycle ends."""
-        self.cycles: Ints32 = np.zeros(bodies, dtype=np.int32)
+        self.cycles: Int32s = np.zeros(bodies, dtype=np.int32)
         """(N,) cycles of the segment since it began."""
-        self._playing: Ints32 = np.zeros(bodies, dtype=np.int32)
-        self._next: Ints32 = np.zeros(bodies, dtype=np.int32)
-        self._ended: NDArray[np.bool_] = np.zeros(bodies, dtype=np.bool_)
-        self._bridge_from: Ints32 = np.zeros(bodies, dtype=np.int32)
-        self._bridge_frames: Ints32 = np.zeros(bodies, dtype=np.int32)
-        self._bridge_remaining: Ints32 = np.zeros(bodies, dtype=np.int32)
+        self._playing: Int32s = np.zeros(bodies, dtype=np.int32)
+        self._next: Int32s = np.zeros(bodies, dtype=np.int32)
+        self._ended: Bools = np.zeros(bodies, dtype=np.bool_)
+        self._bridge_from: Int32s = np.zeros(bodies, dtype=np.int32)
+        self._bridge_frames: Int32s = np.zeros(bodies, dtype=np.int32)
+        self._bridge_remaining: Int32s = np.zeros(bodies, dtype=np.int32)
         self._points = np.zeros((bodies, 3, padded), dtype=np.float32)
 
     @property
-    def playing(self) -> Ints32:
+    def playing(self) -> Int32s:
         """(N,) segment of each body now."""
         return self._playing
 

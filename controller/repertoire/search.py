@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.repertoire.repertoire import Repertoire
@@ -121,17 +121,17 @@ class _Level:
 
     pose: Floats
     """(n, 3)"""
-    passed: NDArray[np.int64]
+    passed: Ints
     """(n,) waypoints."""
     time_s: Floats
     """(n,)"""
     before: "_Level | None"
-    parent: NDArray[np.int64]
+    parent: Ints
     """(n,) in ``before``."""
-    action: NDArray[np.int64]
+    action: Ints
     """(n,) that led here."""
 
-    def only(self, which: NDArray[np.int64]) -> "_Level":
+    def only(self, which: Ints) -> "_Level":
         """Return some of them."""
         return _Level(
             self.pose[which], self.passed[which], self.time_s[which],
@@ -141,7 +141,7 @@ class _Level:
 
 def _expanded(
     primitives: MotionPrimitives, level: _Level, goals: Floats, radius_m: float
-) -> tuple[Floats, NDArray[np.int64], Floats]:
+) -> tuple[Floats, Ints, Floats]:
     """Every action after each sequence: (nA, 3) poses, (nA,) waypoints passed, (nA,) time."""
     c, s = np.cos(level.pose[:, 2]), np.sin(level.pose[:, 2])
     x, y = primitives.travel[None, :, :, 0], primitives.travel[None, :, :, 1]
@@ -174,7 +174,7 @@ def _backtracked(level: _Level, at: int, candidates: int) -> Route:
 def _remaining_s(
     primitives: MotionPrimitives,
     pose: Floats,
-    count: NDArray[np.int64],
+    count: Ints,
     goals: Floats,
     after: Floats,
     radius_m: float,

@@ -31,7 +31,7 @@ def self_touches(skeleton_rad: Floats, length_m: float, radius_m: float) -> Bool
         step = np.stack([np.cos(some), np.sin(some)], axis=-1) * piece
         ends = np.concatenate([np.zeros((len(some), 1, 2)), np.cumsum(step, axis=1)], axis=1)
         body, i, j = _near_pairs(ends, lag, reach, piece)
-        if not len(body):  # as of most shapes that are used
+        if not len(body):  # the usual case
             continue
         a, b, c, d = ends[body, i], ends[body, i + 1], ends[body, j], ends[body, j + 1]
         near = _segments_cross(a, b, c, d)

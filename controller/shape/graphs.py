@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 from scipy.spatial.distance import pdist, squareform
 
-from snakewalk.config.arrays import Ints
+from snakewalk.config.arrays import Complexes, Int32s, Ints
 from snakewalk.config.errors import InputError
 
 
@@ -109,7 +108,7 @@ def small_world_edges(states: int, degree: int, rewired: float, rng: np.random.G
     return np.array(near, dtype=np.int64)
 
 
-def threshold_graph(states: NDArray[np.complex128], threshold: float | None) -> Graph:
+def threshold_graph(states: Complexes, threshold: float | None) -> Graph:
     """Join states (S, n) whose Euclidean distance is at most ``threshold`` ([KP] 4.2.1).
 
     None: the smallest threshold that joins all of them.
@@ -142,7 +141,7 @@ def _lists(states: int, edges: Ints) -> tuple[Ints, Ints]:
     return ends.astype(np.int64), keys % states
 
 
-def _parts(indptr: Ints, indices: Ints) -> tuple[int, NDArray[np.int32]]:
+def _parts(indptr: Ints, indices: Ints) -> tuple[int, Int32s]:
     """Number of connected parts and the part of each state (V,)."""
     ones = np.ones(len(indices), dtype=np.int8)
     shape = (len(indptr) - 1, len(indptr) - 1)

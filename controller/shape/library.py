@@ -4,13 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.shape.states import energy_kept, random_states, to_angles, to_states
 
-ShapeFilter = Callable[[Floats], NDArray[np.bool_]]
+ShapeFilter = Callable[[Floats], Bools]
 """Shapes (S, N) to a mask (S,) of those that cannot be used."""
 _ROUNDS = 50
 

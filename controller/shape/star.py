@@ -35,7 +35,7 @@ def star_order(M: Ints, F: Ints, heading_error_rad: Floats) -> Iterator[int]:
 
 
 def _best(M: Ints, F: Ints, heading_error_rad: Floats) -> int:
-    """First of the order, in a few passes."""
+    """First candidate of the order, in a few passes."""
     tied = np.flatnonzero(M == 0)
     if len(tied) == 0:
         tied = np.flatnonzero(F == 0)

@@ -75,7 +75,7 @@ def energy_kept(angles_rad: Floats, coefficients: int = 7) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class StateRange:
-    """What a recording's states say of its animal: [PT] 2.5 draws between these."""
+    """Range of a recording's states: [PT] 2.5 draws random ones between these."""
 
     low: Floats
     """(n,) smallest modulus of each coefficient, C_min of [PT]."""
@@ -95,6 +95,6 @@ def state_range(states: Complexes) -> StateRange:
 
 def random_states(states: Complexes, count: int, rng: np.random.Generator) -> Complexes:
     """Draw states with moduli in the recorded range and free phases ([PT] Eq. 1-2): (count, n)."""
-    seen = state_range(states)
-    modulus = seen.low + rng.random((count, states.shape[-1])) * (seen.high - seen.low)
+    limits = state_range(states)
+    modulus = limits.low + rng.random((count, states.shape[-1])) * (limits.high - limits.low)
     return np.asarray(modulus * np.exp(2j * np.pi * rng.random((count, states.shape[-1]))))

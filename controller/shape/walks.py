@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.shape.graphs import Graph
 
@@ -25,11 +25,11 @@ RULES = ("snake", "snake-printed", "stack", "random", "degree")
 class Walk:
     """One walk, from its start until all states are seen or the steps run out."""
 
-    path: NDArray[np.int64]
+    path: Ints
     """(steps + 1,) states in order, the start first."""
-    selected: NDArray[np.int64]
+    selected: Ints
     """(V,) M: how often each was selected, the start counted."""
-    failures: NDArray[np.int64]
+    failures: Ints
     """(V,) F of the rule; zeros for rules without it."""
     covered: bool
     """Whether every state was seen."""
@@ -63,23 +63,23 @@ def walk(
     check_rule(rule)
     if not 0 <= start < graph.states:
         raise InputError(f"start {start}: expected a state from 0 to {graph.states - 1}")
-    book = _Book(graph, start)
+    state = _WalkState(graph, start)
     choose: Callable[[list[int]], int] = {
-        "snake": book.snake,
-        "snake-printed": book.snake,
-        "stack": book.stack_top,
-        "random": lambda near: book.free(near, rng),
-        "degree": book.degree_over_visits,
+        "snake": state.snake,
+        "snake-printed": state.snake,
+        "stack": state.stack_top,
+        "random": lambda near: state.free(near, rng),
+        "degree": state.degree_over_visits,
     }[rule]
     counts_fresh = {"snake": False, "snake-printed": True}.get(rule)
     limit = graph.states**2 if max_steps is None else max_steps
-    while book.step < limit and book.seen < graph.states:
-        book.move(choose(book.near[book.path[-1]]), counts_fresh)
+    while state.step < limit and state.seen < graph.states:
+        state.move(choose(state.near[state.path[-1]]), counts_fresh)
     return Walk(
-        path=np.array(book.path, dtype=np.int64),
-        selected=np.array(book.selected, dtype=np.int64),
-        failures=np.array(book.failures, dtype=np.int64),
-        covered=book.seen == graph.states,
+        path=np.array(state.path, dtype=np.int64),
+        selected=np.array(state.selected, dtype=np.int64),
+        failures=np.array(state.failures, dtype=np.int64),
+        covered=state.seen == graph.states,
     )
 
 
@@ -102,8 +102,8 @@ def _one_over_w(degree: int, selected: int, failures: int) -> tuple[int, int]:
     return degree * (1 + (failures > 0)) + (selected << failures), degree
 
 
-class _Book:
-    """What a walk remembers, in plain lists: the inner loop is about ten neighbours long."""
+class _WalkState:
+    """State of a walk, in plain lists: the inner loop is about ten neighbours long."""
 
     def __init__(self, graph: Graph, start: int) -> None:
         ends = graph.indptr.tolist()

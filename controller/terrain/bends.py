@@ -3,9 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.controller.terrain.path import SplinePath
 
 _CHORD_M = 0.05  # the path is tabulated every centimetre; a shorter arc has no curvature
@@ -15,7 +14,7 @@ _NEAREST = 2
 
 
 def widen(
-    points_m: Floats, free: NDArray[np.bool_], radius_m: float, safe: Callable[[SplinePath], bool]
+    points_m: Floats, free: Bools, radius_m: float, safe: Callable[[SplinePath], bool]
 ) -> SplinePath:
     """Spline through points, with free ones near its sharpest bends dropped or pulled straight.
 
@@ -57,7 +56,7 @@ def sharpest_bend(path: SplinePath) -> tuple[float, Floats]:
     return (_CHORD_M / float(turn[k]) if turn[k] > 1e-6 else float("inf")), b[k]
 
 
-def _near(points: Floats, free: NDArray[np.bool_], at_m: Floats) -> list[int]:
+def _near(points: Floats, free: Bools, at_m: Floats) -> list[int]:
     """Free points nearest to a place."""
     which = np.flatnonzero(free)
     order = np.argsort(np.hypot(*(points[which] - at_m).T))

@@ -1,4 +1,4 @@
-"""What the ground is to a body: elevation variance and slope over a window, and how risky that is.
+"""Relief of the ground: elevation variance and slope over a window, and their risk.
 
 [PT] 2.6.1 and [KP] 4.3 call a point safe when the elevation around it varies little. A snake also
 needs a bound on slope, or it rolls over; both are windowed, since a body bridges what
@@ -6,11 +6,11 @@ is smaller than itself.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.ndimage import map_coordinates
 from scipy.signal import fftconvolve
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 
@@ -44,11 +44,11 @@ class Relief:
         x, y = np.asarray(x_m, float), np.asarray(y_m, float)
         return np.where(self.within(x, y), self._at(self._risk, x, y), np.inf)
 
-    def safe(self, x_m: ArrayLike, y_m: ArrayLike) -> NDArray[np.bool_]:
+    def safe(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points keep both limits and the margin."""
         return np.asarray(self.risk(x_m, y_m) <= 1.0)
 
-    def within(self, x_m: ArrayLike, y_m: ArrayLike) -> NDArray[np.bool_]:
+    def within(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points lie on the field and ``edge_margin_m`` away from its border."""
         x, y = np.asarray(x_m, float), np.asarray(y_m, float)
         ground, margin = self.ground, self.config.edge_margin_m - 1e-9

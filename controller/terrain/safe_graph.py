@@ -1,11 +1,10 @@
 """The graph of safe nodes, and the cheapest paths through it ([PT] 2.6.1, [KP] 4.3)."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from snakewalk.config.arrays import Floats, Indices
+from snakewalk.config.arrays import Bools, Floats, Indices
 from snakewalk.controller.terrain.relief import Relief
 
 # A tenth is kept back for the nodes and edges: the spline may leave the polygon by a little.
@@ -44,7 +43,7 @@ class SafeGraph:
         self._edges = self._joined(index)
         self._trees: dict[int, tuple[Floats, Indices]] = {}
 
-    def nearest(self, point_m: Floats, among: NDArray[np.bool_] | None = None) -> int | None:
+    def nearest(self, point_m: Floats, among: Bools | None = None) -> int | None:
         """Return the safe node nearest to a point; None if there is none."""
         gap = np.hypot(*(self.nodes_m - point_m).T)
         if among is not None:
@@ -53,7 +52,7 @@ class SafeGraph:
             return None
         return int(np.argmin(gap))
 
-    def can_reach(self, target: int) -> NDArray[np.bool_]:
+    def can_reach(self, target: int) -> Bools:
         """(n,) nodes from which ``target`` can be reached."""
         return np.isfinite(self._tree(target)[0])
 
@@ -67,7 +66,7 @@ class SafeGraph:
             at.append(int(towards[at[-1]]))
         return self.nodes_m[at]
 
-    def edge_cost(self, from_m: Floats, to_m: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def edge_cost(self, from_m: Floats, to_m: Floats) -> tuple[Floats, Bools]:
         """Weights of straight pieces (k, 2) to (k, 2), and whether each is safe all along."""
         config = self._relief.config
         length = np.hypot(*(to_m - from_m).T)

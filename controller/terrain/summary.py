@@ -1,4 +1,4 @@
-"""What a path asks of a body: slopes, roughness, bends."""
+"""Summary of a path: its slopes, roughness and bends."""
 
 from dataclasses import dataclass
 

@@ -3,6 +3,8 @@
 The library and every piece of a walk are tested by them.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
@@ -46,3 +48,12 @@ def shape_filters(
         "self-contact": touching,
         "traction": slipping,
     }
+
+
+def passes_all(filters: dict[str, ShapeFilter]) -> Callable[[Floats], bool]:
+    """Return a test of one body (N,): whether it passes every filter."""
+
+    def passes(body_rad: Floats) -> bool:
+        return not any(is_bad(body_rad[None])[0] for is_bad in filters.values())
+
+    return passes

@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
@@ -27,7 +26,7 @@ from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.walk.joint_track import JointTrack
 from snakewalk.controller.walk.pilot import Pilot, ShapeChooser
 from snakewalk.controller.walk.serpenoid import Serpenoid, SerpenoidFallback
-from snakewalk.controller.walk.shape_filters import shape_filters
+from snakewalk.controller.walk.shape_filters import passes_all, shape_filters
 from snakewalk.controller.walk.time_law import TimeLaw
 from snakewalk.controller.walk.walker import Walker
 
@@ -198,9 +197,5 @@ class WalkRun:
                 nearest_count=walk.nearest_count,
             )
         order = np.random.default_rng(self.run.seed).permutation(len(self.library.shapes_rad))
-        walker = Walker(self.library.shapes_rad[order], walk, self._passes_filters)
+        walker = Walker(self.library.shapes_rad[order], walk, passes_all(self.shape_filters))
         return SerpenoidFallback(walker) if self.run.motion == "walk" and walk.fallback else walker
-
-    def _passes_filters(self, body_rad: Floats) -> bool:
-        """Whether a body between two shapes can be made, does not touch itself, and pushes."""
-        return not any(is_bad(body_rad[None])[0] for is_bad in self.shape_filters.values())

@@ -1,4 +1,4 @@
-"""What the oscillators of a pattern generator go to: a gait as Fourier series of its joints."""
+"""The goal of a pattern generator's oscillators: a gait as Fourier series of its joints."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ STILL_RAD = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """What the oscillators go to."""
+    """Goal values of the oscillators."""
 
     omega_rad_s: float
     offset_rad: Floats
