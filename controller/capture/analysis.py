@@ -18,14 +18,14 @@ from snakewalk.controller.capture.undulation import (
 from snakewalk.controller.capture.wave import Wave, measure_wave
 from snakewalk.controller.shape.states import StateRange, energy_kept, state_range, to_states
 
-WANTED_SHIFT = 4.0
+TARGET_SHIFT = 4.0
 """Points that the pattern should move between the frames that are compared."""
 COEFFICIENTS = 7
 
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
-    """What ``snakewalk analyse`` tells."""
+    """The results of ``snakewalk analyse``."""
 
     track: Track
     wave: Wave
@@ -124,7 +124,7 @@ def analyse(track: Track) -> Analysis:
     number = np.rint(track.time_s * track.rate_hz).astype(np.int64)
     segments = track.angles_rad.shape[1]
     expected = abs(wave.pulse_body_lengths_s) * segments / track.rate_hz
-    step = int(np.clip(round(WANTED_SHIFT / max(expected, 1e-9)), 1, max(1, track.frames // 8)))
+    step = int(np.clip(round(TARGET_SHIFT / max(expected, 1e-9)), 1, max(1, track.frames // 8)))
     half = int(0.45 * segments / max(wave.waves, 0.5))
     room = (segments - NEIGHBOURS) // 3
     most = max(2, min(max(12, int(np.ceil(2.0 * expected * step))), half, room))

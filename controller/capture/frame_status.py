@@ -1,4 +1,4 @@
-"""What is to be said of the body in one frame."""
+"""Whether the body of one frame can be used, and if not, why."""
 
 from enum import StrEnum
 

@@ -1,8 +1,8 @@
 """Head and tail keep their identity over time, and which end the head is.
 
 From frame to frame the body is compared with itself and with itself reversed; over a gap its
-thickness along the body decides as well. Which end leads is said by the user, or found from the way
-that the body travels, the way that its wave runs, or at last its taper.
+thickness along the body decides as well. The user may name the head; else it is found from the
+direction of travel, the direction of the wave, or at last the taper.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.medial_axis import Skeleton
 
 _SURE = 0.2  # margin from which one frame is enough to tell the ends apart
-_GAP = 3  # frames without a skeleton after which the place alone is no longer trusted
+_GAP = 3  # frames without a skeleton after which the place alone is not enough
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +25,11 @@ class AlignedSkeletons:
     skeletons: tuple[Skeleton, ...]
     margin: Floats
     """(T,) how much better the frame fits as it is than reversed, -1 to 1; NaN where there is no
-    skeleton, 1 at the first one. Below 0 thickness overruled the place."""
+    skeleton, 1 at the first one. Below 0 where thickness overruled the place."""
 
 
 def margin_of(body: Skeleton, before: Skeleton) -> float:
-    """1: fits ``before`` exactly as it is; -1: fits exactly reversed; 0: cannot be told.
+    """1: fits ``before`` exactly as it is; -1: fits exactly reversed; 0: undecided.
 
     Places count, not only shapes, but a common shift of all points does not.
     """
@@ -52,16 +52,16 @@ def align_ends(skeletons: Sequence[Skeleton]) -> AlignedSkeletons:
     profile = np.zeros(0)
     for number, k in enumerate(good):
         if number == 0:
-            profile = _lopsided(out[k])
+            profile = _asymmetry(out[k])
             continue
         before = good[number - 1]
         here = margin_of(out[k], out[before])
         if abs(here) < _SURE or k - before > _GAP:
-            thick = _agree(_lopsided(out[k]), profile)
+            thick = _agreement(_asymmetry(out[k]), profile)
             here = here if abs(here) > 2.0 * abs(thick) else thick
         if here < 0.0:
             out[k] = out[k].reversed()
-        profile = profile + (_lopsided(out[k]) - profile) / min(number + 1, 200)
+        profile = profile + (_asymmetry(out[k]) - profile) / min(number + 1, 200)
     return AlignedSkeletons(tuple(out), margins(out))
 
 
@@ -76,14 +76,14 @@ def margins(skeletons: Sequence[Skeleton]) -> Floats:
     return margin
 
 
-def _lopsided(body: Skeleton) -> Floats:
+def _asymmetry(body: Skeleton) -> Floats:
     """(50,) thickness from the first end minus that from the other, of the mean thickness."""
     radius = body.radius_px / body.radius_px.mean()
     return np.asarray((radius - radius[::-1])[:50])
 
 
-def _agree(one: Floats, other: Floats) -> float:
-    """-1 to 1: whether two bodies are thick at the same end; about 0 where neither end is."""
+def _agreement(one: Floats, other: Floats) -> float:
+    """-1 to 1: whether two asymmetries have the same sign; about 0 where there is hardly one."""
     scale = float(np.abs(other).mean())
     product = float((one * other).sum() / max(np.hypot(*_norms(one, other)) ** 2 / 2.0, 1e-12))
     return product * min(1.0, scale / 0.1)
@@ -97,8 +97,8 @@ def travel_score(points_px: Floats, step: int) -> float:
     """Whether the first end leads, -1 to 1: travel along the body's direction over all travel.
 
     Args:
-        points_px: (T, P, 2), NaN where the body was not seen.
-        step: frames over which travel is measured, long against the shaking of a frame.
+        points_px: (T, P, 2), NaN where the body was not found.
+        step: frames over which travel is measured; long enough that noise of a frame is small.
 
     Returns:
         0 where the body does not travel by more than a hundredth of its length in a step.

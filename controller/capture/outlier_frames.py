@@ -1,7 +1,7 @@
-"""Frames whose body is unlike that of the film's other frames: it lies on itself, or on another.
+"""Outlier frames: their body differs from the others, as it touches itself or another animal.
 
 A coil that leaves no hole and a small animal that touches the body have no side branch. But they
-make the body shorter, longer, locally thicker, or change its area, beside what frames usually do.
+make the body shorter, longer or locally thicker than in most frames, or change its area.
 """
 
 from collections.abc import Sequence
@@ -13,18 +13,18 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.medial_axis import Skeleton, no_skeleton
 
-_SPREADS = 6.0  # usual deviations, taken from the middle half of the frames
-_LENGTH = 0.06  # of the usual: least deviation that is told
+_SPREADS = 6.0  # standard deviations, estimated from the median deviation
+_LENGTH = 0.06  # of the median: a smaller deviation is none
 _AREA = 0.08
 _THICK = 0.3
 _LEAST_PX = 0.3
 _STRETCH = 7  # of 101 points over which thickness is averaged
 _TIPS = 6  # points at each end whose thickness is not compared
-_FEWEST = 5  # frames that make a usual body
+_FEWEST = 5  # frames from which outliers can be told
 
 
 def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skeleton]:
-    """Drop bodies that are unlike the film's: nothing is guessed of them.
+    """Drop the skeletons of bodies that differ from the film's; their status says how.
 
     Args:
         skeletons: (T) the same end first in all.
@@ -35,12 +35,12 @@ def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skelet
     good = [k for k, one in enumerate(out) if one.status is FrameStatus.GOOD]
     if len(good) < _FEWEST:
         return out
-    length = _beside(np.array([out[k].length_px for k in good]), _LENGTH)
-    area = _beside(area_px[good], _AREA)
+    length = _deviation(np.array([out[k].length_px for k in good]), _LENGTH)
+    area = _deviation(area_px[good], _AREA)
     radius = uniform_filter1d(np.stack([out[k].radius_px for k in good]), _STRETCH, axis=1)
     radius = radius[:, _TIPS:-_TIPS]
-    usual = np.maximum(np.median(radius, axis=0), _LEAST_PX)
-    ratio = radius / usual - 1.0
+    median = np.maximum(np.median(radius, axis=0), _LEAST_PX)
+    ratio = radius / median - 1.0
     spread = 1.4826 * np.median(np.abs(ratio), axis=0)
     thick = (ratio / np.maximum(_THICK, _SPREADS * spread)).max(axis=1)
     for n, k in enumerate(good):
@@ -51,7 +51,7 @@ def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skelet
     return out
 
 
-def _beside(values: Floats, least: float) -> Floats:
-    """How far each is from the usual, 1 where it is told."""
+def _deviation(values: Floats, least: float) -> Floats:
+    """Deviation of each from the median; an outlier is beyond 1 or -1."""
     off = values / np.median(values) - 1.0
     return np.asarray(off / max(least, _SPREADS * 1.4826 * float(np.median(np.abs(off)))))

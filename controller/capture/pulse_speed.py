@@ -61,7 +61,7 @@ def measure_pulse_speed(
         angles_rad: (T, N) tangent angles, head first, unwrapped along the body.
         number: (T,) frame numbers, increasing; only frames ``step`` apart are compared.
         step: frames between those compared.
-        most: points, the largest shift looked for, either way.
+        most: points, the largest shift that is tried, in either direction.
         heading_known: False where each frame was turned to a heading of its own (recordings of
             joint angles): one turn of the whole body a frame is then fitted first.
 
@@ -71,7 +71,7 @@ def measure_pulse_speed(
     """
     points = angles_rad.shape[1]
     if step < 1 or most < 1 or points < NEIGHBOURS + 2 * most:
-        raise ValueError(f"cannot look for shifts of {most} points over {step} frames on {points}")
+        raise ValueError(f"cannot compare shifts of {most} points over {step} frames on {points}")
     later, earlier = _pairs(number, step)
     now, before = angles_rad[later], angles_rad[earlier]
     if not heading_known:
@@ -86,8 +86,8 @@ def measure_pulse_speed(
     slope = np.sqrt(_sums(np.diff(before, axis=1) ** 2) / NEIGHBOURS)
     slope = np.pad(slope, ((0, 0), (4, 5)), mode="edge")
     usual = np.sqrt((np.diff(before, axis=1) ** 2).mean()) if before.size else 0.0
-    # a best shift at the end of what can be looked up is no minimum: the pattern came from beyond
-    # the head or the tail, or moved more than was looked for
+    # a best shift at the end of the range is no minimum: the pattern came from beyond
+    # the head or the tail, or moved by more than was tried
     n = np.arange(points)
     ahead, behind = n - NEIGHBOURS // 2 - 1 - shift, points - 2 - NEIGHBOURS // 2 - n + shift
     inside = (ahead > _EDGE) & (behind > _EDGE) & (np.abs(shift) < most - 0.5)

@@ -1,4 +1,4 @@
-"""Equal arc lengths: a few points along a body become 100 segments and their tangent angles."""
+"""Resampling to equal arc lengths: points along a body become 100 segments and tangent angles."""
 
 import numpy as np
 from scipy.interpolate import CubicSpline

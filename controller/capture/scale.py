@@ -41,27 +41,27 @@ def scale_of_marker(marker: str, image: Image) -> float:
 
     """
     try:
-        said = [float(part) for part in marker.split(",")]
+        numbers = [float(part) for part in marker.split(",")]
     except ValueError:
-        said = []
-    if len(said) not in {1, 5} or not np.isfinite(said).all() or said[-1] <= 0.0:
+        numbers = []
+    if len(numbers) not in {1, 5} or not np.isfinite(numbers).all() or numbers[-1] <= 0.0:
         raise InputError(
             f"--marker {marker}: expected the SIDE in metres of a printed marker in view, or "
             "X0,Y0,X1,Y1,METRES for two places in the image"
         )
-    if len(said) == 5:
-        apart = float(np.hypot(said[2] - said[0], said[3] - said[1]))
+    if len(numbers) == 5:
+        apart = float(np.hypot(numbers[2] - numbers[0], numbers[3] - numbers[1]))
         if apart < 1.0:
             raise InputError(f"--marker {marker}: the two places must be apart")
-        return said[4] / apart
+        return numbers[4] / apart
     sides = _sides(image)
     if not sides:
         raise InputError(f"--marker {marker}: no ArUco or AprilTag marker in the image")
-    return said[0] / float(np.median(sides))
+    return numbers[0] / float(np.median(sides))
 
 
 def _sides(image: Image) -> list[float]:
-    """Lengths in pixels of the sides of all markers of the first family that is seen."""
+    """Lengths in pixels of the sides of all markers of the first family that is found."""
     for family in _FAMILIES:
         settings = cv2.aruco.DetectorParameters()
         settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX

@@ -12,7 +12,7 @@ from snakewalk.controller.capture.resample import equal_arc_length, tangent_angl
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """What every recording becomes; frames without a whole midline are left out and counted."""
+    """A recording of any kind; frames without a whole midline are left out and counted."""
 
     name: str
     angles_rad: Floats
@@ -28,7 +28,7 @@ class Track:
     dropped: int
     """Frames that were left out because points were missing."""
     rate_assumed: bool = False
-    """Whether the file says nothing of its rate and its format's usual one was taken."""
+    """Whether the file states no rate, so that the default of its format was taken."""
     source: str = "not stated"
     licence: str = "not stated"
 
@@ -72,7 +72,7 @@ def track_from_points(
         scale_m: metres per unit; None where it is unknown (points become body lengths).
         frame: (T,) frame numbers, increasing; default 0, 1, 2...
         rate_assumed: whether ``rate_hz`` is a guess.
-        source: where it is from.
+        source: origin of the recording.
         licence: under which it may be used.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Which way the body wave runs, how long it is, and how fast: one number each for a recording."""
+"""The body wave of a recording: its direction, length and speed, one number each."""
 
 from dataclasses import dataclass
 

@@ -7,7 +7,7 @@ from snakewalk.controller.capture.fish.matching import SilhouetteFrame
 from snakewalk.controller.capture.fish.model import FishModel, fish_model
 from snakewalk.controller.capture.fish.postures import Postures
 from snakewalk.controller.capture.fish.rendered_fish import FilmConditions, FishScene
-from snakewalk.controller.capture.fish.silhouettes import seen
+from snakewalk.controller.capture.fish.silhouettes import silhouette_frame
 from snakewalk.controller.capture.image.silhouette import Polarity
 
 Floats = NDArray[np.float64]
@@ -30,7 +30,7 @@ def film(
     scene = FishScene(rows, columns, seed, conditions)
     empty = scene.background()
     half = model.half_width * length_px
-    top = [seen(scene.top(body + shift, half), empty, Polarity.DARK) for body in spine]
+    top = [silhouette_frame(scene.top(body + shift, half), empty, Polarity.DARK) for body in spine]
     return top, model, truth.base[list(frames)] * length_px + shift
 
 
@@ -53,5 +53,5 @@ def side_film(
         wide = np.abs(step[:, 1]) / np.hypot(step[:, 0], step[:, 1])
         wide *= model.half_width * model.length_px
         image = scene.side(line[:, [0, 2]], wide, model.half_height * model.length_px)
-        found.append(seen(image, empty, Polarity.DARK))
+        found.append(silhouette_frame(image, empty, Polarity.DARK))
     return found

@@ -78,7 +78,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     head_px = None if options.head is None else _place(options.head)
     console = Console(stderr=True)
     with console.status("learning the background ..."):
-        some = footage.some(_SAMPLE)
+        some = footage.spread(_SAMPLE)
         background = (
             None if options.background is None else _like(read_image(options.background), some[0])
         )

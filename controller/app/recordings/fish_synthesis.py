@@ -16,17 +16,17 @@ from snakewalk.controller.capture.fish.segments import (
     MotionSegment,
     Segmentation,
     commonest_posture,
-    cut,
+    segment_motion,
 )
 from snakewalk.controller.capture.fish.synthesis import (
     PieceSequence,
-    at_random,
     compose,
     joint_motion,
     joint_pieces,
     junctions,
+    random_sequence,
     save_motion,
-    through,
+    sequence_through,
 )
 from snakewalk.controller.kinematics.retarget import Retarget
 
@@ -102,9 +102,9 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
     if options.through:
         points = np.array(options.through)
         radius = options.radius * source.length
-        sequence = through(pieces, points, radius=radius, limit_s=options.limit_s)
+        sequence = sequence_through(pieces, points, radius=radius, limit_s=options.limit_s)
     else:
-        sequence = at_random(pieces, options.seconds, np.random.default_rng(options.seed))
+        sequence = random_sequence(pieces, options.seconds, np.random.default_rng(options.seed))
     motion = replace(
         compose(pieces, sequence, options.blend_s),
         name=f"{source.name}, put together anew",
@@ -147,7 +147,7 @@ def _segments(source: Postures, options: SynthesisOptions) -> list[MotionSegment
     elif options.reference != "straight":
         raise InputError(f"--reference {options.reference}: straight or commonest")
     segmentation = Segmentation(within_rad=within, merge_rad=float(np.radians(options.merge_deg)))
-    return cut(source, segmentation, reference)
+    return segment_motion(source, segmentation, reference)
 
 
 def _steps(parts: list[Floats]) -> Floats:

@@ -24,9 +24,9 @@ def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
         InputError: no such recording, or made for another robot.
 
     """
-    made = _made_joints(track, robot)
-    if made is not None:
-        return made
+    stored = _stored_joints(track, robot)
+    if stored is not None:
+        return stored
     recording = load_track(track)
     if recording.frames < 2:
         raise InputError(f"{track}: one frame is no motion")
@@ -41,7 +41,7 @@ def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
     return time_s, even
 
 
-def _made_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | None:
+def _stored_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | None:
     """Joint angles that a synthesis wrote beside its midlines; None where there are none."""
     if Path(track).suffix != ".npz" or not Path(track).is_file():
         return None
@@ -52,7 +52,7 @@ def _made_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | None
             joints = np.asarray(data["joints_rad"], dtype=float)
             rate_hz, name = float(data["rate_hz"]), str(data["robot"])
     except (BadZipFile, ValueError, OSError):
-        return None  # load_track says what is wrong with it
+        return None  # load_track raises with the reason
     if name != robot.name or joints.ndim != 2 or len(joints) < 2:
         return None
     return np.arange(len(joints)) / rate_hz, joints

@@ -3,8 +3,8 @@
 ``model`` bends and projects the fish, ``raster`` draws it as the camera would see it, ``matching``
 scores a posture by area and edges, ``pattern_search`` searches, ``first_frame`` and ``calibrate``
 start, ``tracking`` goes from frame to frame, ``side_view`` adds height and pitch. ``postures``
-keeps the result. ``segments`` cuts it at basic postures, ``joining`` says what may follow what,
-``synthesis`` strings segments together and ``track_file`` writes what a run can follow.
+keeps the result. ``segments`` cuts it at basic postures, ``piece_graph`` says what may follow
+what, ``synthesis`` strings pieces together and writes a motion that a run can play.
 ``rendered_fish`` and ``swimmer`` render films of a fish whose every angle is known; ``accuracy``
 compares postures with known ones.
 """

@@ -55,8 +55,8 @@ class Target:
         self.window = window
         self._thickness = blur_px
         mask = frame.mask.astype(np.uint8) * 255
-        self._area = window.cut(mask)
-        self._edge = _edges(window.cut(frame.grey), self._area, blur_px)
+        self._area = window.crop(mask)
+        self._edge = _edges(window.crop(frame.grey), self._area, blur_px)
         self._canvas = np.zeros(window.shape, dtype=np.uint8)
         self.soft_area = self._soften(self._area)
 

@@ -1,9 +1,9 @@
-"""Which segment may follow which, [TH] 4.2.1, and what happens when none may.
+"""Which segment may follow which, [TH] 4.2.1, also where the rule permits none.
 
 A segment follows another where the speed at the end of one and at the beginning of the other fall
 into the same of three classes. The text draws at random until a permitted one comes up; where none
-is permitted that never ends. Here a segment from which every way ends is avoided as long as another
-is left, and at a dead end the segment of the nearest speed follows, and is counted.
+is permitted that never ends. Here a segment that only leads to dead ends is avoided as long as
+there is another, and at a dead end the segment of the nearest speed follows, and is counted.
 """
 
 from dataclasses import dataclass
@@ -60,7 +60,7 @@ class PieceGraph:
 
     @cached_property
     def lasting(self) -> frozenset[int]:
-        """Pieces after which one can go on for ever."""
+        """Pieces from which a sequence can go on for ever."""
         alive = set(range(len(self.pieces)))
         while True:
             dead = {k for k in alive if not alive.intersection(self.permitted(k))}
@@ -69,7 +69,7 @@ class PieceGraph:
             alive -= dead
 
     def next(self, piece: int) -> tuple[list[int], bool]:
-        """What may follow, never empty, and whether that is by the rule.
+        """Pieces that may follow, never empty, and whether the rule permits them.
 
         Permitted pieces that do not lead to a dead end; else permitted ones; else those whose first
         speed is nearest to the last speed of ``piece``.
@@ -102,7 +102,7 @@ def piece_graph(
         postures: of the film.
         segments: cut from it.
         mirror: add each piece with left and right exchanged; a fish that was filmed turning only
-            one way can then turn both. Only for a basic posture that is straight.
+            to one side can then turn to both. Only for a basic posture that is straight.
 
     Raises:
         InputError: no segment.

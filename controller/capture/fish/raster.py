@@ -35,7 +35,7 @@ class Window:
         """Rows and columns of the canvas."""
         return max(1, round(self.height * self.scale)), max(1, round(self.width * self.scale))
 
-    def cut(self, image: Grey) -> Grey:
+    def crop(self, image: Grey) -> Grey:
         """Return this part of ``image``, averaged down."""
         part = image[self.top : self.top + self.height, self.left : self.left + self.width]
         rows, columns = self.shape

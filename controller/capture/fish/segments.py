@@ -1,6 +1,6 @@
 """A motion cut where the body passes through a basic posture, [TH] 4.1.
 
-Corrections: the printed merge looks at the first and last direction only, so that a left turn and a
+Corrections: the printed merge compares the first and last direction only, so that a left turn and a
 right turn become "forward"; each part must be below the threshold too. Directions are compared
 wrapped. A missing frame ends a segment. The basic posture may be other than straight: an eel is
 never straight while it swims, but passes through one posture again and again.
@@ -65,7 +65,7 @@ def commonest_posture(angles_rad: Floats, within_rad: float) -> Floats:
     return np.asarray(best)
 
 
-def cut(
+def segment_motion(
     postures: Postures, cutting: Segmentation | None = None, reference_rad: Floats | None = None
 ) -> list[MotionSegment]:
     """Cut a motion into glides and merged beats; what comes before and after is left out.

@@ -1,4 +1,4 @@
-"""Films on disk to what matching looks at: grey pictures and the fish's silhouettes."""
+"""Films on disk to the input of matching: grey pictures and the fish's silhouettes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from snakewalk.controller.capture.image.silhouette import Polarity, contrast, si
 from snakewalk.controller.capture.image.video import Footage, open_footage, read_image
 
 _FOR_BACKGROUND = 31
-_THIN = 0.5  # of the silhouette's threshold: what hangs together with it belongs to it
+_THIN = 0.5  # of the silhouette's threshold: what is connected to the body down to it belongs to it
 _SURE = 12.0  # grey values above the ground at least
 
 
@@ -41,7 +41,7 @@ class FishFilm:
                     f"{self.footage.path}: a frame of {image.shape[1]} x {image.shape[0]} pixels "
                     f"over a background of {self.background.shape[1]} x {self.background.shape[0]}"
                 )
-            yield seen(image, self.background, self.polarity)
+            yield silhouette_frame(image, self.background, self.polarity)
 
 
 def open_film(path: Path, background: Path | None = None, rate_hz: float | None = None) -> FishFilm:
@@ -57,7 +57,7 @@ def open_film(path: Path, background: Path | None = None, rate_hz: float | None 
 
     """
     footage = open_footage(path, rate_hz)
-    some = [grey(image) for image in footage.some(_FOR_BACKGROUND)]
+    some = [grey(image) for image in footage.spread(_FOR_BACKGROUND)]
     if len({image.shape for image in some}) > 1:
         raise InputError(f"{path}: its frames differ in size")
     empty = grey(read_image(background)) if background is not None else median_background(some)
@@ -69,11 +69,13 @@ def open_film(path: Path, background: Path | None = None, rate_hz: float | None 
     return FishFilm(footage, empty, contrast_polarity(some[len(some) // 2], empty))
 
 
-def seen(image: Image, background: Image, polarity: Polarity = Polarity.BOTH) -> SilhouetteFrame:
+def silhouette_frame(
+    image: Image, background: Image, polarity: Polarity = Polarity.BOTH
+) -> SilhouetteFrame:
     """Cut the fish out of one frame; the mask is empty where nothing stands out.
 
     A tail fin seen on edge is thinner than the blur of the picture and has not half the body's
-    contrast: what hangs together with the body at less belongs to it.
+    contrast: what is connected to the body at a lower threshold belongs to it.
 
     Args:
         image: (H, W) or (H, W, 3), 8 bit.

@@ -65,8 +65,8 @@ def swim(
             speed.append(speed[-1] + (gain - 0.9 * speed[-1]) / rate_hz)
     heading = np.array(head)
     pace = np.array(speed) / rate_hz
-    way = np.column_stack([np.cos(heading), np.sin(heading)]) * pace[:, None]
-    base = np.cumsum(way, axis=0) - way[0]
+    step = np.column_stack([np.cos(heading), np.sin(heading)]) * pace[:, None]
+    base = np.cumsum(step, axis=0) - step[0]
     time = np.arange(len(heading)) / rate_hz
     return Postures(
         base=base - 0.5 * (base.min(axis=0) + base.max(axis=0)),

@@ -1,4 +1,10 @@
-"""New motion from segments: at random ([TH] 4.2.2), or through control points ([TH] 5)."""
+"""New motion from segments: at random ([TH] 4.2.2), or through control points ([TH] 5).
+
+[TH] joins segments where the body is straight to 4 degrees; two such ends still differ by up to 8
+degrees an angle, and in speed by anything; no servo can jump 8 degrees. Here the piece that
+follows starts with the value *and slope* of the one before it, and the difference dies away along
+a quintic: position and speed are continuous, acceleration is bounded.
+"""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,7 +36,7 @@ class PieceSequence:
 
 @dataclass(frozen=True, slots=True)
 class _Node:
-    """A way that may be taken: where it ends, and what it has passed."""
+    """A sequence under search: its pieces, where it ends, and the points it has reached."""
 
     order: tuple[int, ...]
     base: Floats
@@ -44,7 +50,7 @@ class _Node:
         return self.order[-1]
 
 
-def at_random(pieces: PieceGraph, seconds: float, rng: np.random.Generator) -> PieceSequence:
+def random_sequence(pieces: PieceGraph, seconds: float, rng: np.random.Generator) -> PieceSequence:
     """Follow permitted pieces, each as likely as the other, for at least ``seconds``."""
     every = range(len(pieces.pieces))
     order = [int(rng.choice(sorted(pieces.lasting) or list(every)))]
@@ -57,7 +63,7 @@ def at_random(pieces: PieceGraph, seconds: float, rng: np.random.Generator) -> P
     return PieceSequence(tuple(order), forced)
 
 
-def through(
+def sequence_through(
     pieces: PieceGraph,
     points: Floats,
     *,
@@ -68,9 +74,9 @@ def through(
     """Swim through control points in order, from the origin along x.
 
     The text takes the piece that ends nearest to the point; with turns of one size that can circle
-    a point for ever. Here the best of many ways of ``depth`` pieces is sought, and its first piece
-    taken. A point counts as reached when the base of the head comes within ``radius``, on the way
-    as well as at an end.
+    a point for ever. Here the best of many sequences of ``depth`` pieces is searched, and its first
+    piece taken. A point counts as reached when the base of the head comes within ``radius`` of it,
+    within a piece as well as at its end.
 
     Args:
         pieces: what can be done.
@@ -100,7 +106,7 @@ def through(
 
 
 def compose(pieces: PieceGraph, sequence: PieceSequence, blend_s: float = BLEND_S) -> Postures:
-    """Lay the pieces end to end; angles, direction and way blended at every junction."""
+    """Put the pieces end to end; angles, direction and path are blended at every junction."""
     parts = [pieces.pieces[k] for k in sequence.order]
     base, head = [], []
     origin, direction = np.zeros(2), 0.0
@@ -130,8 +136,8 @@ def _seconds(pieces: PieceGraph, piece: int) -> float:
 
 
 def _ahead(pieces: PieceGraph, here: _Node, points: Floats, radius: float, depth: int) -> _Node:
-    """Take the first piece of the best way found."""
-    wanted = len(here.reached_at)
+    """Take the first piece of the best sequence found."""
+    reached = len(here.reached_at)
     beam, best, first = [here], None, len(here.order)
     for level in range(depth):
         grown = [
@@ -144,7 +150,7 @@ def _ahead(pieces: PieceGraph, here: _Node, points: Floats, radius: float, depth
         beam = grown[:_BEAM]
         if best is None or _cost(beam[0], points) < _cost(best, points):
             best = beam[0]
-        if level + 1 < depth and len(beam[0].reached_at) > wanted:
+        if level + 1 < depth and len(beam[0].reached_at) > reached:
             break
     if best is None:
         raise ValueError("depth must be 1 or more")
@@ -168,10 +174,10 @@ def _take(
     pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, points: Floats, radius: float
 ) -> _Node:
     part = pieces.pieces[piece]
-    way = placed(part.base, node.base, node.head_rad)
+    path = placed(part.base, node.base, node.head_rad)
     reached, at = node.reached_at, 1
     while len(reached) < len(points):
-        near = np.flatnonzero(np.hypot(*(way[at:] - points[len(reached)]).T) <= radius)
+        near = np.flatnonzero(np.hypot(*(path[at:] - points[len(reached)]).T) <= radius)
         if not len(near):
             break
         at += int(near[0])
@@ -179,9 +185,9 @@ def _take(
     return replace(
         node,
         order=(*node.order, piece),
-        base=way[-1],
+        base=path[-1],
         head_rad=node.head_rad + float(part.head_rad[-1]),
-        samples=node.samples + len(way) - 1,
+        samples=node.samples + len(path) - 1,
         forced=node.forced + (not by_rule),
         reached_at=reached,
     )

@@ -10,30 +10,30 @@ from snakewalk.controller.capture.image.silhouette import Polarity
 
 _GRID_PX = 64  # longest side of the picture to which the surface is fitted
 _ROUNDS = 4
-_STRONGEST_PX = 20.0  # pixels that say what the animal looks like
-_LATE = 0.85  # a dark animal may stay on a place for so long a part of the time
+_STRONGEST_PX = 20.0  # pixels that decide the polarity
+_QUANTILE = 0.85  # a dark animal may cover a pixel in so large a share of the frames
 
 
 def median_background(frames: Sequence[Image]) -> Image:
     """(H, W[, 3]) median over frames of one size; right where the animal is gone half the time."""
-    return _part_of(np.stack(frames), 0.5)
+    return _quantile(np.stack(frames), 0.5)
 
 
 def background_candidates(frames: Sequence[Image]) -> Iterator[tuple[Image, Polarity | None, str]]:
-    """The median over frames, and for slow animals the light and the dark end of what was seen.
+    """The median over frames, and for slow animals a light and a dark quantile of each pixel.
 
     Yields:
         background (H, W[, 3]), the polarity that it supposes (None: any), and its name.
 
     """
     stack = np.stack(frames)
-    yield _part_of(stack, 0.5), None, "the median of frames"
-    yield _part_of(stack, _LATE), Polarity.DARK, "the lighter frames at each place"
-    yield _part_of(stack, 1.0 - _LATE), Polarity.LIGHT, "the darker frames at each place"
+    yield _quantile(stack, 0.5), None, "the median of frames"
+    yield _quantile(stack, _QUANTILE), Polarity.DARK, "the lighter frames at each place"
+    yield _quantile(stack, 1.0 - _QUANTILE), Polarity.LIGHT, "the darker frames at each place"
 
 
-def _part_of(stack: Image, part: float) -> Image:
-    place = round(part * (len(stack) - 1))
+def _quantile(stack: Image, quantile: float) -> Image:
+    place = round(quantile * (len(stack) - 1))
     return np.ascontiguousarray(np.partition(stack, place, axis=0)[place])
 
 

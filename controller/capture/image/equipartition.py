@@ -20,7 +20,7 @@ _RATE = 0.95  # of the correction; 1 would be Newton's step for a straight curve
 _DESCENTS = 12
 _BISECTIONS = 80
 _SCAN = 96  # chords tried between the least and the greatest possible one
-_BENT = 1.05  # arc over chord from which several solutions are looked for
+_BENT = 1.05  # arc over chord from which all solutions are searched
 
 
 class NoEquipartitionError(ValueError):
@@ -37,10 +37,10 @@ class Equipartition:
     """(N + 1,) arc length at the points, increasing."""
     chord: float
     """Distance of neighbouring points, in the curve's unit."""
-    way: str
+    method: str
     """How it was found: ``descent``, ``bisection``, ``bisector`` (2 chords), ``later crossing``."""
     solutions: int
-    """Solutions found, of which this is the closest to the curve; 1 where none was looked for, as
+    """Solutions found, of which this is the closest to the curve; 1 where no other was searched, as
     no chord leaves its arc by more than 5 %."""
     distance: float
     """Mean distance of the curve from the chords."""
@@ -64,7 +64,7 @@ class _Curve:
         self.first: Ints = np.zeros(segments, dtype=np.int64)
         self.points = np.empty((segments + 1, 2))
         self.at = np.empty(segments + 1)
-        # N chords are no longer than the curve, and no shorter than the way from A to B
+        # N chords are no longer than the curve, and no shorter than the distance from A to B
         self.least = float(np.hypot(*(kept[-1] - kept[0]))) / segments
         self.most = self.length / segments
 
@@ -74,11 +74,11 @@ class _Curve:
         done = march(self.line, self.line_arc, chord, taken, self.points, self.at)
         return float(self.at[-1]) - self.length if done == self.segments else float("nan")
 
-    def solution(self, chord: float, way: str, crossing: Ints | None = None) -> Equipartition:
+    def solution(self, chord: float, method: str, crossing: Ints | None = None) -> Equipartition:
         self.residual(chord, crossing)
         points, at = self.points.copy(), self.at.copy()
         points[-1], at[-1] = self.curve[-1], self.length
-        return Equipartition(points, at, chord, way, 1, self.distance(points, at))
+        return Equipartition(points, at, chord, method, 1, self.distance(points, at))
 
     def distance(self, points: Floats, at: Floats) -> float:
         of = np.clip(np.searchsorted(at, self.arc, side="right") - 1, 0, self.segments - 1)
@@ -92,7 +92,7 @@ def equipartition(curve: Floats, segments: int = 100) -> Equipartition:
     """Divide ``curve`` (M, 2), M 2 or more, into ``segments`` equal chords.
 
     Where a chord leaves its arc by more than 5 % (few chords on a strong bend) all solutions by
-    first crossings are looked for, for 8 segments or fewer also those by later crossings, and the
+    first crossings are searched, for 8 segments or fewer also those by later crossings, and the
     closest to the curve is taken.
 
     Raises:
@@ -178,23 +178,23 @@ def _bisect(given: _Curve, low: float, high: float, crossing: Ints | None = None
 
 
 def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
-    """Look for every solution and take the one closest to the curve."""
+    """Search every solution and take the one closest to the curve."""
     found = [] if known is None else [known]
-    for way, crossing in _ways(given.segments, search=known is None):
+    for method, crossing in _crossings(given.segments, search=known is None):
         for chord in _roots(given, crossing):
             if all(abs(chord - other.chord) > 1e-7 * given.most for other in found):
-                found.append(given.solution(chord, way, crossing))
-        if way == "later crossing" and found and given.segments > 8:
+                found.append(given.solution(chord, method, crossing))
+        if method == "later crossing" and found and given.segments > 8:
             break
     if not found:
         raise NoEquipartitionError(
             f"no {given.segments} equal chords on this curve of {len(given.curve)} points"
         )
     best = min(found, key=lambda one: one.distance)
-    return Equipartition(best.points, best.at, best.chord, best.way, len(found), best.distance)
+    return Equipartition(best.points, best.at, best.chord, best.method, len(found), best.distance)
 
 
-def _ways(segments: int, *, search: bool) -> Iterator[tuple[str, Ints]]:
+def _crossings(segments: int, *, search: bool) -> Iterator[tuple[str, Ints]]:
     """First crossings, then one later crossing at any step, then (few segments) at two steps."""
     crossing: Ints = np.zeros(segments, dtype=np.int64)
     yield "bisection", crossing
@@ -238,7 +238,7 @@ def march(
         at: (N + 1,) arc length of them, written.
 
     Returns:
-        N, or fewer steps where the wanted crossing does not exist.
+        N, or fewer steps where such a crossing does not exist.
 
     """
     px, py, here = line[0, 0], line[0, 1], 0.0
@@ -253,7 +253,7 @@ def march(
             ex, ey = line[j + 1, 0] - px, line[j + 1, 1] - py
             if left == 0 and ex * ex + ey * ey < square:
                 # for the first crossing the piece so far lies inside the circle; for a later one
-                # it may cut the circle twice, which the roots below would tell
+                # it may cut the circle twice, which the roots below would show
                 ax, ay = line[j, 0] - px, line[j, 1] - py
                 if j == piece or ax * ax + ay * ay < square:
                     j += 1

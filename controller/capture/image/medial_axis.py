@@ -31,7 +31,7 @@ WORKING_WIDTH = 14.0
 """Width of the body while it is thinned, px."""
 _SMOOTH = 3.0  # of the chain of pixels, working px
 _CENTRINGS = 2
-_FOLLOW = 1.0  # how readily the way to a tip turns with the ridge
+_TURN_GAIN = 1.0  # of the turn towards the ridge on the way to a tip
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Skeleton:
 
     points_px: Floats
     """(101, 2) x, y at 100 equal chords from tip to tip; NaN where there is none. Which end is the
-    head is for ``identity`` to say. A pixel's centre has whole coordinates."""
+    head, ``identity`` decides. A pixel's centre has whole coordinates."""
     radius_px: Floats
     """(101,) distance to the boundary."""
     length_px: float
@@ -85,7 +85,7 @@ def skeleton_of_level(
     level: Level,
     threshold: float,
     origin_px: tuple[float, float] = (0.0, 0.0),
-    least: float = 0.0,
+    noise_level: float = 0.0,
     *,
     grey: bool = True,
 ) -> Skeleton:
@@ -95,7 +95,7 @@ def skeleton_of_level(
         level: contrast of one body against nothing, as a cut-out of an image.
         threshold: the contrast at the body's boundary.
         origin_px: x, y of the cut-out's first pixel in the image.
-        least: contrast that noise alone reaches; tips are not looked for below it.
+        noise_level: contrast that noise alone reaches; tips are not searched below it.
         grey: whether ``level`` falls off at the boundary as blur makes it; a mask does not.
 
     """
@@ -120,7 +120,7 @@ def skeleton_of_level(
         return no_skeleton(FrameStatus.BRANCH)
     inside = float(np.percentile(fine[solid > 0], 75))
     tip = inside * float(np.clip(_THIN_TIP + 0.075 * (width - 2.0), _THIN_TIP, 0.5))
-    line = _to_the_tips(curve, fine, threshold, depth, min(threshold, max(tip, least)))
+    line = _to_the_tips(curve, fine, threshold, depth, min(threshold, max(tip, noise_level)))
     if line is None:
         return no_skeleton(FrameStatus.BLOB)
     if width < THIN_PX and grey:
@@ -229,9 +229,9 @@ def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
         last = float(level[0])
         weight = np.maximum(level[1:] - threshold, 0.0)
         off = float((weight * across).sum() / max(float(weight.sum()), 1e-9))
-        turned = ahead + _FOLLOW * off / WORKING_WIDTH * side
+        turned = ahead + _TURN_GAIN * off / WORKING_WIDTH * side
         ahead = turned / np.hypot(*turned)
-        here = there + 0.5 * _FOLLOW * off * side
+        here = there + 0.5 * _TURN_GAIN * off * side
         found.append(here)
     return np.asarray(found)
 

@@ -11,7 +11,7 @@ from snakewalk.config.arrays import Image
 from snakewalk.controller.capture.frame_status import FrameStatus
 
 _MARGIN = 4
-_CLEAR = 6.0  # standard deviations of the noise that an animal's pixel must stand out
+_CLEAR = 6.0  # standard deviations of the noise by which an animal's pixel must stand out
 _LEAST_PX = 12
 _RIVAL = 0.4  # of the largest body's size: a second animal, not dirt
 _SHRUNK_PX = 400  # longest side of the picture on which the noise is measured
@@ -62,8 +62,8 @@ def contrast(image: Image, background: Image, polarity: Polarity) -> Image:
     return np.asarray(apart)
 
 
-def noise_of(apart: Image) -> tuple[float, float]:
-    """Middle and spread of the contrast where nothing is: it is taken from every n-th pixel."""
+def _noise_of(apart: Image) -> tuple[float, float]:
+    """Median and spread of the contrast of the background, from every n-th pixel."""
     every = max(1, min(apart.shape) // _SHRUNK_PX + 1)
     some = apart[::every, ::every].ravel()
     middle = float(np.median(some))
@@ -85,28 +85,28 @@ def silhouette_of(
     apart: Image = np.asarray(
         cv2.GaussianBlur(contrast(image, background, polarity), (3, 3), 0.0), dtype=np.uint8
     )
-    middle, spread = noise_of(apart)
-    sure = middle + _CLEAR * spread
-    found = _parts((apart > sure).astype(np.uint8))
+    middle, spread = _noise_of(apart)
+    clear = middle + _CLEAR * spread
+    found = _parts((apart > clear).astype(np.uint8))
     if found is None:
-        return nothing()
+        return _no_silhouette()
     label, stats = found
     best = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
     left, top, wide, high, _ = (int(v) for v in stats[best])
     inside = apart[top : top + high, left : left + wide]
     own = inside[label[top : top + high, left : left + wide] == best]
     threshold = max(middle + 0.5 * (float(np.percentile(own, 70)) - middle), middle + 3.0 * spread)
-    return _cut_out(apart, threshold, sure)
+    return _cut_out(apart, threshold, clear)
 
 
-def nothing() -> Silhouette:
-    """No animal."""
+def _no_silhouette() -> Silhouette:
+    """The silhouette of a frame without an animal."""
     empty = np.zeros((1, 1), dtype=np.float32)
     return Silhouette(empty, 0.5, 0.0, (0.0, 0.0), 0.0, 0.0, FrameStatus.NOTHING)
 
 
 def _parts(mask: Image) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
-    """Labels and statistics of the parts, looked for only where there is anything."""
+    """Labels and statistics of the connected parts, searched only where the mask is not empty."""
     left, top, wide, high = cv2.boundingRect(mask)
     if wide * high < _LEAST_PX:
         return None
@@ -121,11 +121,11 @@ def _parts(mask: Image) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
     return label, np.asarray(stats, dtype=np.int32)
 
 
-def _cut_out(apart: Image, threshold: float, sure: float) -> Silhouette:
+def _cut_out(apart: Image, threshold: float, noise_level: float) -> Silhouette:
     """The largest body above the threshold, with a margin, and whether it is alone and whole."""
     found = _parts((apart > threshold).astype(np.uint8))
     if found is None:
-        return nothing()
+        return _no_silhouette()
     label, stats = found
     areas = stats[1:, cv2.CC_STAT_AREA]
     best = 1 + int(np.argmax(areas))
@@ -146,4 +146,4 @@ def _cut_out(apart: Image, threshold: float, sure: float) -> Silhouette:
     if other.any():
         level[cv2.dilate(other.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = 0.0
     origin = (float(window[1].start), float(window[0].start))
-    return Silhouette(level, threshold, sure, origin, float(area), distractors, status)
+    return Silhouette(level, threshold, noise_level, origin, float(area), distractors, status)

@@ -15,7 +15,7 @@ from snakewalk.config.errors import InputError
 
 os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
 
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # faults are told in our own words
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # faults get our own messages
 
 IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".webp")
 ASSUMED_HZ = 30.0
@@ -33,7 +33,7 @@ class Footage:
     """Frames that there should be."""
     rate_hz: float
     rate_assumed: bool
-    """Whether nobody states the rate."""
+    """Whether ``rate_hz`` is a guess: neither the caller nor the file states it."""
 
     def read(self) -> Iterator[Image]:
         """(H, W) or (H, W, 3) 8-bit frames in order.
@@ -44,7 +44,7 @@ class Footage:
         """
         return self._images() if self.files else self._video(1)
 
-    def some(self, most: int) -> list[Image]:
+    def spread(self, most: int) -> list[Image]:
         """At most ``most`` frames, spread over the recording."""
         every = max(1, -(-self.count // most))
         if self.files:
@@ -64,7 +64,7 @@ class Footage:
                     whole, frame = film.retrieve()
                     if not whole:
                         break
-                    yield _plain(frame)
+                    yield _one_channel(frame)
                 done += 1
         finally:
             film.release()
@@ -76,11 +76,11 @@ class Footage:
 
 
 def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
-    """Look at a recording without reading all of it.
+    """Open a recording without reading all of it.
 
     Args:
         path: a video file, or a folder of images.
-        rate_hz: frames a second, instead of what the file says; a folder says nothing.
+        rate_hz: frames a second, instead of what the file states; a folder states none.
 
     Raises:
         InputError: no such file, no images, no video that can be read, or an empty one.
@@ -102,7 +102,7 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
     film = cv2.VideoCapture(str(path))
     try:
         first, _ = film.read()
-        count, said = film.get(cv2.CAP_PROP_FRAME_COUNT), film.get(cv2.CAP_PROP_FPS)
+        count, stated = film.get(cv2.CAP_PROP_FRAME_COUNT), film.get(cv2.CAP_PROP_FPS)
     finally:
         film.release()
     if not first:
@@ -110,10 +110,10 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
             f"{path}: no frame can be read: it is no video, is cut, or has a codec that this "
             "OpenCV lacks; convert it, or give a folder of images"
         )
-    if not 0.0 < said < 1e5:
-        said = 0.0
-    rate = rate_hz or said or ASSUMED_HZ
-    return Footage(path, (), max(1, int(count)), rate, rate_hz is None and said == 0.0)
+    if not 0.0 < stated < 1e5:
+        stated = 0.0
+    rate = rate_hz or stated or ASSUMED_HZ
+    return Footage(path, (), max(1, int(count)), rate, rate_hz is None and stated == 0.0)
 
 
 def read_image(file: Path) -> Image:
@@ -130,10 +130,10 @@ def read_image(file: Path) -> Image:
     image = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR) if data.size else None
     if image is None:
         raise InputError(f"{file}: is no image that can be read")
-    return _plain(image)
+    return _one_channel(image)
 
 
-def _plain(image: NDArray[np.generic]) -> Image:
+def _one_channel(image: NDArray[np.generic]) -> Image:
     """One channel where all three are the same: three times quicker."""
     out = np.asarray(image, dtype=np.uint8)
     if out.ndim == 3 and not (

@@ -71,16 +71,16 @@ def _obj(mesh: Mesh, material: str) -> str:
 def _glb(mesh: Mesh, texture: Image | None) -> bytes:
     """Bytes of the glTF."""
     turned = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    look: Any = trimesh.visual  # its classes have no types
+    visual: Any = trimesh.visual  # its classes have no types
     paint: dict[str, Any] = {"baseColorFactor": [*SKIN_RGB, 1.0]}
     if texture is not None:
         paint = {"baseColorTexture": Pillow.fromarray(texture)}
-    skin = look.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.8, **paint)
+    skin = visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.8, **paint)
     body: Any = trimesh.Trimesh(
         vertices=mesh.vertices @ turned.T,
         faces=mesh.faces,
         vertex_normals=mesh.normals @ turned.T,
-        visual=look.TextureVisuals(uv=mesh.uv, material=skin),
+        visual=visual.TextureVisuals(uv=mesh.uv, material=skin),
         process=False,
     )
     return bytes(trimesh.Scene({"body": body}).export(file_type="glb"))  # type: ignore[no-untyped-call]

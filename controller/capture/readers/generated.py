@@ -32,11 +32,11 @@ def generate(figures: RecordingConfig) -> Track:
     angles = swing * np.sin(np.interp(tau, at, phase)) + np.interp(tau, at, heading)
     front = angles[:, 0]
     step = np.stack([np.cos(front), np.sin(front)], axis=-1)
-    way = np.cumsum(step, axis=0) * (figures.travel * pulse / figures.rate_hz)
+    travel = np.cumsum(step, axis=0) * (figures.travel * pulse / figures.rate_hz)
     return Track(
         name=figures.name,
         angles_rad=np.asarray(angles),
-        points=(body_points(angles) + way[:, None, :]) * figures.length_m,
+        points=(body_points(angles) + travel[:, None, :]) * figures.length_m,
         time_s=time,
         rate_hz=figures.rate_hz,
         length_m=figures.length_m,

@@ -27,8 +27,8 @@ def track_from_keypoints(
     Args:
         file: for faults and the name.
         pixels: (T, K, 2), columns to the right and rows downwards; NaN where nothing was seen.
-        scores: (T, K) how sure the tracker was, 0..1; None where the file says nothing.
-        rate_hz: frames a second; None takes ``KEYPOINT_RATE_HZ`` and says so.
+        scores: (T, K) how sure the tracker was, 0..1; None where the file holds no scores.
+        rate_hz: frames a second; None takes ``KEYPOINT_RATE_HZ`` and marks the rate as assumed.
         least_score: keypoints below it count as missing, and their frames are left out.
         frame: (T,) frame numbers; default 0, 1, 2...
 

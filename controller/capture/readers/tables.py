@@ -29,8 +29,8 @@ def load_csv(file: Path, rate_hz: float | None, least_score: float | None = None
     column = {name.strip(): index for index, name in enumerate(rows[0])}
     for pair, scale_m in _MIDLINE.items():
         if {"t", "frame", "point", *pair} <= column.keys():
-            wanted = [column[name] for name in ("t", "frame", "point", *pair)]
-            return _midline(file, _numbers(file, rows, wanted), scale_m, rate_hz)
+            columns = [column[name] for name in ("t", "frame", "point", *pair)]
+            return _midline(file, _numbers(file, rows, columns), scale_m, rate_hz)
     keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
     if keypoints and "frame_idx" in column:
         return _sleap(file, rows, column, keypoints, rate_hz, least_score)
@@ -41,11 +41,11 @@ def load_csv(file: Path, rate_hz: float | None, least_score: float | None = None
     )
 
 
-def _numbers(file: Path, rows: list[list[str]], wanted: list[int]) -> Floats:
+def _numbers(file: Path, rows: list[list[str]], columns: list[int]) -> Floats:
     """Cells as numbers (rows, columns); empty ones and NA are NaN."""
-    table = np.full((len(rows) - 1, len(wanted)), np.nan)
+    table = np.full((len(rows) - 1, len(columns)), np.nan)
     for line, row in enumerate(rows[1:], start=2):
-        for k, index in enumerate(wanted):
+        for k, index in enumerate(columns):
             cell = row[index].strip() if index < len(row) else ""
             if cell.lower() in {"", "na", "nan"}:
                 continue
@@ -92,8 +92,8 @@ def _sleap(
     least_score: float | None,
 ) -> Track:
     """One row a frame, keypoints in the table's order, head first, in pixels."""
-    wanted = [column["frame_idx"], *(column[f"{k}.{axis}"] for k in keypoints for axis in "xy")]
-    table = _numbers(file, rows, wanted)
+    columns = [column["frame_idx"], *(column[f"{k}.{axis}"] for k in keypoints for axis in "xy")]
+    table = _numbers(file, rows, columns)
     score_columns = [column[f"{k}.score"] for k in keypoints if f"{k}.score" in column]
     scores = _numbers(file, rows, score_columns) if len(score_columns) == len(keypoints) else None
     xy = table[:, 1:].reshape(len(table), len(keypoints), 2)

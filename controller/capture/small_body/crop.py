@@ -53,7 +53,7 @@ class Workspace:
         """Choose it from some frames."""
         scale = min(1.0, _WORKING_PX / length_px)
         if crops[0].image.ndim == 2:
-            # above 0 where the body is: which sign that is, the strongest pixels say
+            # the strongest pixels decide the sign that makes the body positive
             strong = np.concatenate([_strongest(one) for one in crops])
             return cls(scale, np.array([np.sign(np.median(strong)) or 1.0]))
         apart = np.median(np.concatenate([_strongest(one) for one in crops]), axis=0)
@@ -72,17 +72,17 @@ class Workspace:
         own = 0.0 if self.scale == 1.0 else _OWN_BLUR
         return float(np.sqrt(max(spot**2 - own**2, 0.09))) / self.scale
 
-    def contrast(self, seen: Crop) -> tuple[Floats, tuple[int, int]]:
+    def contrast(self, crop: Crop) -> tuple[Floats, tuple[int, int]]:
         """Picture (h, w) on the working grid, above 0 where the body is, and its first pixel."""
-        apart = seen.ground.astype(np.float32) - seen.image.astype(np.float32)
+        apart = crop.ground.astype(np.float32) - crop.image.astype(np.float32)
         apart = apart.reshape(*apart.shape[:2], -1) @ self.channels.astype(np.float32)
         if self.scale == 1.0:
-            return np.asarray(apart, dtype=float), seen.origin_px
+            return np.asarray(apart, dtype=float), crop.origin_px
         apart = np.asarray(cv2.GaussianBlur(apart, (0, 0), _SOFTEN / self.scale), dtype=np.float32)
         size = np.array(apart.shape[::-1])
-        first = np.ceil(self.from_px(np.array(seen.origin_px, dtype=float))).astype(int)
-        last = np.floor(self.from_px(np.array(seen.origin_px) + size - 1.0)).astype(int)
-        there = self.to_px(first.astype(float)) - seen.origin_px
+        first = np.ceil(self.from_px(np.array(crop.origin_px, dtype=float))).astype(int)
+        last = np.floor(self.from_px(np.array(crop.origin_px) + size - 1.0)).astype(int)
+        there = self.to_px(first.astype(float)) - crop.origin_px
         back = np.array([[1.0 / self.scale, 0.0, there[0]], [0.0, 1.0 / self.scale, there[1]]])
         wide, high = (int(v) for v in last - first + 1)
         how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -90,9 +90,9 @@ class Workspace:
         return np.asarray(small, dtype=float), (int(first[0]), int(first[1]))
 
 
-def _strongest(seen: Crop) -> Floats:
+def _strongest(crop: Crop) -> Floats:
     """(K[, C]) contrast of the twelfth part of the pixels that stands out most."""
-    apart = seen.ground.astype(float) - seen.image.astype(float)
+    apart = crop.ground.astype(float) - crop.image.astype(float)
     much = np.abs(apart) if apart.ndim == 2 else np.linalg.norm(apart, axis=2)
     return np.asarray(apart[much >= np.percentile(much, 92.0)])
 
@@ -111,9 +111,9 @@ class View:
     """(FRAME,) a first guess; places relative to the first pixel."""
 
     @classmethod
-    def of(cls, seen: Crop, points_px: Floats, radius_px: float, space: Workspace) -> "View":
-        """View a frame whose body lies about along ``points_px`` (P, 2)."""
-        picture, first = space.contrast(seen)
+    def of(cls, crop: Crop, points_px: Floats, radius_px: float, space: Workspace) -> "View":
+        """View a frame whose body lies roughly along ``points_px`` (P, 2)."""
+        picture, first = space.contrast(crop)
         line = space.from_px(points_px) - first
         paper = np.full(picture.shape, 255, dtype=np.uint8)
         drawn = np.rint(line * 16.0).astype(np.int32)
@@ -125,7 +125,7 @@ class View:
         corner = np.array([columns[0], rows[0]])
         # blur dims a thin body: its own contrast is between what is seen and that of black
         peak = max(float(np.percentile(picture[use], 95.0)), 4.0)
-        contrast = float(np.sqrt(peak * max(peak, float(np.median(seen.ground)))))
+        contrast = float(np.sqrt(peak * max(peak, float(np.median(crop.ground)))))
         middle = 0.5 * (line[1:] + line[:-1]).mean(axis=0) - corner
         return cls(
             np.ascontiguousarray(picture[window]),
@@ -143,7 +143,7 @@ def bends_of(line: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(bend_basis(at), angle, rcond=None)[0])
 
 
-def turned_round(frame: Floats) -> Floats:
+def reversed_body(frame: Floats) -> Floats:
     """The same place with the other end first."""
     other = frame.copy()
     other[2 : 2 + BENDS] = frame[2 : 2 + BENDS][::-1] + np.pi

@@ -2,7 +2,7 @@
 
 They are found together with the bends of a sample of frames by damped least squares on the grey
 values; the frames' own parameters are eliminated, so that the cost grows with the frames only
-linearly. With the body known, a frame tells where it lies far better than its two blurred ends do.
+linearly. With the body known, a frame fixes its place far better than its two blurred ends do.
 """
 
 from collections.abc import Sequence
@@ -28,13 +28,13 @@ _ROUNDS = 14
 _SETTLED = 1e-4  # of the cost
 _LEARNING = 4  # rounds in which the noise is learnt
 _LEAST_NOISE2 = 1.0
-_LEVEL = 0.35  # what is known of the log of the width before
+_LEVEL = 0.35  # prior standard deviation of the log of the mean width
 _EVEN = 0.3  # of second differences of the logs of the widths
 _TIP = (-0.55, 0.3)  # of the log of the width at a tip beside that before it: a round cap
 _BLUR = 0.5  # of the log of the blur
 _STIFF = 1.0  # rad, of second differences of the bends
 _CONTRAST = 0.15  # of the contrast of one frame beside the film's
-_WAYS = 8
+_DIRECTIONS = 8
 _AWAY = (0.5, 1.0, 1.8, 3.0)  # of the greatest half width
 _LOOKED_AT = 12  # frames
 _WORTH = 30.0  # by how much the fit must gain, in squares of the noise
@@ -57,13 +57,13 @@ class Fit:
     frame: Floats
     """(FRAME,)"""
     noise: float
-    """Standard deviation of what is left, raised where what is left hangs together."""
+    """Standard deviation of the residual, raised where neighbouring pixels of it correlate."""
     inverse: Floats
     """(FRAME, FRAME) covariance of the parameters."""
     by_body: Floats
     """(FRAME, body) how the parameters move with those of the body."""
-    left: Floats
-    """(h, w) what the picture shows beyond the model."""
+    residual: Floats
+    """(h, w) picture minus model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,15 +79,15 @@ class FilmBody:
 
 
 def _frame_prior(contrast: float) -> tuple[Floats, Floats]:
-    """Rows (R, FRAME) and what they should give, each in its own standard deviations."""
+    """Prior rows (R, FRAME) and their target values, each in its own standard deviation."""
     bend = np.zeros((BENDS - 2, FRAME))
     bend[:, 2 : 2 + BENDS] = np.diff(np.eye(BENDS), 2, axis=0) / _STIFF
     level = np.zeros((3, FRAME))
     level[0, 2 + BENDS] = 1.0 / (_CONTRAST * contrast)
     level[1, -2] = level[2, -1] = 1.0 / (0.1 * contrast)
-    wanted = np.zeros(BENDS + 1)
-    wanted[BENDS - 2] = 1.0 / _CONTRAST
-    return np.vstack([bend, level]), wanted
+    target = np.zeros(BENDS + 1)
+    target[BENDS - 2] = 1.0 / _CONTRAST
+    return np.vstack([bend, level]), target
 
 
 def _body_prior(start: Floats, size: int) -> tuple[Floats, Floats]:
@@ -98,7 +98,7 @@ def _body_prior(start: Floats, size: int) -> tuple[Floats, Floats]:
     rows[0, 2:BODY] = 1.0 / stations / _LEVEL
     rows[1, 1] = 1.0 / _BLUR
     rows[2, [2, 3]] = rows[3, [BODY - 1, BODY - 2]] = np.array([1.0, -1.0]) / _TIP[1]
-    wanted = np.concatenate(
+    target = np.concatenate(
         [
             np.zeros(stations - 4),
             [start[2:BODY].mean() / _LEVEL, start[1] / _BLUR],
@@ -111,14 +111,14 @@ def _body_prior(start: Floats, size: int) -> tuple[Floats, Floats]:
         shade[[1, 2], [BODY + 1, BODY + 2]] = 0.2
         shade[3, BODY + 3] = 2.0
         rows = np.vstack([rows, shade])
-        wanted = np.concatenate([wanted, [0.0, 0.0, 0.0, 2.0 * (start[1] + 0.3)]])
-    return np.vstack([even, rows]), wanted
+        target = np.concatenate([target, [0.0, 0.0, 0.0, 2.0 * (start[1] + 0.3)]])
+    return np.vstack([even, rows]), target
 
 
 def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> Fit:
     """Fit one frame; damped least squares from ``start`` (FRAME,)."""
     ribbon = Ribbon(body.grid)
-    prior, wanted = _frame_prior(body.contrast)
+    prior, target = _frame_prior(body.contrast)
     shape, use = patch.picture.shape, patch.use.ravel()
     seen = max(float(use.sum()), 1.0)
     noise2 = 0.0
@@ -128,13 +128,13 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
         shown, slopes = ribbon.picture(values, body.values, shape, shared=False)
         rest = (patch.picture - shown).ravel() * use
         squares = float(rest @ rest)
-        soft = wanted - prior @ values
+        soft = target - prior @ values
         if turn == 0:
             noise2 = max(squares / seen, _LEAST_NOISE2)
         cost = squares / noise2 + float(soft @ soft)
         if cost < best:
             done = best - cost < _SETTLED * cost
-            if turn < _LEARNING:  # what is left is noise only near the end
+            if turn < _LEARNING:  # what is residual is noise only near the end
                 noise2 = max(squares / seen, _LEAST_NOISE2)
                 cost = squares / noise2 + float(soft @ soft)
             best, kept, damp = cost, values, 0.3 * damp
@@ -147,20 +147,20 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
             damp *= 10.0
         values = kept + np.linalg.solve(normal + damp * np.diag(np.diag(normal)), push)
     shown, slopes = ribbon.picture(kept, body.values, shape)
-    left = (patch.picture - shown) * patch.use
-    raised = _hangs_together(left, float(np.exp(body.values[1])))
+    residual = (patch.picture - shown) * patch.use
+    raised = _correlation(residual, float(np.exp(body.values[1])))
     products = gram(slopes.reshape(len(slopes), -1) * use) / noise2
     inverse = np.linalg.inv(products[:FRAME, :FRAME] + prior.T @ prior)
     moved = -inverse @ products[:FRAME, FRAME:]
-    return Fit(kept, float(np.sqrt(noise2 * raised)), np.asarray(inverse * raised), moved, left)
+    return Fit(kept, float(np.sqrt(noise2 * raised)), np.asarray(inverse * raised), moved, residual)
 
 
-def _hangs_together(left: Floats, spot: float) -> float:
-    """Variance of the rest seen through the blur, over that of as much white noise; at least 1."""
+def _correlation(residual: Floats, spot: float) -> float:
+    """Variance of the blurred residual, over that of as much white noise; at least 1."""
     # of white noise a Gaussian leaves 1 / (4 pi spot^2); less blur than that of a pixel is none
     spot = max(spot, 0.8)
-    smooth = gaussian_filter(left, spot, mode="constant")
-    white = float((left**2).mean()) / (4.0 * np.pi * spot * spot)
+    smooth = gaussian_filter(residual, spot, mode="constant")
+    white = float((residual**2).mean()) / (4.0 * np.pi * spot * spot)
     return max(1.0, float((smooth**2).mean()) / max(white, 1e-12))
 
 
@@ -177,7 +177,7 @@ def film_body(
     """
     size = len(start)
     ribbon = Ribbon(Grid.of(start))
-    body_rows, body_wanted = _body_prior(start, size)
+    body_rows, body_target = _body_prior(start, size)
     body = kept_body = start
     frames = kept = [one.copy() for one in starts]
     contrast = float(np.median([one[2 + BENDS] for one in starts]))
@@ -187,13 +187,13 @@ def film_body(
     raised = 1.0
     seen = sum(float(patch.use.sum()) for patch in patches)
     for turn in range(_ROUNDS):
-        prior, wanted = _frame_prior(contrast)
+        prior, target = _frame_prior(contrast)
         rows = [_rows(ribbon, one, body, patch) for one, patch in zip(frames, patches, strict=True)]
         squares = sum(float(row[-1] @ row[-1]) for row in rows)
         if turn == 0:
             noise2 = max(squares / seen, _LEAST_NOISE2)
-        soft_body = body_wanted - body_rows @ body
-        softs = [wanted - prior @ one for one in frames]
+        soft_body = body_target - body_rows @ body
+        softs = [target - prior @ one for one in frames]
         softness = float(soft_body @ soft_body) + sum(float(v @ v) for v in softs)
         cost = squares / noise2 + softness
         if cost < best:
@@ -213,7 +213,7 @@ def film_body(
                 gs = gs + products[FRAME:-1, -1]
             spot = float(np.exp(body[1]))
             each = [
-                _hangs_together(row[-1].reshape(patch.picture.shape), spot)
+                _correlation(row[-1].reshape(patch.picture.shape), spot)
                 for row, patch in zip(rows, patches, strict=True)
             ]
             raised = float(np.mean(each))
@@ -236,7 +236,7 @@ def film_body(
 
 
 def _rows(ribbon: Ribbon, frame: Floats, body: Floats, patch: Patch) -> Floats:
-    """(FRAME + body + 1, pixels) slopes, and last what is left."""
+    """(FRAME + body + 1, pixels) slopes, and last what is residual."""
     shown, slopes = ribbon.picture(frame, body, patch.picture.shape)
     rows = np.concatenate([slopes, (patch.picture - shown)[None]]) * patch.use
     return np.asarray(rows.reshape(len(rows), -1))
@@ -262,23 +262,23 @@ def _eliminated(
 def with_shadow(
     body: FilmBody, frames: Sequence[Floats], patches: Sequence[Patch]
 ) -> tuple[FilmBody, list[Floats]] | None:
-    """Fit again with a shadow where what is left looks like one; None where it does not."""
-    best = _direction(body, frames, patches)
+    """Fit again with a shadow where the residual shows one; None where it does not."""
+    best = _shadow(body, frames, patches)
     if best is None:
         return None
     start = np.concatenate([body.values, best])
     return film_body(patches, frames, start)
 
 
-def _direction(body: FilmBody, frames: Sequence[Floats], patches: Sequence[Patch]) -> Floats | None:
+def _shadow(body: FilmBody, frames: Sequence[Floats], patches: Sequence[Patch]) -> Floats | None:
     ribbon = Ribbon(body.grid)
     spot = float(np.exp(body.values[1]))
     wide = float(np.exp(body.values[2:BODY].max()))
     soft = float(np.log(np.hypot(spot, 0.7 + 0.3 * wide)))
     tried = [
-        np.array([1.0, away * wide * np.cos(way), away * wide * np.sin(way), soft])
+        np.array([1.0, away * wide * np.cos(angle), away * wide * np.sin(angle), soft])
         for away in _AWAY
-        for way in np.linspace(0.0, 2.0 * np.pi, _WAYS, endpoint=False)
+        for angle in np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS, endpoint=False)
     ]
     gain, norm, squares, count = np.zeros(len(tried)), np.zeros(len(tried)), 0.0, 0.0
     every = max(1, len(frames) // _LOOKED_AT)

@@ -1,6 +1,6 @@
 """Small bodies of a film fitted to its grey values, with one body for all frames.
 
-A frame's expected error is told from what is left of its picture and from how well the shared body
+A frame's expected error follows from the residual of its picture and from how well the shared body
 is known; where it is above a hundredth of the length the frame is ``ROUGH``.
 """
 
@@ -15,7 +15,7 @@ from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
 from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px
-from snakewalk.controller.capture.small_body.crop import Crop, View, Workspace, turned_round
+from snakewalk.controller.capture.small_body.crop import Crop, View, Workspace, reversed_body
 from snakewalk.controller.capture.small_body.film_body import (
     FilmBody,
     Fit,
@@ -34,7 +34,7 @@ from snakewalk.controller.capture.small_body.ribbon import (
 )
 
 ROUGH = 0.01
-"""Of the length: a larger expected error is told."""
+"""Of the length: a frame of a larger expected error is ``ROUGH``."""
 _SAMPLE_PX = 30000.0  # working pixels in all frames of the sample
 _FEWEST, _MOST = 8, 40
 _PASSES = 2
@@ -42,13 +42,13 @@ _FORM = 0.004  # of the length: what the model of the tips may be wrong by
 _SHARP = 62.0  # times the blur: a longer body's medial axis is as good
 _LONG, _WIDE = 50.0, 2.4  # times the blur: so is that of a wide body, by length and half width
 _BY_BLUR = 0.6  # of the blur of all of the body, what its edges show: ``edge_blur_px``
-_LOST = 2.0  # times the usual rest: the picture shows something else
+_LOST = 2.0  # times the median noise: the picture shows something else
 _FOUND = 1.5  # the same for a frame that had no skeleton
 _ALIKE = 0.3  # of the usual contrast
 _DOUBT = 0.35  # margin of the ends under which both ways are tried
 _TRIED = 5  # frames of a stretch between doubts
 _FREE = 0.03  # of the body's cover: less than that is ground
-_BELIEVED = 2.0  # frames that must have seen a place before it is half believed
+_PRIOR_FRAMES = 2.0  # weight of the surroundings of a place, in frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +75,9 @@ def fit_film(
     Args:
         skeletons: (T) the same end first in all.
         crops: by frame.
-        margin: (T,) how surely the ends were told apart: ``identity.AlignedSkeletons``.
+        margin: (T,) how surely the ends were told apart: ``identity.margins``.
         expected_px: (T,) error of frames that are not fitted, NaN where it is not known.
-        fixed: whether the ground stands still, so that frames tell it to one another.
+        fixed: whether the ground stands still, so that its pattern is learnt from all frames.
 
     """
     good = [k for k in crops if skeletons[k].status is FrameStatus.GOOD]
@@ -106,11 +106,11 @@ def fit_film(
             body = body if shaded is None else shaded[0]
         fits = {k: fit_frame(patches[k], starts[k], body) for k in starts}
         if turn == 0:
-            _tell_the_ends(fits, patches, body, margin)
-            _find_the_lost(fits, views, crops, body, radius, space)
+            _reverse_wrong_stretches(fits, patches, body, margin)
+            _recover_lost(fits, views, crops, body, radius, space)
             ground = FilmGround.of(views, fits, body) if fixed else None
             for k, fit in fits.items():
-                beside = 0.0 if ground is None else ground.beside(views[k], fit, body)
+                beside = 0.0 if ground is None else ground.visible(views[k], fit, body)
                 patches[k] = Patch(views[k].picture - beside, views[k].use)
         start, starts = body.values, {k: fit.frame for k, fit in fits.items()}
     out = list(skeletons)
@@ -123,21 +123,25 @@ def fit_film(
         expected[k] = expected_error(fit, body) / space.scale
         line = space.to_px(curve_of(fit.frame, float(body.values[0])) + views[k].first)
         out[k] = _skeleton(line, body, space, expected[k])
-    rest = [one if k in fits else _told(one, expected[k], length) for k, one in enumerate(out)]
+    rest = [
+        one if k in fits else _with_status(one, expected[k], length) for k, one in enumerate(out)
+    ]
     return FittedFilm(tuple(rest), expected, body)
 
 
 def _unfitted(skeletons: Sequence[Skeleton], expected_px: Floats) -> FittedFilm:
-    """Skeletons as they are, rough where their error says so."""
+    """Skeletons as they are, ``ROUGH`` where their expected error is too large."""
     good = [one.status is FrameStatus.GOOD for one in skeletons]
     length = np.array([one.length_px for one in skeletons])
     usual = float(np.median(length[good])) if any(good) else 1.0
-    out = [_told(one, error, usual) for one, error in zip(skeletons, expected_px, strict=True)]
+    out = [
+        _with_status(one, error, usual) for one, error in zip(skeletons, expected_px, strict=True)
+    ]
     return FittedFilm(tuple(out), expected_px, None)
 
 
-def _told(body: Skeleton, error_px: float, length_px: float) -> Skeleton:
-    """The body, rough where its error says so."""
+def _with_status(body: Skeleton, error_px: float, length_px: float) -> Skeleton:
+    """The body, ``ROUGH`` where its expected error is too large."""
     if body.status is FrameStatus.GOOD and error_px > ROUGH * length_px:
         return replace(body, status=FrameStatus.ROUGH)
     return body
@@ -155,10 +159,10 @@ def expected_error(fit: Fit, body: FilmBody) -> float:
     return float(np.sqrt(np.maximum(square, 0.0) + (_FORM * length) ** 2).mean())
 
 
-def _tell_the_ends(
+def _reverse_wrong_stretches(
     fits: dict[int, Fit], patches: Mapping[int, Patch], body: FilmBody, margin: Floats
 ) -> None:
-    """Turn stretches round whose grey values fit the body better from its other end."""
+    """Reverse stretches whose grey values fit the body better from its other end."""
     stretches: list[list[int]] = []
     for k in sorted(fits):
         joined = stretches and stretches[-1][-1] == k - 1 and margin[k] >= _DOUBT
@@ -171,14 +175,14 @@ def _tell_the_ends(
     for stretch in stretches:
         worse = 0.0
         for k in stretch[:: max(1, len(stretch) // _TRIED)]:
-            other = fit_frame(patches[k], turned_round(fits[k].frame), body)
-            worse += float((other.left**2).sum() - (fits[k].left ** 2).sum())
+            other = fit_frame(patches[k], reversed_body(fits[k].frame), body)
+            worse += float((other.residual**2).sum() - (fits[k].residual ** 2).sum())
         if worse < 0.0:
             for k in stretch:
-                fits[k] = fit_frame(patches[k], turned_round(fits[k].frame), body)
+                fits[k] = fit_frame(patches[k], reversed_body(fits[k].frame), body)
 
 
-def _find_the_lost(
+def _recover_lost(
     fits: dict[int, Fit],
     views: dict[int, View],
     crops: Mapping[int, Crop],
@@ -186,7 +190,7 @@ def _find_the_lost(
     radius: float,
     space: Workspace,
 ) -> None:
-    """Fit frames without a skeleton from their neighbour's place; kept where they look alike."""
+    """Fit frames without a skeleton from their neighbour's place; keep those that fit as well."""
     usual = float(np.median([fit.noise for fit in fits.values()]))
     lost = sorted(set(crops) - set(fits))
     for step, order in ((-1, lost), (1, lost[::-1])):
@@ -241,7 +245,7 @@ class FilmGround:
 
     @classmethod
     def of(cls, views: Mapping[int, View], fits: Mapping[int, Fit], body: FilmBody) -> "FilmGround":
-        """Take the mean of what is left where the body was not, of all frames that have a fit."""
+        """Take the mean residual where the body was not, over all frames that have a fit."""
         firsts = np.array([views[k].first for k in fits])
         lasts = np.array([np.add(views[k].first, views[k].picture.shape[::-1]) for k in fits])
         low, high = firsts.min(axis=0), lasts.max(axis=0)
@@ -258,13 +262,13 @@ class FilmGround:
             window = (slice(y, y + shape[0]), slice(x, x + shape[1]))
             total[window] += free * (view.picture - shown)
             count[window] += free
-        # seldom seen: less believed; never seen: what is around it
+        # a place seen in few frames is weighted less; one never seen takes its surroundings
         around = gaussian_filter(total, 1.0) / (gaussian_filter(count, 1.0) + 1.0)
-        pattern = (total + _BELIEVED * around) / (count + _BELIEVED)
+        pattern = (total + _PRIOR_FRAMES * around) / (count + _PRIOR_FRAMES)
         return cls(np.asarray(pattern), (int(low[0]), int(low[1])))
 
-    def beside(self, view: View, fit: Fit, body: FilmBody) -> Floats:
-        """(h, w) what of the pattern a frame shows beside the body."""
+    def visible(self, view: View, fit: Fit, body: FilmBody) -> Floats:
+        """(h, w) the part of the pattern that a frame shows beside the body."""
         x, y = np.subtract(view.first, self.first)
         rows, columns = view.picture.shape
         cover = Ribbon(body.grid).cover(fit.frame, body.values, view.picture.shape)

@@ -17,7 +17,7 @@ from snakewalk.config.arrays import Floats
 BENDS = 10
 """Coefficients of the tangent angle."""
 STATIONS = np.array([0.0, 0.04, 0.1, 0.2, 0.35, 0.5, 0.65, 0.78, 0.88, 0.95, 1.0])
-"""Places along the body at which its half width is told; linear between them."""
+"""Places along the body at which its half width is given; linear between them."""
 GROUND = 3
 """Coefficients of the ground: level and slopes."""
 FRAME = 2 + BENDS + 1 + GROUND

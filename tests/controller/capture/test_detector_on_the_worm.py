@@ -17,7 +17,7 @@ def worm(shared_data: Path) -> tuple[Capture, np.ndarray]:
     if not (folder / "frames").is_dir():
         pytest.skip("the frames of the worm are not there")
     footage = open_footage(folder / "frames")
-    detector = make_detector(footage.some(25))
+    detector = make_detector(footage.spread(25))
     seen = capture(footage.read(), detector, footage.rate_hz, fixed=False)
     with np.load(folder / "skeletons.npz") as data:
         published = data["skeletons"].astype(float)

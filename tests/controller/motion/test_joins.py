@@ -15,9 +15,9 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.capture.fish.piece_graph import piece_graph
-from snakewalk.controller.capture.fish.segments import cut
+from snakewalk.controller.capture.fish.segments import segment_motion
 from snakewalk.controller.capture.fish.swimmer import swim
-from snakewalk.controller.capture.fish.synthesis import at_random, joint_motion
+from snakewalk.controller.capture.fish.synthesis import joint_motion, random_sequence
 from snakewalk.controller.gaits.gait import ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
@@ -58,8 +58,8 @@ def wave(robot: RobotConfig) -> tuple[np.ndarray, np.ndarray]:
 def fish_motion(name: str) -> tuple[np.ndarray, np.ndarray]:
     """Segments of a fish in a random order, joined at the joint layer, as wide as joints bend."""
     swum = swim()
-    pieces = piece_graph(swum, cut(swum), mirror=True)
-    order = at_random(pieces, 6.0, np.random.default_rng(2))
+    pieces = piece_graph(swum, segment_motion(swum), mirror=True)
+    order = random_sequence(pieces, 6.0, np.random.default_rng(2))
     joints = joint_motion(pieces, order, Retarget(ROBOTS[name]), 6)
     share = 0.9 / (np.abs(joints) / ROBOTS[name].limit_rad).max()
     return np.arange(len(joints)) / pieces.rate_hz, min(1.0, share) * joints

@@ -17,20 +17,20 @@ from snakewalk.controller.capture.fish.segments import (
     Segmentation,
     basic_frames,
     commonest_posture,
-    cut,
     merge,
+    segment_motion,
     turned,
 )
 from snakewalk.controller.capture.fish.swimmer import Stroke, swim
 from snakewalk.controller.capture.fish.synthesis import (
-    at_random,
     compose,
     fading,
     join,
     joint_motion,
     joint_pieces,
     junctions,
-    through,
+    random_sequence,
+    sequence_through,
 )
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.kinematics.retarget import Retarget
@@ -51,12 +51,12 @@ def printed_merge(a: MotionSegment, b: MotionSegment) -> bool:
 
 
 def test_a_script_is_cut_into_its_strokes() -> None:
-    kinds = [s.kind for s in cut(TRUTH)]
+    kinds = [s.kind for s in segment_motion(TRUTH)]
     assert kinds.count("left") == 2
     assert kinds.count("right") == 2
     assert kinds.count("forward") == 5
     assert kinds[0] == kinds[-1] == "glide"
-    for s in cut(TRUTH):
+    for s in segment_motion(TRUTH):
         ends = np.degrees(np.abs(TRUTH.angles_rad[[s.start, s.stop]]))
         assert ends.max() <= 4.0
 
@@ -81,7 +81,7 @@ def test_directions_are_compared_wrapped() -> None:
     assert abs(head[-1] - head[0]) > np.radians(300.0)  # the printed difference: a turn
     assert np.degrees(turned(head)) == pytest.approx(4.0)
     away = replace(TRUTH, head_rad=np.angle(np.exp(1j * (TRUTH.head_rad + np.pi))))
-    assert [s.kind for s in cut(away)] == [s.kind for s in cut(TRUTH)]
+    assert [s.kind for s in segment_motion(away)] == [s.kind for s in segment_motion(TRUTH)]
 
 
 def test_missing_frames_end_a_segment() -> None:
@@ -90,17 +90,17 @@ def test_missing_frames_end_a_segment() -> None:
     lost = replace(
         TRUTH, angles_rad=holed, head_rad=np.where(np.isnan(holed[:, 0]), np.nan, TRUTH.head_rad)
     )
-    spans = [(s.start, s.stop) for s in cut(lost)]
+    spans = [(s.start, s.stop) for s in segment_motion(lost)]
     assert not any(start <= 52 <= stop for start, stop in spans)
-    assert len(spans) < len(cut(TRUTH))
+    assert len(spans) < len(segment_motion(TRUTH))
 
 
 def test_an_animal_that_is_never_straight_is_refused_with_what_helps() -> None:
     bent = replace(TRUTH, angles_rad=TRUTH.angles_rad + 0.9)
     with pytest.raises(InputError, match="--reference commonest"):
-        cut(bent)
+        segment_motion(bent)
     posture = commonest_posture(bent.angles_rad, np.radians(4.0))
-    assert [s.kind for s in cut(bent, None, posture)]
+    assert [s.kind for s in segment_motion(bent, None, posture)]
 
 
 def piece(begin: float, end: float, way: float = 1.0, turn: float = 0.0) -> Piece:
@@ -121,7 +121,7 @@ def test_where_nothing_is_permitted_drawing_never_ends_and_ours_does() -> None:
     rng = np.random.default_rng(0)
     draws = [int(rng.integers(1)) in stuck.permitted(0) for _ in range(10_000)]
     assert not any(draws)
-    made = at_random(stuck, 5.0, rng)
+    made = random_sequence(stuck, 5.0, rng)
     assert len(made.order) == 5
     assert made.forced == 4
 
@@ -130,7 +130,7 @@ def test_dead_ends_are_avoided_while_there_is_another_way() -> None:
     lively = pieces(piece(0.1, 0.1), piece(0.1, 2.9))  # the second leads nowhere
     assert lively.permitted(0) == [0, 1]
     assert lively.lasting == {0}
-    made = at_random(lively, 20.0, np.random.default_rng(1))
+    made = random_sequence(lively, 20.0, np.random.default_rng(1))
     assert set(made.order) == {0}
     assert made.forced == 0
 
@@ -138,9 +138,9 @@ def test_dead_ends_are_avoided_while_there_is_another_way() -> None:
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000))
 def test_every_join_is_within_one_class_and_seeds_repeat(seed: int) -> None:
-    stock = piece_graph(TRUTH, cut(TRUTH))
-    made = at_random(stock, 10.0, np.random.default_rng(seed))
-    assert made == at_random(stock, 10.0, np.random.default_rng(seed))
+    stock = piece_graph(TRUTH, segment_motion(TRUTH))
+    made = random_sequence(stock, 10.0, np.random.default_rng(seed))
+    assert made == random_sequence(stock, 10.0, np.random.default_rng(seed))
     top = max(max(p.begin_speed, p.end_speed) for p in stock.pieces)
     for a, b in pairwise(made.order):
         ends = [stock.pieces[a].end_speed, stock.pieces[b].begin_speed]
@@ -152,8 +152,8 @@ POINTS = np.array([[3.0, 0.0], [5.0, 3.0], [2.0, 5.0], [-2.0, 2.0]])
 
 
 def test_control_points_are_passed_in_order() -> None:
-    stock = piece_graph(TRUTH, cut(TRUTH), mirror=True)
-    made = through(stock, POINTS, radius=0.5)
+    stock = piece_graph(TRUTH, segment_motion(TRUTH), mirror=True)
+    made = sequence_through(stock, POINTS, radius=0.5)
     way = compose(stock, made).base
     at = [round(t * TRUTH.rate_hz) for t in made.reached_s]
     assert at == sorted(at)
@@ -167,9 +167,9 @@ def test_the_printed_choice_circles_a_point_that_looking_ahead_reaches() -> None
     missed = 0
     for angle in np.linspace(0.5, 2.9, 9):
         point = 2.2 * np.array([[np.cos(angle), np.sin(angle)]])
-        through(stock, point, radius=0.3, limit_s=60.0)
+        sequence_through(stock, point, radius=0.3, limit_s=60.0)
         try:
-            through(stock, point, radius=0.3, limit_s=60.0, depth=1)
+            sequence_through(stock, point, radius=0.3, limit_s=60.0, depth=1)
         except InputError:
             missed += 1
     assert missed >= 1
@@ -178,7 +178,7 @@ def test_the_printed_choice_circles_a_point_that_looking_ahead_reaches() -> None
 def test_a_point_out_of_reach_is_said_to_be() -> None:
     ahead_only = pieces(piece(1, 1))
     with pytest.raises(InputError, match=r"control point 1 at -3,0 .* turn from 0 to 0 degrees"):
-        through(ahead_only, np.array([[-3.0, 0.0]]), radius=0.3, limit_s=20.0)
+        sequence_through(ahead_only, np.array([[-3.0, 0.0]]), radius=0.3, limit_s=20.0)
 
 
 def test_straight_ends_still_step_eight_degrees_and_the_blend_takes_it_away() -> None:
@@ -187,7 +187,7 @@ def test_straight_ends_still_step_eight_degrees_and_the_blend_takes_it_away() ->
     one = replace(piece(1, 1), angles_rad=np.tile([four, -four, four, -four], (11, 1)))
     other = replace(piece(1, 1), angles_rad=-one.angles_rad)
     stock = pieces(one, other)
-    order = at_random(stock, 8.0, np.random.default_rng(3))
+    order = random_sequence(stock, 8.0, np.random.default_rng(3))
     spine = np.concatenate([stock.pieces[k].angles_rad for k in order.order])
     assert np.degrees(np.abs(np.diff(spine, axis=0)).max()) == pytest.approx(8.0)  # as printed
     fine = replace(stock, rate_hz=100.0)
@@ -211,8 +211,8 @@ def test_joining_what_fits_changes_nothing_and_blending_commutes_with_the_joints
     line = np.arange(31.0)[:, None] * [0.1, 0.2]
     np.testing.assert_array_equal(join([line[:11], line[10:]], 5), line)
     assert join([wave[:11], wave[10:]], 5) == pytest.approx(wave, abs=0.02)
-    stock = piece_graph(TRUTH, cut(TRUTH))
-    order = at_random(stock, 6.0, np.random.default_rng(2))
+    stock = piece_graph(TRUTH, segment_motion(TRUTH))
+    order = random_sequence(stock, 6.0, np.random.default_rng(2))
     robot = Retarget(load_robot("yaw16"))
     motion = compose(stock, order)
     np.testing.assert_allclose(
@@ -231,7 +231,7 @@ def test_a_placed_piece_is_turned_to_the_left_by_its_angle() -> None:
 
 def test_a_filmed_turn_to_one_side_serves_both_when_mirrored() -> None:
     left = swim((Stroke("glide", 0.3), Stroke("turn", 0.6, 1.0), Stroke("glide", 0.3)))
-    stock = piece_graph(left, cut(left), mirror=True)
+    stock = piece_graph(left, segment_motion(left), mirror=True)
     turns = [float(p.head_rad[-1]) for p in stock.pieces]
     assert min(turns) == pytest.approx(-max(turns))
     assert max(turns) > 0.8
@@ -250,8 +250,8 @@ def test_real_eels_are_never_straight_and_are_cut_at_their_commonest_posture(
     within = np.radians(12.0)
     assert not basic_frames(found.angles_rad, np.zeros(8), within).any()
     posture = commonest_posture(found.angles_rad, within)
-    stock = piece_graph(found, cut(found, Segmentation(within_rad=within), posture))
-    made = at_random(stock, 20.0, np.random.default_rng(0))
+    stock = piece_graph(found, segment_motion(found, Segmentation(within_rad=within), posture))
+    made = random_sequence(stock, 20.0, np.random.default_rng(0))
     motion = compose(stock, made)
     assert motion.frames / motion.rate_hz >= 20.0
     assert np.isfinite(motion.points()).all()

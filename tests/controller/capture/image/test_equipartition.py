@@ -145,7 +145,7 @@ def test_where_no_first_crossing_ends_at_b_a_later_one_does() -> None:
             found = equipartition(curve, 4)
         except NoEquipartitionError:
             continue
-        residual = first_crossings_only(curve, 4) if found.way == "later crossing" else None
+        residual = first_crossings_only(curve, 4) if found.method == "later crossing" else None
         if residual is None or np.abs(residual).min() < 0.05:
             continue
         shown += 1
