@@ -71,7 +71,7 @@ def measure_pulse_speed(
     """
     points = angles_rad.shape[1]
     if step < 1 or most < 1 or points < NEIGHBOURS + 2 * most:
-        raise ValueError(f"cannot compare shifts of {most} points over {step} frames on {points}")
+        raise ValueError(f"cannot look for shifts of {most} points over {step} frames on {points}")
     later, earlier = _pairs(number, step)
     now, before = angles_rad[later], angles_rad[earlier]
     if not heading_known:

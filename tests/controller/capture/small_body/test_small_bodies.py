@@ -13,7 +13,7 @@ from snakewalk.controller.capture.identity import margins
 from snakewalk.controller.capture.image.medial_axis import no_skeleton
 from snakewalk.controller.capture.image.silhouette import Polarity
 from snakewalk.controller.capture.image.thin_body_fit import fitted
-from snakewalk.controller.capture.small_body.crop import bends_of, crop_body, turned_round
+from snakewalk.controller.capture.small_body.crop import bends_of, crop_body, reversed_body
 from snakewalk.controller.capture.small_body.film_fit import fit_film
 from snakewalk.controller.capture.small_body.ribbon import (
     BENDS,
@@ -132,9 +132,9 @@ def test_the_line_has_its_length_its_middle_and_its_slopes() -> None:
         assert np.allclose(slopes[:, :, k], moved, atol=1e-6)
 
 
-def test_turned_round_is_the_same_line_from_its_other_end() -> None:
+def test_reversed_body_is_the_same_line_from_its_other_end() -> None:
     _, frame, _, _ = picture_and_parameters()
-    line, other = curve_of(frame, 20.0), curve_of(turned_round(frame), 20.0)
+    line, other = curve_of(frame, 20.0), curve_of(reversed_body(frame), 20.0)
     assert np.allclose(other, line[::-1], atol=1e-9)
     angle = np.abs(np.exp(1j * bends_of(line)) - np.exp(1j * frame[2 : 2 + BENDS]))
     assert angle.max() < 0.05
