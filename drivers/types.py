@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools, Floats
 
+LIMIT_SLACK_RAD = 0.2
+"""How far beyond its limit a joint may be measured, at the start and in a run (ours)."""
+
 
 class JointCommand(NamedTuple):
     """Goal positions of all joints."""

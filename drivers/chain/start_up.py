@@ -23,11 +23,10 @@ from snakewalk.drivers.protocol.registers import (
     ServoUnits,
     alarm_names,
 )
+from snakewalk.drivers.types import LIMIT_SLACK_RAD
 
 FAST_READ_FIRMWARE = 45
 """First firmware with fast sync read (e-manual, DYNAMIXEL Protocol 2.0, Fast Sync Read)."""
-_SLACK_RAD = 0.2
-"""How far beyond its limit a joint may be found, for example after a fall."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +168,7 @@ def check_pose(robot: RobotConfig, position_rad: NDArray[np.float64]) -> None:
         f"limit of {limit:g}: bend it back by hand; if it is straight, its turn count or zero "
         "position is wrong: reboot it, check Homing Offset"
         for joint, (angle, limit) in enumerate(zip(position_rad, robot.limit_rad, strict=True))
-        if not abs(angle) <= limit + _SLACK_RAD
+        if not abs(angle) <= limit + LIMIT_SLACK_RAD
     ]
     if faults:
         raise ChainError(faults)

@@ -7,9 +7,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
-
-LIMIT_SLACK_RAD = 0.2
-"""How far beyond its limit a joint may be measured (ours)."""
+from snakewalk.drivers.types import LIMIT_SLACK_RAD
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""What mutation showed that no test noticed: small print of the judgement."""
+"""Edge cases of the vetting that mutation testing found untested."""
 
 from dataclasses import replace
 from itertools import product
