@@ -1,4 +1,4 @@
-"""Where a replay departs from its original: the first time and joint, and how far in all."""
+"""Differences between a replay and its original: first time and joint, largest and RMS."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class Comparison:
 
     @property
     def same(self) -> bool:
-        """Whether the replay is the original, as far as it was compared."""
+        """Whether the replay equals the original within the tolerances."""
         return self.cycles[0] == self.cycles[1] and all(d.same for d in self.differences)
 
     @property
@@ -74,7 +74,7 @@ class Comparison:
         }
 
     def lines(self) -> tuple[str, ...]:
-        """For people, the first departure first."""
+        """Return lines for a reader, the earliest difference first."""
         head = f"{self.cycles[0]} cycles against {self.cycles[1]}"
         if not self.same_config:
             head += "; the configurations differ"
@@ -96,7 +96,7 @@ def compare(
         original: of the two.
         replay: the other.
         tolerance: a difference up to this, in SI units, counts as none.
-        tolerances: the same for single quantities, by name; infinite: told, never held against it.
+        tolerances: the same for single quantities, by name; infinite: none counts.
 
     """
     limits = dict(tolerances or {})

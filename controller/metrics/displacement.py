@@ -1,4 +1,4 @@
-"""How far a gait carried the body in a cycle, by its log: in the frame of the virtual chassis."""
+"""Displacement of the body in a gait cycle, from the log, in the frame of the virtual chassis."""
 
 from dataclasses import dataclass
 
@@ -34,7 +34,7 @@ class GaitDisplacement:
 
 
 def gait_displacement(record: RunRecord) -> GaitDisplacement:
-    """Judge a gait run whose parameters did not change.
+    """Return the displacement of a gait run whose parameters did not change.
 
     Raises:
         InputError: the log is of another motion.
@@ -44,17 +44,17 @@ def gait_displacement(record: RunRecord) -> GaitDisplacement:
     if config is None:
         raise InputError("the log is of no gait")
     hz = GaitCycle(make_gait(config.name, config.parameters), robot).frequency_hz
-    nothing = GaitDisplacement(0, hz, *(float("nan"),) * 4)
+    unknown = GaitDisplacement(0, hz, *(float("nan"),) * 4)
     known = np.isfinite(pose.links_m).all(axis=(1, 2))
     if not known.any() or hz <= 0.0:
-        return nothing
+        return unknown
     time_s, links = pose.time_s[known], pose.links_m[known]
     up = pose.rotation[known][:, :, 2]
     last_s = time_s[-1] - STOP_S
     first_s = max(last_s - config.duration_s + SKIPPED_S, float(time_s[0]))
     count = int((last_s - first_s) * hz + 1e-9)
     if count < 1:
-        return nothing
+        return unknown
     frames: list[Frame] = []
     marks: list[Frame] = []
     due = last_s - np.arange(count, -1, -1) / hz

@@ -1,4 +1,4 @@
-"""What a gait cost, by its log: electrical energy, and how far the belly slid."""
+"""Effort of a gait from its log: electrical power, cost of transport, slip."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ from snakewalk.drivers.types import BodyPose
 
 @dataclass(frozen=True, slots=True)
 class Winding:
-    """What of a motor turns current and speed into electrical power."""
+    """Constants of a motor that give electrical power from current and speed."""
 
     resistance_ohm: float
     back_emf_v_s: float
@@ -26,43 +26,43 @@ class Winding:
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """Over the time in which the gait ran at full rate; NaN where the log cannot tell."""
+    """Means over the time at full rate; NaN where the log does not hold what is needed."""
 
     power_w: float
     """Electrical, all motors, mean; what they give back is lost."""
     cost_of_transport: float
-    """Power over weight times speed along the net way; without the servos' own electronics."""
+    """Power over weight times net speed; without the servos' own electronics."""
     climb_m_s: float
     slip: float
-    """Way that touching links slide across themselves, over the way of the centre; flat floors."""
+    """Distance that touching links slide sideways, over that of the centre; flat floors only."""
 
 
 def effort(record: RunRecord, from_s: float, motor: Winding | None) -> Effort:
-    """Judge a gait run from ``from_s`` after the start until it comes to rest.
+    """Return the effort of a gait run from ``from_s`` after the start until it stops.
 
-    ``motor`` is that of the robot's servos; None: not known, and nothing can be told.
+    ``motor`` is that of the robot's servos; with None, all numbers are NaN.
     """
     header, cycle, pose = record.header, record.cycle, record.pose
-    nothing = Effort(*(float("nan"),) * 4)
+    unknown = Effort(*(float("nan"),) * 4)
     end_s = record.end_s - STOP_S
     steady = (pose.time_s >= from_s) & (pose.time_s <= end_s)
     if motor is None or steady.sum() < 2 or not np.isfinite(pose.links_m[steady]).all():
-        return nothing
+        return unknown
     during = (cycle.time_s >= from_s) & (cycle.time_s <= end_s)
     current, speed = cycle.current_a[during], cycle.velocity_rad_s[during]
     # i^2 R is heat, k_e w i is work at the shaft with the losses of the gears
     watts = motor.resistance_ohm * current**2 + motor.back_emf_v_s * speed * current
     power = float(np.nanmean(np.clip(watts, 0.0, None).sum(axis=1)))
     span_s = float(pose.time_s[steady][-1] - pose.time_s[steady][0])
-    way = pose.centre_m[steady][-1] - pose.centre_m[steady][0]
-    net_m_s = float(np.linalg.norm(way)) / span_s
+    moved_m = pose.centre_m[steady][-1] - pose.centre_m[steady][0]
+    net_m_s = float(np.linalg.norm(moved_m)) / span_s
     weight_n = header.robot.link_mass_kg * (header.robot.joint_count + 1) * GRAVITY_M_S2
     cost = power / (weight_n * net_m_s) if net_m_s > 1e-6 else float("inf")
-    return Effort(power, cost, float(way[2]) / span_s, _slip(record, steady))
+    return Effort(power, cost, float(moved_m[2]) / span_s, _slip(record, steady))
 
 
 def _slip(record: RunRecord, steady: NDArray[np.bool_]) -> float:
-    """Sideways way of the lowest point of each touching link, mean over the links."""
+    """Sideways distance of the lowest point of touching links, over the centre's distance."""
     header, pose = record.header, record.pose
     if header.world.ground.kind != "flat" or header.world.obstacle is not None:
         return float("nan")

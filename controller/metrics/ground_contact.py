@@ -1,4 +1,4 @@
-"""How the body lay on the ground during a run: how far it rolled, how much hung in the air."""
+"""Contact of the body with the ground during a run: largest roll, share of links in the air."""
 
 from dataclasses import dataclass
 
@@ -16,13 +16,13 @@ class GroundContact:
     """Over all cycles of a run."""
 
     roll_max_rad: float
-    """Largest lean of the head link to a side."""
+    """Largest roll of the head link to a side."""
     in_air: float
     """Share of links in the air, mean."""
 
 
 def ground_contact(record: RunRecord, ground: HeightField | None) -> GroundContact:
-    """Judge a run's poses; NaN where the log has none."""
+    """Return the ground contact over a run's poses; NaN where the log has none."""
     pose = record.pose
     if len(pose.time_s) == 0 or not np.isfinite(pose.links_m).all():
         return GroundContact(float("nan"), float("nan"))

@@ -1,4 +1,4 @@
-"""Where the body went against where it should: waypoints in order, distance from the path."""
+"""Path error: waypoints reached in order, and distance of the body from its path."""
 
 from typing import Final
 
@@ -68,7 +68,7 @@ def distance_m(points_m: Floats, path_m: Floats, along_m: Floats) -> Floats:
 
 
 def travelled_m(pose: PoseTable) -> float:
-    """Length of the way of the centre of mass in the horizontal plane."""
+    """Length of the track of the centre of mass in the horizontal plane."""
     return float(np.hypot(*np.diff(pose.centre_m[:, :2], axis=0).T).sum())
 
 

@@ -11,16 +11,16 @@ FORMAT: Final = 1
 Json = dict[str, Any]
 
 
-def _of(kind: str, said: str) -> Json:
-    return {"type": kind, "description": said}
+def _of(kind: str, description: str) -> Json:
+    return {"type": kind, "description": description}
 
 
-def _list(said: str, items: str = "number") -> Json:
-    return {"type": "array", "items": {"type": [items, "null"]}, "description": said}
+def _list(description: str, items: str = "number") -> Json:
+    return {"type": "array", "items": {"type": [items, "null"]}, "description": description}
 
 
-def _maybe(said: str) -> Json:
-    return {"type": ["number", "null"], "description": said}
+def _maybe(description: str) -> Json:
+    return {"type": ["number", "null"], "description": description}
 
 
 _TIME = _of("number", "clock of the run, s")

@@ -36,7 +36,9 @@ def record_of(rows: Mapping[str, Sequence[Row]], *, complete: bool, note: str) -
     """
     header = _header(rows["/config"][0])
     joints = header.robot.joint_count
-    laid = tuple((float(r["time_s"]), _floats([r], "points_m")[0]) for r in rows.get("/path", ()))
+    replanned = tuple(
+        (float(r["time_s"]), _floats([r], "points_m")[0]) for r in rows.get("/path", ())
+    )
     return RunRecord(
         header=header,
         cycle=_cycle(rows.get("/cycle", ()), joints),
@@ -44,7 +46,7 @@ def record_of(rows: Mapping[str, Sequence[Row]], *, complete: bool, note: str) -
         pose=_pose(rows.get("/pose", ()), joints + 1),
         walk=_walk(rows.get("/walk", ())),
         qpos=_qpos(rows.get("/qpos", ())),
-        paths=((0.0, header.plan.path_m), *laid),
+        paths=((0.0, header.plan.path_m), *replanned),
         events=tuple(
             Event(float(r["time_s"]), r["level"], r["kind"], r["text"])
             for r in rows.get("/event", ())

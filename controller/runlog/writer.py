@@ -88,7 +88,7 @@ class RunLog:
         torque_constant_n_m_a: float = float("nan"),
         initial_pose: InitialPose | None = None,
     ) -> None:
-        """Say once, first, what runs; the ground is thinned, so that a report can draw it."""
+        """Log once, first, what runs; the ground is thinned: enough for a report to draw it."""
         row = {
             "format": FORMAT,
             "software": version("snakewalk"),

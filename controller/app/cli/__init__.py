@@ -1,1 +1,1 @@
-"""The command line: one command a file, their options, keys of an operator."""
+"""The command line: ``main`` registers the commands, ``options`` is what they share."""

@@ -11,8 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
 from snakewalk.controller.app.cli.commands.analyse import analyse
 from snakewalk.controller.app.cli.commands.body import body
-from snakewalk.controller.app.cli.commands.bus import serve, sniff
-from snakewalk.controller.app.cli.commands.bus_set import bus_set
+from snakewalk.controller.app.cli.commands.bus import bus_set, serve, sniff
 from snakewalk.controller.app.cli.commands.capture import capture
 from snakewalk.controller.app.cli.commands.doctor import doctor
 from snakewalk.controller.app.cli.commands.fish import film, match, synthesise
@@ -213,10 +212,10 @@ def main() -> None:
 
 
 def _in_one_line(error: Any) -> None:
-    """Say what is wrong with the words of a command, in place of typer's box of five lines."""
+    """Print what is wrong with a command's words in one line, in place of typer's box."""
     if type(error).__name__ == "NoArgsIsHelpError":  # its help has been shown
         return
     context = getattr(error, "ctx", None)
     path = "snakewalk" if context is None else context.command_path
-    said = " ".join(error.format_message().split())
-    print(f"snakewalk: {said} (see {path} --help)", file=sys.stderr)
+    text = " ".join(error.format_message().split())
+    print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)

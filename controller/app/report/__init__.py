@@ -1,5 +1,5 @@
-"""From a log to something a person can read: numbers, figures, one page; nothing but the log.
+"""Files for a person, made from a run's log alone: numbers, figures, one page, a film.
 
-``build.build_report`` makes the page, ``summary.summary`` the numbers, ``compare.compare`` says
-where a replay departs from its original.
+``artifacts.make_artifacts`` makes all of them, ``page`` writes the HTML, ``film`` draws the film;
+``figures`` are those of the page, ``plots`` those of the other commands.
 """

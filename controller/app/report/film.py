@@ -1,4 +1,4 @@
-"""From a log to its film: the measured head pose and joints are all that it takes, on metal too."""
+"""Film of a run, from the head pose and the joint angles in its log; on metal too."""
 
 from collections.abc import Callable
 from pathlib import Path

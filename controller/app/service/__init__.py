@@ -1,5 +1,6 @@
-"""Fitness of a bus for a run, and what is to be done where it is not fit.
+"""Service of a bus: ``scan`` lists servos, ``servo_settings`` changes one, ``sniff`` taps the line.
 
-Each check is a function from what was read to findings; ``examine`` reads, in an order in which one
-fault does not hide the next. Nothing is written to a servo.
+``doctor`` examines whether a bus is fit for a run. Each of its checks (``adapter``,
+``servo_checks``) makes findings of what was read; the order is such that no fault hides the next.
+Only ``servo_settings`` writes to a servo.
 """

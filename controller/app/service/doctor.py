@@ -26,7 +26,7 @@ def examine(
     *,
     latency_s: float,
     latency_timer_ms: int | None,
-    tell: Callable[[str], None] = lambda step: None,
+    on_progress: Callable[[str], None] = lambda step: None,
 ) -> list[Finding]:
     """Findings about the bus, worst causes first.
 
@@ -36,19 +36,21 @@ def examine(
     """
     bus = DynamixelBus(port, robot.servo.model, latency_s=latency_s)
     findings = [adapter.latency_timer(latency_timer_ms, port.name)]
-    tell("who answers")
-    wanted, baud = robot.servo_ids, port.getBaudRate()
-    found = bus.find(wanted)
-    missing = [i for i in wanted if i not in found]
-    elsewhere = _at_other_bauds(port, missing, tell) if missing and has_baud(port.name) else {}
-    findings += servos.presence(wanted, list(found), elsewhere, baud, port.name)
-    tell("who else is there")
-    findings += [f for f in [servos.strangers(wanted, list(bus.scan()))] if f is not None]
+    on_progress("who answers")
+    expected, baud = robot.servo_ids, port.getBaudRate()
+    found = bus.find(expected)
+    missing = [i for i in expected if i not in found]
+    elsewhere = (
+        _at_other_bauds(port, missing, on_progress) if missing and has_baud(port.name) else {}
+    )
+    findings += servos.presence(expected, list(found), elsewhere, baud, port.name)
+    on_progress("who else is there")
+    findings += [f for f in [servos.unexpected_ids(expected, list(bus.scan()))] if f is not None]
     if not found:
         return findings
-    tell("duplicate IDs")
+    on_progress("duplicate IDs")
     findings.append(servos.duplicates([bus.probe(i) for i in found]))
-    tell("registers")
+    on_progress("registers")
     reports = _reports(bus, robot, findings)
     if reports:
         findings += [
@@ -59,7 +61,7 @@ def examine(
             servos.supply(reports, safety.voltage_min_v, safety.voltage_max_v),
             servos.heat(reports, safety.temperature_limit_c),
         ]
-        tell("group reads")
+        on_progress("group reads")
         fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
         findings.append(line_quality(bus.cycle([s.servo_id for s in reports], fast=fast)))
     fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
@@ -93,7 +95,7 @@ def _reports(
 
 
 def _at_other_bauds(
-    port: BytePort, missing: Sequence[int], tell: Callable[[str], None]
+    port: BytePort, missing: Sequence[int], on_progress: Callable[[str], None]
 ) -> dict[int, int]:
-    heard = scan(port, tell=tell)
-    return {s.servo_id: s.baud for s in heard if s.servo_id in missing}
+    answering = scan(port, on_progress=on_progress)
+    return {s.servo_id: s.baud for s in answering if s.servo_id in missing}

@@ -1,4 +1,4 @@
-"""Who is on a bus, at which baud rate; and which port is meant."""
+"""Servos on a bus at every baud rate, and the choice of the serial port."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -16,8 +16,8 @@ _LIKELY = (1_000_000, FACTORY_BAUD)
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
-    """A servo that answered a broadcast ping."""
+class ScanResult:
+    """One servo that answered a broadcast ping."""
 
     servo_id: int
     model: str
@@ -51,8 +51,10 @@ def has_baud(device: str) -> bool:
 
 
 def scan(
-    port: BytePort, bauds: Sequence[int] = (), tell: Callable[[str], None] = lambda step: None
-) -> list[Heard]:
+    port: BytePort,
+    bauds: Sequence[int] = (),
+    on_progress: Callable[[str], None] = lambda step: None,
+) -> list[ScanResult]:
     """Ask at each baud rate, the likely ones first; leaves the port at the one it had.
 
     Raises:
@@ -62,20 +64,22 @@ def scan(
     before = port.getBaudRate()
     if not has_baud(port.name):
         bauds = (before,)
-    heard: list[Heard] = []
+    results: list[ScanResult] = []
     try:
         for baud in bauds or sorted(BAUDS, key=lambda rate: (rate not in _LIKELY, rate)):
-            tell(f"{baud} baud")
+            on_progress(f"{baud} baud")
             if port.setBaudRate(baud):
-                heard += _at(port, baud)
+                results += _at(port, baud)
     finally:
         port.setBaudRate(before)
-    return sorted(heard, key=lambda servo: (servo.servo_id, servo.baud))
+    return sorted(results, key=lambda servo: (servo.servo_id, servo.baud))
 
 
-def _at(port: BytePort, baud: int) -> list[Heard]:
+def _at(port: BytePort, baud: int) -> list[ScanResult]:
     names = model_numbers()
     return [
-        Heard(f.servo_id, names.get(f.model_number, f"number {f.model_number}"), f.firmware, baud)
+        ScanResult(
+            f.servo_id, names.get(f.model_number, f"number {f.model_number}"), f.firmware, baud
+        )
         for f in DynamixelBus(port).scan().values()
     ]

@@ -31,12 +31,16 @@ def _do(servos: Sequence[ServoReport] | Sequence[int], verb: str) -> str:
 
 
 def presence(
-    wanted: Sequence[int], found: Sequence[int], elsewhere: Mapping[int, int], baud: int, port: str
+    expected: Sequence[int],
+    found: Sequence[int],
+    elsewhere: Mapping[int, int],
+    baud: int,
+    port: str,
 ) -> list[Finding]:
     """Who answers, who does at another baud rate, who does not at all.
 
     Args:
-        wanted: IDs of the robot.
+        expected: IDs of the robot.
         found: those that answered at ``baud``.
         elsewhere: ID to the other baud rate at which it answered.
         baud: the robot's.
@@ -46,7 +50,7 @@ def presence(
     findings = []
     rates = sorted(set(elsewhere.values()))
     for rate in rates:
-        ids = [i for i in wanted if elsewhere.get(i) == rate]
+        ids = [i for i in expected if elsewhere.get(i) == rate]
         findings.append(
             Finding(
                 "baud rate",
@@ -57,22 +61,22 @@ def presence(
         )
     if not rates:
         findings.append(Finding("baud rate", "ok" if found else "warn", f"{baud} baud"))
-    missing = [i for i in wanted if i not in found and i not in elsewhere]
+    missing = [i for i in expected if i not in found and i not in elsewhere]
     if missing:
         remedy = (
             "is the servo power on? is the adapter's switch at TTL or RS-485 as the servos need?"
-            if len(missing) == len(wanted)
+            if len(missing) == len(expected)
             else f"look at the cable in front of {_ids(missing[:1])}; snakewalk scan --port {port}"
         )
         findings.append(Finding("servo IDs", "fail", f"no answer from {_ids(missing)}", remedy))
     else:
-        findings.append(Finding("servo IDs", "ok", f"{len(found)} of {len(wanted)} answer"))
+        findings.append(Finding("servo IDs", "ok", f"{len(found)} of {len(expected)} answer"))
     return findings
 
 
-def strangers(wanted: Sequence[int], heard: Sequence[int]) -> Finding | None:
+def unexpected_ids(expected: Sequence[int], answering: Sequence[int]) -> Finding | None:
     """Servos on the bus that the robot does not have; None if there are none."""
-    extra = [i for i in heard if i not in wanted]
+    extra = [i for i in answering if i not in expected]
     if not extra:
         return None
     return Finding(

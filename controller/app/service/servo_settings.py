@@ -3,7 +3,6 @@
 They live in the EEPROM, which is locked while torque is on; each is read back.
 """
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -28,8 +27,8 @@ _LIMITS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
-    """What shall be different; None stays."""
+class SettingsRequest:
+    """New values of a servo's settings; None leaves a setting as it is."""
 
     new_id: int | None = None
     new_baud: int | None = None
@@ -44,12 +43,23 @@ class Wish:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One register."""
+    """One register: its raw values now and then, and what the new one means."""
 
     register: str
     before: int
     after: int
     meaning: str
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsResult:
+    """What changed on a servo, or would change."""
+
+    servo: int
+    """The ID by which it was addressed."""
+    changes: tuple[Change, ...]
+    written: bool
+    """Whether the changes were written and read back."""
 
     def as_dict(self) -> dict[str, object]:
         """For JSON."""
@@ -71,20 +81,20 @@ def open_servo(port: BytePort, servo_id: int, latency_s: float) -> DynamixelBus:
     return DynamixelBus(port, model_of(found.model_number), latency_s=latency_s)
 
 
-def plan(bus: DynamixelBus, servo_id: int, wish: Wish) -> tuple[Change, ...]:
+def plan(bus: DynamixelBus, servo_id: int, request: SettingsRequest) -> tuple[Change, ...]:
     """Registers that would change, in the order of writing; reads only.
 
     Raises:
-        InputError: a wish that the servo or the bus cannot have, all of them at once.
+        InputError: values that the servo or the bus cannot have, all of them at once.
         BusError: the servo does not answer.
 
     """
     faults: list[str] = []
-    values = _raw(bus, wish, faults)
-    if wish.new_id is not None and wish.new_id != servo_id and 0 <= wish.new_id <= MAX_ID:
-        taken = bus.find([wish.new_id])
+    values = _raw(bus, request, faults)
+    if request.new_id is not None and request.new_id != servo_id and 0 <= request.new_id <= MAX_ID:
+        taken = bus.find([request.new_id])
         if taken:
-            faults.append(f"--new-id {wish.new_id}: there is a servo with this ID already")
+            faults.append(f"--new-id {request.new_id}: there is a servo with this ID already")
     if faults:
         raise InputError(faults)
     now = {name: bus.read(servo_id, name) for name in values}
@@ -122,27 +132,29 @@ def apply(bus: DynamixelBus, servo_id: int, changes: tuple[Change, ...]) -> None
             bus.write_verified(servo_id, change.register, change.after)
 
 
-def _raw(bus: DynamixelBus, wish: Wish, faults: list[str]) -> dict[str, tuple[int, str]]:
+def _raw(
+    bus: DynamixelBus, request: SettingsRequest, faults: list[str]
+) -> dict[str, tuple[int, str]]:
     """Register to value and what it means; limits first, then ID, then baud rate."""
     values: dict[str, tuple[int, str]] = {}
     for field, register in _LIMITS.items():
-        wanted = getattr(wish, field)
-        if wanted is None:
+        value = getattr(request, field)
+        if value is None:
             continue
         option = "--" + field.rsplit("_", 1)[0].replace("_", "-")
         try:
-            values[register] = (_limit(bus, register, float(wanted)), _said(field, wanted))
+            values[register] = (_limit(bus, register, float(value)), _with_unit(field, value))
             bus.table[register].encode(values[register][0])
         except (InputError, ValueError, OverflowError) as error:
-            faults.append(f"{option} {wanted:g}: {error}")
-    if wish.new_id is not None:
-        values["ID"] = (wish.new_id, f"answers to {wish.new_id}")
-        if not 0 <= wish.new_id <= MAX_ID:
-            faults.append(f"--new-id {wish.new_id}: a bus has IDs 0 to {MAX_ID}")
-    if wish.new_baud is not None:
+            faults.append(f"{option} {value:g}: {error}")
+    if request.new_id is not None:
+        values["ID"] = (request.new_id, f"answers to {request.new_id}")
+        if not 0 <= request.new_id <= MAX_ID:
+            faults.append(f"--new-id {request.new_id}: a bus has IDs 0 to {MAX_ID}")
+    if request.new_baud is not None:
         try:
-            code = baud_code(bus.table.model, wish.new_baud)
-            values["Baud Rate"] = (code, f"{wish.new_baud} bit/s")
+            code = baud_code(bus.table.model, request.new_baud)
+            values["Baud Rate"] = (code, f"{request.new_baud} bit/s")
         except InputError as error:
             faults.append(f"--new-baud {error}")
     return values
@@ -165,15 +177,6 @@ def _limit(bus: DynamixelBus, register: str, value: float) -> int:
     return round(value / 2.0) if register == "Return Delay Time" else round(value)
 
 
-def _said(field: str, value: float) -> str:
+def _with_unit(field: str, value: float) -> str:
     unit = {"rad": "rad", "a": "A", "c": "C", "v": "V", "us": "us"}[field.rsplit("_", 1)[1]]
     return f"{value:g} {unit}"
-
-
-def as_dict(servo_id: int, changes: tuple[Change, ...], written: bool) -> Mapping[str, object]:
-    """What the command prints."""
-    return {
-        "servo": servo_id,
-        "changes": [change.as_dict() for change in changes],
-        "written": written,
-    }

@@ -8,7 +8,7 @@ from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.app.service import adapter
 from snakewalk.controller.app.service.doctor import examine
 from snakewalk.controller.app.service.finding import Finding, worst
-from snakewalk.controller.app.service.scan import Heard, pick_port, scan
+from snakewalk.controller.app.service.scan import ScanResult, pick_port, scan
 from snakewalk.drivers.bus.budget import chain_budget, wire_budget
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.protocol.packet import Instruction
@@ -168,15 +168,15 @@ def test_permission(tmp_path: object, mocker: MockerFixture) -> None:
 
 def test_scan_goes_through_the_baud_rates_and_leaves_the_port_as_it_was(line: Recorder) -> None:
     line.bank["Baud Rate"][:] = [1, 3, 6, 3]
-    told: list[str] = []
-    assert scan(line, tell=told.append) == [
-        Heard(1, "XM430-W350", 48, 57_600),
-        Heard(2, "XM430-W350", 48, 1_000_000),
-        Heard(3, "XM430-W350", 48, 4_000_000),
-        Heard(4, "XM430-W350", 48, 1_000_000),
+    steps: list[str] = []
+    assert scan(line, on_progress=steps.append) == [
+        ScanResult(1, "XM430-W350", 48, 57_600),
+        ScanResult(2, "XM430-W350", 48, 1_000_000),
+        ScanResult(3, "XM430-W350", 48, 4_000_000),
+        ScanResult(4, "XM430-W350", 48, 1_000_000),
     ]
-    assert told[:2] == ["57600 baud", "1000000 baud"]
-    assert len(told) == 8
+    assert steps[:2] == ["57600 baud", "1000000 baud"]
+    assert len(steps) == 8
     assert line.getBaudRate() == 1_000_000
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.service.servo_settings import Wish, apply, open_servo, plan
+from snakewalk.controller.app.service.servo_settings import SettingsRequest, apply, open_servo, plan
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.errors import ControlTableError, NoAnswerError, ServoError
 from snakewalk.drivers.protocol.registers import BAUDS, baud_code, bauds_of
@@ -34,12 +34,14 @@ def test_ids_out_of_range(line: SimLine, bus: DynamixelBus, servo_id: int) -> No
     with pytest.raises(InputError, match=f"--id {servo_id}: a bus has IDs 0 to 252"):
         open_servo(line, servo_id, 0.004)
     with pytest.raises(InputError, match=f"--new-id {servo_id}: a bus has IDs 0 to 252"):
-        plan(bus, 1, Wish(new_id=servo_id))
+        plan(bus, 1, SettingsRequest(new_id=servo_id))
 
 
 def test_planning_writes_nothing(line: SimLine, bus: DynamixelBus) -> None:
     before = line.bank.table.copy()
-    changes = plan(bus, 1, Wish(new_id=9, new_baud=57_600, return_delay_us=0.0, voltage_max_v=14.0))
+    changes = plan(
+        bus, 1, SettingsRequest(new_id=9, new_baud=57_600, return_delay_us=0.0, voltage_max_v=14.0)
+    )
     assert [(c.register, c.before, c.after) for c in changes] == [
         ("Max Voltage Limit", 160, 140),
         ("Return Delay Time", 250, 0),
@@ -50,13 +52,13 @@ def test_planning_writes_nothing(line: SimLine, bus: DynamixelBus) -> None:
 
 
 def test_what_is_so_already_is_no_change(bus: DynamixelBus) -> None:
-    assert plan(bus, 1, Wish(new_id=1, new_baud=1_000_000, return_delay_us=500.0)) == ()
+    assert plan(bus, 1, SettingsRequest(new_id=1, new_baud=1_000_000, return_delay_us=500.0)) == ()
 
 
 def test_all_is_written_and_the_servo_answers_under_its_new_id_and_baud(
     line: SimLine, bus: DynamixelBus
 ) -> None:
-    wish = Wish(
+    request = SettingsRequest(
         new_id=9,
         new_baud=4_000_000,
         min_position_rad=-1.5,
@@ -64,7 +66,7 @@ def test_all_is_written_and_the_servo_answers_under_its_new_id_and_baud(
         current_limit_a=2.0,
         temperature_limit_c=75,
     )
-    apply(bus, 1, plan(bus, 1, wish))
+    apply(bus, 1, plan(bus, 1, request))
     bank = line.bank
     assert line.getBaudRate() == 4_000_000
     assert bus.ping(9).model_number == 1020
@@ -76,7 +78,7 @@ def test_all_is_written_and_the_servo_answers_under_its_new_id_and_baud(
 
 def test_torque_that_is_on_goes_off_first_and_is_shown(line: SimLine, bus: DynamixelBus) -> None:
     bus.write(1, "Torque Enable", 1)
-    changes = plan(bus, 1, Wish(new_id=3))
+    changes = plan(bus, 1, SettingsRequest(new_id=3))
     assert [c.register for c in changes] == ["Torque Enable", "ID"]
     apply(bus, 1, changes)
     assert line.bank["ID"].tolist() == [3, 2]
@@ -84,9 +86,9 @@ def test_torque_that_is_on_goes_off_first_and_is_shown(line: SimLine, bus: Dynam
 
 
 def test_all_wrong_wishes_at_once(bus: DynamixelBus) -> None:
-    wish = Wish(new_id=2, new_baud=9999, min_position_rad=4.0, voltage_min_v=-1.0)
+    request = SettingsRequest(new_id=2, new_baud=9999, min_position_rad=4.0, voltage_min_v=-1.0)
     with pytest.raises(InputError) as info:
-        plan(bus, 1, wish)
+        plan(bus, 1, request)
     lines = "\n".join(info.value.faults)
     assert "--new-id 2: there is a servo with this ID already" in lines
     assert "--new-baud 9999 baud: a XM430-W350 has 9600, 57600" in lines
@@ -98,17 +100,17 @@ def test_all_wrong_wishes_at_once(bus: DynamixelBus) -> None:
 def test_values_that_no_register_holds(bus: DynamixelBus, value: float) -> None:
     for field in ("temperature_limit_c", "max_position_rad", "return_delay_us", "current_limit_a"):
         with pytest.raises(InputError):
-            plan(bus, 1, Wish(**{field: value}))
+            plan(bus, 1, SettingsRequest(**{field: value}))
 
 
 def test_position_limits_the_wrong_way_round(bus: DynamixelBus) -> None:
     with pytest.raises(InputError, match="the lower is not below the upper"):
-        plan(bus, 1, Wish(min_position_rad=1.0, max_position_rad=-1.0))
+        plan(bus, 1, SettingsRequest(min_position_rad=1.0, max_position_rad=-1.0))
 
 
 def test_what_the_servo_refuses_is_said(bus: DynamixelBus) -> None:
     with pytest.raises(ServoError, match="Temperature Limit: refused: data range"):
-        apply(bus, 1, plan(bus, 1, Wish(temperature_limit_c=140)))
+        apply(bus, 1, plan(bus, 1, SettingsRequest(temperature_limit_c=140)))
 
 
 @pytest.mark.parametrize(

@@ -77,15 +77,15 @@ def _show(facts: dict[str, Any]) -> None:
     assumed = " (assumed; say --rate)" if facts["rate_assumed"] else ""
     length = "no scale" if facts["length_m"] is None else f"{1e3 * facts['length_m']:.4g} mm long"
     low, high = facts["pulse_quartiles_body_lengths_s"]
-    way = "towards the tail" if facts["wave_towards_tail"] else "towards the head"
+    direction = "towards the tail" if facts["wave_towards_tail"] else "towards the head"
     travel, sliding = facts["travel"], facts["sliding_weight"]
     rows = {
         "frames": f"{facts['frames']}, {facts['frames_left_out']} left out, "
         f"{facts['rate_hz']:g} Hz{assumed}, {length}",
         "frequency": f"{facts['frequency_hz']} Hz",
         "wave": f"{facts['waves_on_body']} on the body: {facts['wavelength_body_lengths']} body "
-        f"lengths, {facts['wave_number_rad_per_body_length']} rad a body length, {way}; it is "
-        f"{facts['wave_share']:.0%} of the bending",
+        f"lengths, {facts['wave_number_rad_per_body_length']} rad a body length, {direction}; "
+        f"it is {facts['wave_share']:.0%} of the bending",
         "pulse speed": f"{facts['pulse_body_lengths_s']} body lengths/s (half of it {low} to "
         f"{high}), {facts['pulse_points_per_frame']} points a frame; known at "
         f"{facts['pulse_measured_share']:.0%} of body and time",

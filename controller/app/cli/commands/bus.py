@@ -1,4 +1,4 @@
-"""``snakewalk bus serve`` and ``bus sniff``: simulated servos for any client; bytes in words."""
+"""``snakewalk bus``: ``serve`` simulated servos, ``sniff`` bytes, ``set`` a servo's settings."""
 
 import json
 import signal
@@ -8,21 +8,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.table import Table
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.options import Json
+from snakewalk.controller.app.cli.options import Json, Port, console
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.console import Group
 
+    from snakewalk.controller.app.service.servo_settings import Change
     from snakewalk.sim.line.sim_line import SimLine
     from snakewalk.sim.line.wire import Wire
     from snakewalk.sim.serve.chain_spec import ChainSpec
     from snakewalk.sim.serve.live_table import LiveTable
     from snakewalk.sim.serve.pty import PtyServer
 
-LOOK_S = 0.25
-"""How often the live table is drawn."""
+REFRESH_S = 0.25
+"""Time between two drawings of the live table."""
 STEP_S = 0.02
 WIDTH = 120
 """Characters of a packet that the live view shows."""
@@ -177,41 +181,43 @@ def _announce(server: "PtyServer", what: "ChainSpec", line: "Wire", as_json: boo
         print(f"{what.model}: {ids} at {line.getBaudRate()} baud; ^C ends", flush=True)
 
 
-def _run(server: "PtyServer", traffic: "LiveTable", stopped: "Stop", as_json: bool) -> None:
+def _run(
+    server: "PtyServer", traffic: "LiveTable", stopped: "Callable[[], bool]", as_json: bool
+) -> None:
     """Serve; draw the table on a terminal, nothing elsewhere."""
     from rich.console import Console  # noqa: PLC0415
     from rich.live import Live  # noqa: PLC0415
 
-    console = Console(stderr=True)
-    if as_json or not console.is_terminal:
+    screen = Console(stderr=True)
+    if as_json or not screen.is_terminal:
         server.serve(stopped)
         return
-    seen = _Seen(server.path, [], "")
+    seen = _Shown(server.path, [], "")
 
     def view() -> "Group":
         return _view(seen)
 
     # Drawing takes longer than a servo may take to answer: it has a thread of its own, which sees
     # only what the serving one has copied for it.
-    with Live(console=console, get_renderable=view, refresh_per_second=1.0 / LOOK_S):
-        look = 0.0
+    with Live(console=screen, get_renderable=view, refresh_per_second=1.0 / REFRESH_S):
+        since_s = 0.0
         while not stopped():
             server.step(STEP_S)
-            look += STEP_S
-            if look >= LOOK_S:
-                look = 0.0
+            since_s += STEP_S
+            if since_s >= REFRESH_S:
+                since_s = 0.0
                 counts = (
                     f"{server.path or 'port gone'}   {traffic.questions} questions, "
                     f"{traffic.answers} answers, {traffic.bytes} bytes"
                 )
-                if server.missed_s >= LOOK_S:
+                if server.missed_s >= REFRESH_S:
                     counts += f"; {server.missed_s:.1f} s left out, this machine is too slow"
                 recent = "\n".join(line.text()[:WIDTH] for line in traffic.recent)
-                seen = _Seen(counts, traffic.registers(), recent)
+                seen = _Shown(counts, traffic.registers(), recent)
 
 
 @dataclass(frozen=True, slots=True)
-class _Seen:
+class _Shown:
     """What the live view shows."""
 
     counts: str
@@ -219,9 +225,8 @@ class _Seen:
     recent: str
 
 
-def _view(seen: _Seen) -> "Group":
+def _view(seen: _Shown) -> "Group":
     from rich.console import Group  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
     table = Table(*(seen.rows[0] if seen.rows else ()), box=None, header_style="bold")
@@ -231,7 +236,76 @@ def _view(seen: _Seen) -> "Group":
     return Group(Text(seen.counts, style="bold"), table, Text(seen.recent, style="dim"))
 
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+def bus_set(
+    servo_id: Annotated[int, typer.Option("--id", help="the servo, 0 to 252")],
+    port: Port = None,
+    baud: Annotated[int, typer.Option(help="at which it answers now")] = 1_000_000,
+    new_id: Annotated[int | None, typer.Option(help="0 to 252")] = None,
+    new_baud: Annotated[int | None, typer.Option(help="bit/s")] = None,
+    min_position: Annotated[float | None, typer.Option(help="rad, 0 is straight")] = None,
+    max_position: Annotated[float | None, typer.Option(help="rad, 0 is straight")] = None,
+    current_limit: Annotated[float | None, typer.Option(help="A")] = None,
+    temperature_limit: Annotated[float | None, typer.Option(help="C")] = None,
+    voltage_min: Annotated[float | None, typer.Option(help="V")] = None,
+    voltage_max: Annotated[float | None, typer.Option(help="V")] = None,
+    return_delay: Annotated[float | None, typer.Option(help="us")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="show the changes, no more")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="write without asking")] = False,
+    as_json: Json = False,
+) -> None:
+    """Change settings of one servo that outlive its power; shows them and asks first."""
+    from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.app.service.servo_settings import (  # noqa: PLC0415
+        SettingsRequest,
+        SettingsResult,
+        apply,
+        open_servo,
+        plan,
+    )
+    from snakewalk.drivers.errors import ControlTableError  # noqa: PLC0415
+    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.protocol.registers import BAUDS  # noqa: PLC0415
 
-    Stop = Callable[[], bool]
+    if baud not in BAUDS:
+        raise ControlTableError(f"--baud {baud}: servos have {', '.join(map(str, BAUDS))}")
+    request = SettingsRequest(
+        new_id=new_id,
+        new_baud=new_baud,
+        min_position_rad=min_position,
+        max_position_rad=max_position,
+        current_limit_a=current_limit,
+        temperature_limit_c=temperature_limit,
+        voltage_min_v=voltage_min,
+        voltage_max_v=voltage_max,
+        return_delay_us=return_delay,
+    )
+    with SerialPort(pick_port(port), baud) as line:
+        bus = open_servo(line, servo_id, line.latency_s)
+        changes = plan(bus, servo_id, request)
+        if not as_json:
+            _show(servo_id, bus.table.model, changes)
+        written = bool(changes) and not dry_run and (yes or _confirmed(as_json))
+        if written:
+            apply(bus, servo_id, changes)
+    if as_json:
+        print(json.dumps(SettingsResult(servo_id, changes, written).as_dict()))
+    elif changes:
+        console.print("written and read back" if written else "nothing written")
+
+
+def _show(servo_id: int, model: str, changes: "tuple[Change, ...]") -> None:
+    if not changes:
+        console.print(f"servo {servo_id} ({model}): nothing to change")
+        return
+    table = Table(f"servo {servo_id} ({model})", "now", "then", "", box=None)
+    for change in changes:
+        table.add_row(change.register, str(change.before), str(change.after), change.meaning)
+    console.print(table)
+
+
+def _confirmed(as_json: bool) -> bool:
+    """Ask a person, if there is one."""
+    if as_json or not sys.stdin.isatty():
+        print("snakewalk: nothing written; say --yes to write without asking", file=sys.stderr)
+        return False
+    return typer.confirm("write this?", default=False)

@@ -42,7 +42,7 @@ def doctor(
                 job.cycle_hz,
                 latency_s=line.latency_s,
                 latency_timer_ms=line.latency_timer_ms,
-                tell=lambda step: status.update(f"{device}: {step}"),
+                on_progress=lambda step: status.update(f"{device}: {step}"),
             )
     grade = worst(findings)
     if as_json:

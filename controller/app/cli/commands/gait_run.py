@@ -83,7 +83,7 @@ def run_gait(
         on_progress = _in_real_time(bar.on_progress) if paced else bar.on_progress
         finished = execute(prepared, folder, port, on_progress=on_progress, on_event=bar.on_event)
     artifacts = write_artifacts(finished.record, folder, film=film)
-    found: dict[str, object] = {
+    result: dict[str, object] = {
         "gait": prepared.config.name,
         "robot": prepared.robot.name,
         "world": prepared.world.name,
@@ -92,26 +92,26 @@ def run_gait(
         "slowed_to": round(finished.outcome.least_rate, 3),
     }
     if prepared.config.then:
-        found["then"] = [f"{change.name}@{change.at_s:g}" for change in prepared.config.then]
+        result["then"] = [f"{change.name}@{change.at_s:g}" for change in prepared.config.then]
     if prepared.make_operator is None and not prepared.config.then and by == "blend":
-        way = gait_displacement(finished.record)
-        found |= {
-            "frequency_hz": round(way.frequency_hz, 3),
-            "cycles": way.cycles,
-            "forward_body_lengths_cycle": _digits(way.forward_bl),
-            "left_body_lengths_cycle": _digits(way.left_bl),
-            "up_body_lengths_cycle": _digits(way.up_bl),
-            "turn_rad_cycle": _digits(way.turn_rad),
-            "speed_m_s": _digits(way.speed_m_s),
+        displacement = gait_displacement(finished.record)
+        result |= {
+            "frequency_hz": round(displacement.frequency_hz, 3),
+            "cycles": displacement.cycles,
+            "forward_body_lengths_cycle": _digits(displacement.forward_bl),
+            "left_body_lengths_cycle": _digits(displacement.left_bl),
+            "up_body_lengths_cycle": _digits(displacement.up_bl),
+            "turn_rad_cycle": _digits(displacement.turn_rad),
+            "speed_m_s": _digits(displacement.speed_m_s),
         }
-    found |= {
+    result |= {
         "peak_current_a": finished.summary.peak_current_a,
         "peak_temperature_c": finished.summary.peak_temperature_c,
         "log": str(finished.log),
         "summary": str(folder / "summary.json"),
         **artifacts.to_dict(),
     }
-    show(found, as_json)
+    show(result, as_json)
     if finished.outcome.tripped is not None:
         raise SystemExit(1)
 

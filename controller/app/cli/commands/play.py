@@ -42,7 +42,7 @@ def play(
             prepared, folder, port, on_progress=bar.on_progress, on_event=bar.on_event
         )
     artifacts = write_artifacts(finished.record, folder, film=film)
-    found: dict[str, object] = {
+    result: dict[str, object] = {
         "recording": track,
         "robot": prepared.robot.name,
         "world": prepared.world.name,
@@ -54,7 +54,7 @@ def play(
         "summary": str(folder / "summary.json"),
         **artifacts.to_dict(),
     }
-    show(found, as_json)
+    show(result, as_json)
     if finished.outcome.tripped is not None:
         raise SystemExit(1)
 

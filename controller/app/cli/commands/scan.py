@@ -32,15 +32,15 @@ def scan(
         SerialPort(device, baud[0] if baud else 1_000_000) as line,
         Console(stderr=True).status("") as status,
     ):
-        heard = scanning.scan(line, baud or (), lambda step: status.update(f"{device}: {step}"))
+        results = scanning.scan(line, baud or (), lambda step: status.update(f"{device}: {step}"))
     if as_json:
-        print(json.dumps({"port": device, "servos": [servo.as_dict() for servo in heard]}))
-    elif heard:
+        print(json.dumps({"port": device, "servos": [servo.as_dict() for servo in results]}))
+    elif results:
         table = Table("ID", "model", "firmware", "baud", box=None)
-        for servo in heard:
+        for servo in results:
             table.add_row(str(servo.servo_id), servo.model, str(servo.firmware), str(servo.baud))
         console.print(table)
     else:
         console.print(f"{device}: nobody answers at any baud rate: power? cable? adapter's switch?")
-    if not heard:
+    if not results:
         raise SystemExit(1)

@@ -40,7 +40,7 @@ def tune(
     require_extra("tuning needs", "mujoco")
     body = robot or ("alternating16" if make_gait(gait).needs.pitch else "yaw16")
     with ProgressBar(f"{gait} for {aim}", budget) as bar:
-        found = search.tune(
+        result = search.tune(
             gait,
             body,
             aim,
@@ -56,20 +56,20 @@ def tune(
         "gait": gait,
         "robot": body,
         "for": aim,
-        "runs": found.tried,
-        "default": [round(value, 4) for value in found.default],
-        "tuned": [round(value, 4) for value in found.best],
-        "better_by": f"{found.margin:.0%}",
-        "better_on": f"{found.wins} of {seeds} grounds",
-        "parameters": found.parameters,
+        "runs": result.tried,
+        "default": [round(value, 4) for value in result.default],
+        "tuned": [round(value, 4) for value in result.best],
+        "better_by": f"{result.margin:.0%}",
+        "better_on": f"{result.wins} of {seeds} grounds",
+        "parameters": result.parameters,
     }
     if out is not None:
         lines = [
-            f"# tuned for {aim}: {found.margin:+.0%} on {seeds} grounds",
+            f"# tuned for {aim}: {result.margin:+.0%} on {seeds} grounds",
             f'name = "{out.stem}"',
         ]
         lines += [f'gait = "{gait}"', f'robot = "{body}"', "", "[parameters]"]
-        lines += [f"{key} = {json.dumps(value)}" for key, value in found.parameters.items()]
+        lines += [f"{key} = {json.dumps(value)}" for key, value in result.parameters.items()]
         with atomic_write(out) as part:
             part.write_text("\n".join(lines) + "\n")
         facts["set"] = str(out)

@@ -47,22 +47,22 @@ def walk(
     for name in rules:
         check_rule(name)
     cases = [(spec, name) for spec in dict.fromkeys(graphs) for name in dict.fromkeys(rules)]
-    found = [
+    results = [
         run_study(spec, name, repeats, seed)
         for spec, name in show_progress(cases, "walks", len(cases))
     ]
     if picture is not None:
         from snakewalk.controller.app.report.plots.walk import draw  # noqa: PLC0415
 
-        draw(found, picture)
+        draw(results, picture)
     if as_json:
-        print(json.dumps([result.to_dict() for result in found]))
+        print(json.dumps([result.to_dict() for result in results]))
         return
-    console.print(_table(found))
+    console.print(_table(results))
 
 
-def _table(found: "list[StudyResult]") -> Table:
-    title = f"Steps until all states are seen, over |V|; {found[0].repeats} graphs of each kind"
+def _table(results: "list[StudyResult]") -> Table:
+    title = f"Steps until all states are seen, over |V|; {results[0].repeats} graphs of each kind"
     table = Table(
         title=title, title_justify="left", box=None, collapse_padding=True, pad_edge=False
     )
@@ -73,7 +73,7 @@ def _table(found: "list[StudyResult]") -> Table:
     for name in ("mean", "worst", "seen\nat |V|", "back in\n< |V|/20", "of all\nsteps"):
         table.add_column(name, justify="right")
     last = ""
-    for result in found:
+    for result in results:
         row = result.to_dict()
         first = result.graph != last
         if first and last:

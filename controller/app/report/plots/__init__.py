@@ -1,1 +1,1 @@
-"""Pictures that commands draw, one file a command."""
+"""Pictures of the commands that take ``--picture``, and of capture: one module a subject."""
