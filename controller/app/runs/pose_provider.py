@@ -158,6 +158,7 @@ def pose_provider(
         robot, prepared.world.friction, run.start_m, prepared.start_heading_rad
     )
     provider = PoseProvider(reckoning)
+    comparison: PoseComparison | None = None
     with ExitStack() as stack:
         if run.pose == "camera":
             from snakewalk.controller.localization.camera_pose import CameraPose  # noqa: PLC0415  OpenCV is an extra
@@ -168,8 +169,9 @@ def pose_provider(
             )
         if true is not None:
             provider.measure = comparison = PoseComparison(prepared, provider.measure, true)
-            stack.callback(lambda: setattr(provider, "error", comparison.error()))
         yield provider
+        if comparison is not None:
+            provider.error = comparison.error()
     facts = provider.facts()
     if facts:
         on_event("pose", ", ".join(f"{key} {value}" for key, value in facts.items()))

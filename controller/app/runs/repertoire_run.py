@@ -176,7 +176,7 @@ def initial_frame(run: RunConfig, robot: RobotConfig, pose: InitialPose) -> Fram
 
 @dataclass(frozen=True, slots=True)
 class RouteRun:
-    """A run of a plan, and what its follower saw."""
+    """A run of a plan, and what its follower predicted and measured."""
 
     job: RepertoireRun
     finished: Finished
@@ -190,7 +190,7 @@ class RouteRun:
     def facts(self) -> dict[str, object]:
         """Numbers for a command's answer."""
         job, outcome, follower = self.job, self.finished.outcome, self.follower
-        found: dict[str, object] = {
+        facts: dict[str, object] = {
             "waypoints": len(job.run.waypoints_m),
             "waypoints_reached": outcome.reached,
             "replanned": job.replan,
@@ -202,17 +202,17 @@ class RouteRun:
         }
         cycle, route = follower.errors(), follower.route_errors()
         if len(cycle):
-            found |= {
+            facts |= {
                 "cycle_error_median_m": round(float(np.median(cycle[:, 0])), 4),
                 "cycle_error_median_rad": round(float(np.median(cycle[:, 1])), 4),
             }
         if len(route) and not job.replan:
-            found |= {
+            facts |= {
                 "open_loop_error_max_m": round(float(route[:, 0].max()), 4),
                 "open_loop_error_end_m": round(float(route[-1, 0]), 4),
                 "open_loop_error_end_rad": round(float(route[-1, 1]), 4),
             }
-        return found
+        return facts
 
 
 def default_folder(job: RepertoireRun) -> Path:
