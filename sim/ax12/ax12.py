@@ -56,7 +56,7 @@ class Ax12Servos:
         """Events that happen to the servos at a time of their own, such as faults."""
         self.powered = np.ones(servos, bool)
         """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
-        self._path = Trajectory(servos)
+        self._trajectory = Trajectory(servos)
         self._turn_rad = np.zeros(servos)
         self._registered: dict[int, tuple[int, bytes]] = {}
         self._time_s = plant.time_s
@@ -185,7 +185,7 @@ class Ax12Servos:
         self["Present Voltage"][:] = np.clip(np.rint(self.drive.supply_v * 10.0), 0, 255)
         celsius = np.rint(self.protection.temperature_c)
         self["Present Temperature"][:] = np.clip(celsius, 0, 255)
-        self["Moving"][:] = self._path.ongoing & self._on() & ~self._wheel()
+        self["Moving"][:] = self._trajectory.ongoing & self._on() & ~self._wheel()
 
     def _on(self) -> Bools:
         return np.asarray((self["Torque Enable"] == 1) & self.powered)
@@ -203,15 +203,15 @@ class Ax12Servos:
         drive, wheel = self.drive, self._wheel()
         on, speed = self._on(), self["Moving Speed"].astype(int)
         shaft = self.plant.position_rad
-        self._path.place(~on | wheel, shaft)
+        self._trajectory.restart(~on | wheel, shaft)
         self._update_turns()
         goal = (self["Goal Position"].astype(float) - CENTRE_TICKS) / TICKS_PER_RAD
         goal += self._turn_rad
         units = (speed & 1023).astype(np.float64) * (SPEED_UNIT_RAD_S / VELOCITY_UNIT_RAD_S)
-        still = np.where(on & ~wheel, goal, self._path.goal).astype(np.float64)
-        self._path.aim(still, units, np.zeros(len(self)), np.zeros(len(self), bool))
-        self._path.advance(seconds)
-        error = self._path.position - shaft
+        still = np.where(on & ~wheel, goal, self._trajectory.goal).astype(np.float64)
+        self._trajectory.set_goals(still, units, np.zeros(len(self)), np.zeros(len(self), bool))
+        self._trajectory.advance(seconds)
+        error = self._trajectory.position - shaft
         right = error < 0.0
         margin = np.where(right, self["CW Compliance Margin"], self["CCW Compliance Margin"])
         slope = np.where(right, self["CW Compliance Slope"], self["CCW Compliance Slope"])
@@ -220,7 +220,9 @@ class Ax12Servos:
         gain = np.where(wheel | inside, FAINT, TICKS_PER_RAD / slope)
         drive.torque_on[:] = on
         drive.p_gain_per_rad[:] = gain
-        aim = np.where(inside, shaft, self._path.position - np.sign(error) * margin / TICKS_PER_RAD)
+        aim = np.where(
+            inside, shaft, self._trajectory.position - np.sign(error) * margin / TICKS_PER_RAD
+        )
         drive.goal_rad[:] = np.where(wheel, push / FAINT, aim)
         drive.pwm_limit[:] = np.minimum(self["Torque Limit"], self["Max Torque"]) / 1023.0
         drive.current_limit_a[:] = np.inf

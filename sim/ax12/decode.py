@@ -1,8 +1,8 @@
-"""An exchange of Protocol 1.0 in words, packet by packet, with the registers of an AX-12A.
+"""Decoder of Protocol 1.0 into words, packet by packet, with the registers of an AX-12A.
 
-A status packet looks like an instruction packet. What comes from the servo that was asked last, as
-long as its answer has to be, is taken for the answer; a servo that is told to keep silent and asked
-again at once cannot be told from one that answers.
+A status packet looks like an instruction packet. A packet with the ID of the last instruction, and
+of the length that its reply must have, is taken for the reply; so an instruction that gets no reply
+and is repeated at once looks like one with a reply.
 """
 
 from collections.abc import Iterator
@@ -12,9 +12,9 @@ from snakewalk.sim.ax12.table import CELLS
 from snakewalk.sim.sniff.decode import DecodedPacket
 
 GAP_S = 5e-3
-"""After such a silence what has begun will not go on, as servos take it."""
-PATIENCE_S = 0.1
-"""No answer comes later than that."""
+"""After such a silence servos give up a partial packet."""
+REPLY_MAX_S = 0.1
+"""No reply comes later than that."""
 
 
 class Decoder1:
@@ -41,7 +41,7 @@ class Decoder1:
 
     def _answers(self, packet: Packet1, time_s: float) -> bool:
         asked = self._asked
-        if asked is None or time_s > self._asked_s + PATIENCE_S:
+        if asked is None or time_s > self._asked_s + REPLY_MAX_S:
             return False
         if asked.servo_id == BROADCAST_ID:
             pinged = asked.instruction == Instruction1.PING and packet.servo_id != BROADCAST_ID

@@ -59,7 +59,7 @@ class Instructions:
     def _action(self, row: int, params: bytes) -> int:
         if params:
             return ResultError.DATA_LENGTH
-        kept = self.bank.registered(row)
+        kept = self.bank.take_registered(row)
         return self.write(row, *kept) if kept is not None else ResultError.INSTRUCTION
 
     def _reboot(self, row: int, params: bytes) -> int:

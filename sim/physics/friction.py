@@ -13,7 +13,7 @@ from snakewalk.config.arrays import Floats
 STOP_SHARE = 1.8
 """Share of a contact's momentum that friction may take in one step; the explicit step is stable
 below 2."""
-MOST_SHARE = 1.4
+BENT_STOP_SHARE = 1.4
 """The same of a link's, where it cannot roll: less is safer, more tells no difference any more."""
 
 
@@ -37,7 +37,7 @@ def stop_drag(centre_m: Floats, mass_kg: float, radius_m: float, step_s: float) 
     off_axis = 0.5 * (xx + yy) - math.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
     square = radius_m * radius_m
     lightness = 1.0 + square / (0.5 * square + max(off_axis, 0.0))
-    return min(STOP_SHARE / lightness, MOST_SHARE) * mass_kg / step_s
+    return min(STOP_SHARE / lightness, BENT_STOP_SHARE) * mass_kg / step_s
 
 
 def ellipse_force(

@@ -37,7 +37,7 @@ class Mechanics:
     water: Floats
     """(6,) ``sim.physics.water.water_constants``."""
     totals: Floats = field(default_factory=lambda: np.zeros(2))
-    """Energy lost to ground friction and water, J; way slipped across the links, their mean, m."""
+    """Energy lost to ground friction and water, J; mean distance slipped across the links, m."""
 
     @classmethod
     def of(
@@ -67,12 +67,12 @@ class Mechanics:
         return float(self.model.opt.timestep)
 
     def start_at_rest(self) -> None:
-        """Take note of a state that was set, not stepped to; ``mj_forward`` was just called."""
+        """Set up the memory for a state that was set, not stepped to, after ``mj_forward``."""
         self.before_m[:] = self.data.xipos[1:] - self.step_s * velocities(self.data)[0]
         self.measure_loads()
 
     def measure_loads(self) -> None:
-        """Read ``load_n`` off the contact forces in the data."""
+        """Set ``load_n`` from the contact forces in the data."""
         d = self.data
         row = np.asarray(d.contact.efc_address)
         body = self.model.geom_bodyid[d.contact.geom[:, 1]]

@@ -17,14 +17,14 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import PipeObstacle, PoleObstacle, WorldConfig
 from snakewalk.sim.physics.mechanics import Mechanics
 
-STAVES = 24
+STAVE_COUNT = 24
 """Of which a pipe is made: its wall is flat by less than 1 % of its radius."""
 STAVE_M = 0.02
 CLEAR_M = 0.2
 """Between the floor and what lies level, on the outside."""
 TAIL_UP_M = 0.01
 """Of the lowest link above the floor at the start."""
-WINDS_RAD = 2.0
+COIL_MIN_RAD = 2.0
 """A body that goes less far round its own axis is no coil."""
 
 
@@ -41,12 +41,12 @@ def obstacle_mjcf(world: WorldConfig) -> tuple[str, str]:
         kind, colour = "cylinder", "0.55 0.42 0.30 1"
     else:
         kind, colour = "box", "0.55 0.68 0.78 0.22"
-        half = (thing.radius_m + STAVE_M) * math.tan(math.pi / STAVES)
+        half = (thing.radius_m + STAVE_M) * math.tan(math.pi / STAVE_COUNT)
         out = thing.radius_m + STAVE_M / 2
         size = f"{STAVE_M / 2!r} {half!r} {thing.length_m / 2!r}"
         staves = [
             (out * np.array([math.cos(a), math.sin(a), 0.0]), a, size)
-            for a in 2.0 * math.pi * np.arange(STAVES) / STAVES
+            for a in 2.0 * math.pi * np.arange(STAVE_COUNT) / STAVE_COUNT
         ]
     text = ""
     for k, (place, angle, size) in enumerate(staves):
@@ -70,7 +70,7 @@ def _middle_m(thing: PoleObstacle | PipeObstacle) -> Floats:
 def place_at_obstacle(
     m: Mechanics, robot: RobotConfig, world: WorldConfig, heading_rad: float, joint_rad: ArrayLike
 ) -> bool:
-    """Put a coiled body round the world's pole, or any body into its pipe; head up, at rest.
+    """Place a coiled body round the world's pole, or any body in its pipe, head up, at rest.
 
     The coil is opened, or drawn together, until it just touches: the servos close it. Returns
     False, and does nothing, where there is no obstacle, or a pole and no coil.
@@ -85,7 +85,7 @@ def place_at_obstacle(
     if q.shape != (m.joint_count,):
         raise ValueError(f"joint_rad has shape {q.shape}; the robot has {m.joint_count} joints")
     coil = fit_coil(_links_m(m, q))
-    winds = coil.wound_rad >= WINDS_RAD
+    winds = coil.wound_rad >= COIL_MIN_RAD
     if isinstance(thing, PoleObstacle) and not winds:
         return False
     if winds:
@@ -118,13 +118,13 @@ def _links_m(m: Mechanics, joint_rad: Floats) -> Floats:
 def _touching(
     m: Mechanics, robot: RobotConfig, thing: PoleObstacle | PipeObstacle, q: Floats
 ) -> Floats:
-    """Scale the bends of a coil so that it clears the obstacle by no more than a hair."""
+    """Scale the bends of a coil until it just clears the obstacle."""
     pole = isinstance(thing, PoleObstacle)
-    wanted = thing.radius_m + (1.0 if pole else -1.0) * robot.body_radius_m
+    limit_m = thing.radius_m + (1.0 if pole else -1.0) * robot.body_radius_m
 
     def clears(scale: float) -> bool:
         radius = fit_coil(_links_m(m, scale * q)).radius_m
-        return bool(radius.min() >= wanted if pole else radius.max() <= wanted)
+        return bool(radius.min() >= limit_m if pole else radius.max() <= limit_m)
 
     if clears(1.0):
         return q

@@ -1,4 +1,4 @@
-"""Putting a body down so that it lies still."""
+"""Placing a body on the ground or in water so that it lies still."""
 
 import mujoco
 import numpy as np
@@ -14,10 +14,10 @@ from snakewalk.sim.physics.water import floating_height_m
 DRAPE_ROUNDS = 8
 DRAPE_STIFF_M_RAD = 0.01
 """Height that is given up rather than bend a joint, or lean the head, by a radian."""
-CALM_PER_S = 15.0
-"""Rate at which motion dies while the body is laid down."""
+SETTLE_DAMPING_PER_S = 15.0
+"""Rate at which motion is damped while the body settles."""
 STILL_M_S, STILL_RAD_S = 1e-3, 1e-2
-SHORTEST_S, LONGEST_S = 0.3, 4.0
+SETTLE_MIN_S, SETTLE_MAX_S = 0.3, 4.0
 
 
 def place(
@@ -28,11 +28,11 @@ def place(
     heading_rad: float,
     joint_rad: ArrayLike,
 ) -> None:
-    """Lay the body down with its head above ``start_m``; ends at rest, with its contact forces.
+    """Place the body with its head above ``start_m``; ends at rest, with its contact forces.
 
-    On a height field the pitch joints are bent so that the links follow the ground, as hands would
-    lay it. Then it is lowered until it first touches and settles, strongly damped, the joints held,
-    the head free to sink and lean but not to slide or turn.
+    On a height field the pitch joints are bent so that the links follow the ground. Then the body
+    is lowered until it first touches, and settles, strongly damped, with the joints held; the head
+    is free to sink and lean, but not to slide or turn.
 
     Raises:
         ValueError: ``joint_rad`` is not (J,).
@@ -125,15 +125,15 @@ def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField) -> None:
 def _settle(m: Mechanics) -> None:
     model, data = m.model, m.data
     held, start = data.qpos[7:].copy(), data.qpos[:2].copy()
-    for _ in range(int(LONGEST_S / m.step_s)):
+    for _ in range(int(SETTLE_MAX_S / m.step_s)):
         mujoco.mj_step(model, data)
-        data.qvel[:] *= np.exp(-CALM_PER_S * m.step_s)
+        data.qvel[:] *= np.exp(-SETTLE_DAMPING_PER_S * m.step_s)
         data.qvel[:2] = 0.0
         data.qvel[5:] = 0.0
         data.qpos[7:] = held
         data.qpos[:2] = start
         fall, turn = np.abs(data.qvel[2]), np.abs(data.qvel[3:]).max()
-        if data.time > SHORTEST_S and fall < STILL_M_S and turn < STILL_RAD_S:
+        if data.time > SETTLE_MIN_S and fall < STILL_M_S and turn < STILL_RAD_S:
             break
 
 

@@ -196,7 +196,7 @@ class MujocoPlant:
 
     @property
     def slip_m(self) -> float:
-        """Way slipped across the links since the reset, mean over all links."""
+        """Distance slipped across the links since the reset, mean over all links."""
         return float(self.mechanics.totals[1])
 
     @property

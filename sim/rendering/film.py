@@ -22,9 +22,9 @@ from snakewalk.sim.rendering.shade import add_shade
 if TYPE_CHECKING:
     import av
 
-CALM_S = 1.2
+SMOOTHING_S = 1.2
 """The camera's smoothing, in seconds of film."""
-TURN_CALM_S = 4.0
+TURN_SMOOTHING_S = 4.0
 
 
 def render_film(
@@ -96,7 +96,7 @@ def render_film(
             mujoco.mj_comPos(model, data)
             mujoco.mj_camlight(model, data)
             centre_m = data.xipos[1:, :2].mean(axis=0)
-            reached = _colour(model, centre_m, waypoints_m, waypoint_radius_m, reached)
+            reached = _mark_waypoints(model, centre_m, waypoints_m, waypoint_radius_m, reached)
             view.lookat[:], view.azimuth = camera[k, :3], camera[k, 3]
             view.distance, view.elevation = camera[k, 4], -33.0
             mujoco.mjv_updateScene(
@@ -131,15 +131,15 @@ def _camera(
         links = data.xipos[1:]
         centre[k] = (links.min(axis=0) + links.max(axis=0)) / 2
         body[k] = links[0, :2] - links[-1, :2]
-    calm = gaussian_filter1d(centre, CALM_S * fps, axis=0, mode="nearest")
-    heading = gaussian_filter1d(body, TURN_CALM_S * fps, axis=0, mode="nearest")
+    smooth = gaussian_filter1d(centre, SMOOTHING_S * fps, axis=0, mode="nearest")
+    heading = gaussian_filter1d(body, TURN_SMOOTHING_S * fps, axis=0, mode="nearest")
     azimuth = np.degrees(np.unwrap(np.arctan2(heading[:, 1], heading[:, 0]))) + 28.0
-    stray = np.abs(centre - calm).max()
+    stray = np.abs(centre - smooth).max()
     distance = np.full(len(shots), 1.55 * length_m + stray)
-    return np.column_stack([calm, azimuth, distance])
+    return np.column_stack([smooth, azimuth, distance])
 
 
-def _colour(
+def _mark_waypoints(
     model: mujoco.MjModel,
     centre_m: Floats,
     waypoints_m: Sequence[tuple[float, float]],

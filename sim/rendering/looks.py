@@ -1,4 +1,4 @@
-"""How the body and its ground look in a film; nothing here takes part in the physics."""
+"""The looks of the body and its ground in pictures; nothing here takes part in the physics."""
 
 import itertools
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ PUPIL: Rgba = (0.02, 0.02, 0.02, 1)
 TONGUE: Rgba = (0.75, 0.10, 0.15, 1)
 AHEAD: Rgba = (0.93, 0.33, 0.12, 1)
 REACHED: Rgba = (0.10, 0.62, 0.38, 1)
-WAY: Rgba = (0.98, 0.98, 0.95, 1)
+PATH: Rgba = (0.98, 0.98, 0.95, 1)
 RING_PARTS = 32
 LOWLAND, HIGHLAND = np.array([96.0, 112, 70]), np.array([214.0, 192, 152])
 SHALLOW = [0.30, 0.56, 0.66], [0.26, 0.51, 0.62]
@@ -67,7 +67,7 @@ def dressed_model(
             ).name = f"waypoint{k}ring{part}"
     for x, y in _dots(path_m):
         z = 0.0 if ground is None else float(ground.elevation_m(x, y))
-        _add(spec.worldbody, _SPHERE, (0.012, 0, 0), (float(x), float(y), z + 0.004), WAY)
+        _add(spec.worldbody, _SPHERE, (0.012, 0, 0), (float(x), float(y), z + 0.004), PATH)
     model = finish(spec.compile(), ground)
     if ground is not None:
         _paint(model, ground)

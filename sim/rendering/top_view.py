@@ -1,4 +1,4 @@
-"""The simulated robot as a camera above it sees it: a picture of the floor, body and shade."""
+"""The view from above: the picture that a camera over the simulated robot takes."""
 
 import math
 
@@ -51,9 +51,9 @@ class TopView:
         self._view.distance, self._view.elevation = camera.height_m, -90.0
         self._view.azimuth = 90.0 + math.degrees(camera.turn_rad)
         self._screen = Offscreen(model, *size)
-        self._chance = np.random.default_rng(seed)
+        self._random = np.random.default_rng(seed)
         shape = (_FIELDS, size[1], size[0], 3)
-        self._noise = np.rint(self._chance.normal(0.0, NOISE, shape)).astype(np.int16)
+        self._noise = np.rint(self._random.normal(0.0, NOISE, shape)).astype(np.int16)
 
     def picture(self, qpos: Floats) -> Image:
         """(H, W, 3) the robot at ``qpos`` (7 + J,)."""
@@ -85,8 +85,8 @@ class TopView:
         mujoco.mjv_updateScene(model, data, option, None, self._view, everything, self._scene)
 
     def _drawn(self) -> Image:
-        """What the sensor makes of it: one of a few fields of noise, shifted by chance."""
-        field = self._noise[self._chance.integers(_FIELDS)]
-        down, right = (int(self._chance.integers(side)) for side in field.shape[:2])
+        """Draw, and add the sensor's noise: one of a few fields, shifted by chance."""
+        field = self._noise[self._random.integers(_FIELDS)]
+        down, right = (int(self._random.integers(side)) for side in field.shape[:2])
         grey = self._screen.draw(self._scene) + np.roll(field, (down, right), axis=(0, 1))
         return np.asarray(np.clip(grey, 0, 255), dtype=np.uint8)

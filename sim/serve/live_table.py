@@ -1,4 +1,4 @@
-"""What the live view of a simulated bus shows: registers of all servos, and recent packets."""
+"""Live table of a simulated bus: registers of all servos, and the latest packets."""
 
 from collections import deque
 from collections.abc import Callable
@@ -29,16 +29,16 @@ SHOWN = 8
 
 
 class LiveTable:
-    """A ``PacketTap`` that counts and remembers; ``registers`` reads those worth looking at."""
+    """A ``PacketTap`` that counts packets and keeps the latest; ``registers`` reads the rows."""
 
-    def __init__(self, look: Callable[[], Rows], decoder: Decoder | Decoder1) -> None:
-        self.registers = look
+    def __init__(self, registers: Callable[[], Rows], decoder: Decoder | Decoder1) -> None:
+        self.registers = registers
         self._decoder = decoder
         self.questions = self.answers = self.bytes = 0
         self.recent: deque[DecodedPacket] = deque(maxlen=SHOWN)
 
     def __call__(self, time_s: float, from_host: bool, data: bytes) -> None:
-        """Take note of one packet."""
+        """Count one packet and keep it."""
         self.questions += from_host
         self.answers += not from_host
         self.bytes += len(data)
@@ -46,7 +46,7 @@ class LiveTable:
 
 
 def servo_rows(line: SimLine) -> Rows:
-    """One row a servo of Protocol 2.0: what it is, where it is, how it fares."""
+    """One row a servo of Protocol 2.0: mode, motion and state."""
     line.firmware.refresh()
     bank, measured = line.bank, line.bank.measures_current
     columns = {key: np.asarray(bank[name]) for key, name in COLUMNS.items()}

@@ -1,7 +1,7 @@
-"""The same servos behind a pseudo-terminal, in real time: a serial port for any client.
+"""A pseudo-terminal with simulated servos behind it, in real time: a serial port for any client.
 
 The clock handed in is real time; ``pace`` times that is mirrored on the line's simulated clock
-whenever the server looks. What a client writes to ``path`` goes onto the line, and answers are
+whenever the server runs. What a client writes to ``path`` goes onto the line, and answers are
 handed out when their bytes have arrived. Time that the server itself missed (a busy machine, or
 physics slower than real time) is left out rather than caught up, so that a client never finds
 servos that have aged by a second between two bytes. A client that sets a baud rate retunes the line
@@ -24,7 +24,7 @@ from snakewalk.sim.line.wire import Wire
 IDLE_S = 0.02
 """How often physics catches up while no client talks."""
 LATE_S = 0.1
-"""Real time that one look may make up for; what is beyond it is left out."""
+"""Real time that one step may make up for; what is beyond it is left out."""
 CHUNK_BYTES = 4096
 _SPEEDS = {getattr(termios, f"B{baud}"): baud for baud in BAUDS if hasattr(termios, f"B{baud}")}
 _OUTPUT_SPEED = 5
@@ -107,14 +107,14 @@ class PtyServer:
             self.close()
             return
         if ready:
-            self._listen()
+            self._follow_baud_rate()
             line.write(os.read(self._master, CHUNK_BYTES))
             line.settle()
         arrived = line.read_until(CHUNK_BYTES, line.clock.now_s())
         if arrived:
             try:
                 os.write(self._master, arrived)
-            except BlockingIOError:  # nobody reads: a UART's buffer would overrun, too
+            except BlockingIOError:  # no client reads: a UART's buffer would overrun, too
                 self.overrun_bytes += len(arrived)
 
     def _open(self) -> None:
@@ -131,7 +131,7 @@ class PtyServer:
             raise InputError(f"{self._link}: is there already, and is no link")
         self._link.symlink_to(self.path)
 
-    def _listen(self) -> None:
+    def _follow_baud_rate(self) -> None:
         """Follow the client's baud rate, once it has set one."""
         speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
         if speed != self._speed:

@@ -1,7 +1,8 @@
 """The control tables of all servos of a bus as one array, and the rules for reading and writing.
 
 A register is a live, typed view over all servos at once, so a group read or write is one slice.
-What registers *do* (drive the motor, show the shaft, run the watchdog) is ``sim.servo.firmware``.
+What the registers *do* (drive the motor, show the shaft, run the watchdog) is in
+``sim.servo.firmware``.
 """
 
 from collections.abc import Sequence
@@ -134,7 +135,7 @@ class ServoBank:
         return length > 0 and address >= 0 and address + length <= TABLE_BYTES
 
     def check(self, row: int, address: int, data: bytes, *, ram_only: bool = False) -> ResultError:
-        """Say what a write of ``data`` would answer; nothing is written.
+        """Error of the reply to a write of ``data``; nothing is written.
 
         ``ram_only`` refuses the EEPROM, as a servo does that is addressed by its secondary ID.
         """
@@ -182,8 +183,8 @@ class ServoBank:
             self["Registered Instruction"][row] = 1
         return error
 
-    def registered(self, row: int) -> tuple[int, bytes] | None:
-        """Take out what was registered, address and data; None if nothing was."""
+    def take_registered(self, row: int) -> tuple[int, bytes] | None:
+        """Take out the registered write, address and data; None if there is none."""
         self["Registered Instruction"][row] = 0
         return self._registered.pop(row, None)
 
@@ -233,7 +234,7 @@ class ServoBank:
         self.indirect.refresh()
 
     def switch_mode(self, rows: Indices) -> None:
-        """Set back what a new Operating Mode(11) does: gains, profile, and limits of the output."""
+        """Reset what a new Operating Mode(11) resets: gains, profile, limits of the output."""
         for kind, own in self._kinds:
             some = np.intersect1d(rows, own)
             for name in MODE_RESETS:
@@ -244,7 +245,10 @@ class ServoBank:
         self._zero_goal_velocity(rows)
 
     def _zero_goal_velocity(self, rows: Indices) -> None:
-        """Torque on alone turns nothing (e-manual, Bus Watchdog(98), example, steps 1 and 2)."""
+        """Stop servos in velocity mode: enabling torque alone turns nothing.
+
+        (E-manual, Bus Watchdog(98), example, steps 1 and 2.)
+        """
         turning = rows[self["Operating Mode"][rows] == VELOCITY_MODE]
         self["Goal Velocity"][turning] = 0
 

@@ -17,7 +17,7 @@ STRENGTH = 4.0
 
 
 class BlockedShaft:
-    """The blocked servos of a bus."""
+    """Which servos of a bus are blocked, and the drive and registers of those."""
 
     def __init__(self, drive: ServoDrive) -> None:
         self._drive = drive
@@ -32,32 +32,32 @@ class BlockedShaft:
         """Whether a servo is blocked."""
 
     def block(self, row: int, at_rad: float) -> None:
-        """Hold a shaft where it is; the firmware then takes over its registers again."""
+        """Hold a shaft where it is; the firmware then applies its registers again."""
         self._rows[row], self._at_rad[row], self.any = True, at_rad, True
 
     def free(self, row: int) -> None:
-        """Let go of a shaft."""
+        """Release a shaft."""
         self._rows[row] = False
         self.any = bool(self._rows.any())
 
     def hold(self, fresh: Bools | None = None) -> None:
-        """Turn the blocked servos' drive, as registers or loops have just set it, into a brake.
+        """Turn the blocked servos' drive, just set by registers or control loops, into a brake.
 
         ``fresh`` (S,) are the servos whose goal has just been set; None: all.
         """
         if not self.any:
             return
         drive, rows = self._drive, self._rows
-        told = rows & (drive.pwm_limit <= 1.0)  # else that is still the brake's
-        self._on = np.where(told, drive.torque_on, self._on)
-        self._limit = np.where(told, drive.pwm_limit, self._limit)
-        self._limit_a = np.where(told, drive.current_limit_a, self._limit_a)
-        regained = rows & (drive.p_gain_per_rad != STIFF_PER_RAD)
-        self._gain = np.where(regained, drive.p_gain_per_rad, self._gain)
-        wanted = self._gain * (drive.goal_rad - self._at_rad)
-        limited = np.clip(wanted, -self._limit, self._limit) * self._on
-        aimed = rows if fresh is None else rows & fresh
-        self._output = np.where(aimed, limited, self._output)
+        updated = rows & (drive.pwm_limit <= 1.0)  # else that is still the brake's
+        self._on = np.where(updated, drive.torque_on, self._on)
+        self._limit = np.where(updated, drive.pwm_limit, self._limit)
+        self._limit_a = np.where(updated, drive.current_limit_a, self._limit_a)
+        new_gain = rows & (drive.p_gain_per_rad != STIFF_PER_RAD)
+        self._gain = np.where(new_gain, drive.p_gain_per_rad, self._gain)
+        output = self._gain * (drive.goal_rad - self._at_rad)
+        limited = np.clip(output, -self._limit, self._limit) * self._on
+        changed = rows if fresh is None else rows & fresh
+        self._output = np.where(changed, limited, self._output)
         drive.torque_on[rows] = 1.0
         drive.p_gain_per_rad[rows] = STIFF_PER_RAD
         drive.goal_rad[rows] = self._at_rad[rows]
@@ -77,6 +77,6 @@ class BlockedShaft:
         return np.where(self._rows, stall, self._drive.current_a)
 
     def limit_a(self) -> Floats:
-        """(S,) limit of the current, as the registers have it."""
+        """(S,) limit of the current that the registers hold."""
         limit_a = self._drive.current_limit_a
         return np.where(self._rows, self._limit_a, limit_a) if self.any else limit_a

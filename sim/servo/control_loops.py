@@ -26,8 +26,8 @@ from snakewalk.sim.servo.profile import Trajectory
 CONTROL_S = 1e-3
 TIME_BASED = 0x04
 """Drive Mode(10), bit 2."""
-FAINT = 1e-9
-"""A proportional gain that adds nothing, under which a goal far away is a constant output."""
+TINY_GAIN = 1e-9
+"""A proportional gain too small to add anything: with it a far goal is a constant output."""
 _FORWARD = ("Feedforward 1st Gain", "Feedforward 2nd Gain")
 
 
@@ -47,27 +47,27 @@ class ControlLoops:
         self._sum = np.zeros(servos)
         self._last_error = np.zeros(servos)
 
-    def take_over(self, on: Bools, shaft_rad: Floats) -> None:
-        """Look at modes, gains and profiles after a write; joining servos start where they are."""
+    def apply_registers(self, on: Bools, shaft_rad: Floats) -> None:
+        """Apply modes, gains and profiles after a write; servos that join start where they are."""
         bank = self._bank
         mode = bank["Operating Mode"]
         placed = np.isin(mode, (POSITION_MODE, EXTENDED_MODE, CURRENT_POSITION_MODE))
-        rich = (bank["Position D Gain"] != 0) | (bank["Position I Gain"] != 0)
-        rich |= bank["Profile Velocity"] != 0
+        beyond_p = (bank["Position D Gain"] != 0) | (bank["Position I Gain"] != 0)
+        beyond_p |= bank["Profile Velocity"] != 0
         for name in _FORWARD:
-            rich |= bank[name] != 0
-        position, velocity = on & placed & rich, on & (mode == VELOCITY_MODE)
+            beyond_p |= bank[name] != 0
+        position, velocity = on & placed & beyond_p, on & (mode == VELOCITY_MODE)
         joined = (position & ~self.position) | (velocity & ~self.velocity)
         if joined.any():
-            self.trajectory.place(joined, shaft_rad)
+            self.trajectory.restart(joined, shaft_rad)
             self._sum[joined] = self._last_error[joined] = 0.0
         self.position, self.velocity = position, velocity
         self.active = bool(position.any() or velocity.any())
         self._kp = p_gain_per_rad(bank["Position P Gain"], self._motor)
-        self._drive.p_gain_per_rad[:] = np.where(velocity, FAINT, self._kp)
+        self._drive.p_gain_per_rad[:] = np.where(velocity, TINY_GAIN, self._kp)
 
-    def aim(self, goal_rad: Floats) -> None:
-        """Hand on position goals, in the shafts' frame."""
+    def set_goals(self, goal_rad: Floats) -> None:
+        """Pass on position goals, in the shafts' frame."""
         if not self.active:
             return
         bank = self._bank
@@ -75,12 +75,12 @@ class ControlLoops:
         velocity = bank["Profile Velocity"].astype(float)
         ramp = bank["Profile Acceleration"].astype(float)
         goal = np.where(self.position, goal_rad, self.trajectory.goal)
-        self.trajectory.aim(goal, velocity, ramp, timed)
+        self.trajectory.set_goals(goal, velocity, ramp, timed)
 
     def tick(self, plant: Plant, goal_rad: Floats, sign: Floats, held: Bools) -> None:
-        """One control period: set the drive of the servos that these loops run.
+        """Run one control period: set the drive of the servos that need these loops.
 
-        ``goal_rad`` is where held servos stay; ``sign`` turns registers into the shafts' frame.
+        ``goal_rad`` is the place of held servos; ``sign`` turns registers into the shafts' frame.
         """
         if self.velocity.any():
             self._tick_velocity(plant, sign, held)
@@ -103,7 +103,7 @@ class ControlLoops:
         moving = np.where(held, 0.0, 1.0)
         pwm += bank["Feedforward 1st Gain"] / 4.0 * path.velocity * ticks * moving
         pwm += bank["Feedforward 2nd Gain"] / 4.0 * path.acceleration * (ticks * CONTROL_S) * moving
-        gain = np.maximum(self._kp, FAINT)
+        gain = np.maximum(self._kp, TINY_GAIN)
         drive.p_gain_per_rad[run] = gain[run]
         drive.goal_rad[run] = (target + pwm / PWM_FULL / gain)[run]
 
@@ -126,4 +126,4 @@ class ControlLoops:
         limit = np.where(integral > 0.0, full / np.maximum(integral, 1e-12), 0.0)
         self._sum[run] = np.clip(self._sum + error, -limit, limit)[run]
         pwm = (bank["Velocity P Gain"] / 128.0 * error + integral * self._sum) / PWM_FULL
-        drive.goal_rad[run] = (plant.position_rad + pwm / FAINT)[run]
+        drive.goal_rad[run] = (plant.position_rad + pwm / TINY_GAIN)[run]

@@ -1,7 +1,7 @@
-"""What the servos do in time: registers drive the motors, the shafts show in the registers.
+"""The servos' firmware: registers drive the motors, and the shafts show in the registers.
 
-Order of one look: physics is stepped to the time of the look (cut where a watchdog runs out or a
-protection is due), and only then registers are read or written.
+Physics is always stepped first to the time of an access (with stops where a watchdog runs out or a
+protection is due); only then are registers read or written.
 """
 
 import numpy as np
@@ -37,7 +37,7 @@ from snakewalk.sim.servo.watchdog import Watchdog
 CENTRE_TICKS = 2048
 """Present Position(132) of a straight joint."""
 FAR_RAD = 1e9
-"""Where a motor is sent that only has to push: the output saturates at its limit."""
+"""Goal of a motor that only has to push: the output saturates at its limit."""
 REVERSE, TORQUE_ON_BY_GOAL = 0x01, 0x08
 """Drive Mode(10), bits 0 and 3."""
 STARTUP_TORQUE_ON, STARTUP_RAM_RESTORE = 0x01, 0x02
@@ -67,13 +67,13 @@ class Firmware:
         self._slice_s = self._time_s + SLICE_S
         self._watchdog = Watchdog(bank, self._time_s)
         self._turns = np.zeros(joints)
-        self._was_on = np.zeros(joints, bool)
-        self._was_mode = bank["Operating Mode"].copy()
+        self._last_on = np.zeros(joints, bool)
+        self._last_mode = bank["Operating Mode"].copy()
         self._held = np.zeros(joints, bool)
         self.powered = np.ones(joints, bool)
-        """(S,) False while a servo has no supply: it hears nothing and lets go."""
+        """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
         self.events = EventQueue()
-        """What happens to the servos at a time of its own, whoever talks."""
+        """Events that happen to the servos at a time of their own, such as faults."""
         self.control_loops = ControlLoops(bank, self.drive, motor)
         self._goal = self.drive.goal_rad.copy()
         self._control_s = self._time_s + CONTROL_S
@@ -89,7 +89,7 @@ class Firmware:
                 self.protection,
             )
         )
-        self._taken = np.zeros(joints, bool)
+        self._accepted = np.zeros(joints, bool)
         self.apply_registers()
         self.power_up(np.arange(joints))
 
@@ -113,7 +113,7 @@ class Firmware:
                 self.events.run_due(stop_s)
                 self.apply_registers()
             if stop_s >= dog.due_s:
-                self._stop(dog.trip(stop_s))
+                self._hold(dog.trip(stop_s))
             if stop_s >= self._slice_s:
                 if protection.check(plant):
                     self.apply_registers()
@@ -124,34 +124,34 @@ class Firmware:
         dog = self._watchdog
         dog.fed_s, dog.due_s = time_s, time_s + dog.timeout_s
 
-    # registers to motors
+    # from registers to motors
 
     def apply_registers(self) -> None:
-        """Take over registers after a write of anything but goal positions alone."""
+        """Apply the registers after a write of anything but goal positions alone."""
         bank, drive = self.bank, self.drive
         mode = bank["Operating Mode"]
         on = bank["Torque Enable"] == 1
-        switched = np.flatnonzero(mode != self._was_mode)
+        switched = np.flatnonzero(mode != self._last_mode)
         if len(switched):
             bank.switch_mode(switched)
         on &= self.powered
-        again = (mode == POSITION_MODE) & ((on & ~self._was_on) | (mode != self._was_mode))
+        restarted = (mode == POSITION_MODE) & ((on & ~self._last_on) | (mode != self._last_mode))
         self._sign = np.where(bank["Drive Mode"] & REVERSE, -1.0, 1.0)
-        if again.any():
-            self._reset_turns(again)
+        if restarted.any():
+            self._reset_turns(restarted)
         offset = bank["Homing Offset"].astype(np.int64)
         offset[(mode == POSITION_MODE) & (np.abs(offset) > HOMING_LIMIT_TICKS)] = 0
         self._zero = CENTRE_TICKS + offset - TICKS_PER_REV * self._turns
         self._frame = np.stack([self._sign, self._zero])
-        self._was_on, self._was_mode = on, mode.copy()
+        self._last_on, self._last_mode = on, mode.copy()
         self._enabled_by_goals = bool((bank["Drive Mode"] & TORQUE_ON_BY_GOAL).any())
         tripped = bank["Bus Watchdog"] == WATCHDOG_TRIPPED
         self._held &= tripped
         self._holding = bool(self._held.any())
         drive.torque_on[:] = on
-        self._was_active = self.control_loops.active
-        self.control_loops.take_over(on, self.plant.position_rad)
-        if self.control_loops.active and not self._was_active:
+        was_active = self.control_loops.active
+        self.control_loops.apply_registers(on, self.plant.position_rad)
+        if self.control_loops.active and not was_active:
             self._control_s = self._time_s + CONTROL_S
         full = np.abs(bank["Goal PWM"].astype(float)) / PWM_FULL
         drive.pwm_limit[:] = full
@@ -172,7 +172,7 @@ class Firmware:
         high = np.where(single, bank["Max Position Limit"].astype(int), EXTENDED_RANGE_TICKS)
         never = EXTENDED_RANGE_TICKS + 1
         self._limits = np.where(tripped, [[never], [-never]], [low, high])
-        self._aim()
+        self._set_drive_goals()
         self._watchdog.arm(on)
 
     def write_goals(self, rows: NDArray[np.intp], raw: NDArray[np.uint8], at: int) -> None:
@@ -184,13 +184,13 @@ class Firmware:
             self._holding or self._pushed or self.control_loops.active or self.blocked_shaft.any
         )
         goal_rad = self.drive.goal_rad if plain else np.empty(len(self.bank))
-        table, address, taken = self.bank.table, self._goal_address, self._taken
+        table, address, taken = self.bank.table, self._goal_address, self._accepted
         limits, frame = self._limits, self._frame
         accept_goals(raw, rows, table, at, address, limits, frame, TICKS_PER_RAD, goal_rad, taken)
         if self._enabled_by_goals:
             self.enable_by_goal(np.flatnonzero(taken))
         if not plain:
-            self._aim()
+            self._set_drive_goals()
 
     def enable_by_goal(self, rows: NDArray[np.intp]) -> None:
         """Torque on by goal update (Drive Mode(10), bit 3), unless an error holds it off."""
@@ -213,7 +213,7 @@ class Firmware:
         """After power-on or reboot: one turn of position, goal = present, protections cleared."""
         self._reset_turns(np.isin(np.arange(len(self.bank)), rows))
         self.protection.restart(rows)
-        self._was_on[rows] = False
+        self._last_on[rows] = False
         start = self.bank["Startup Configuration"]
         for row in rows:
             if start[row] & STARTUP_RAM_RESTORE:
@@ -221,10 +221,10 @@ class Firmware:
         self.apply_registers()
         self.refresh()
         self.bank["Goal Position"][rows] = self.bank["Present Position"][rows]
-        self._aim()
-        eager = rows[(start[rows] & STARTUP_TORQUE_ON) != 0]
-        if len(eager):
-            self.bank["Torque Enable"][eager] = 1
+        self._set_drive_goals()
+        switched_on = rows[(start[rows] & STARTUP_TORQUE_ON) != 0]
+        if len(switched_on):
+            self.bank["Torque Enable"][switched_on] = 1
             self.apply_registers()
 
     def clear_turns(self, row: int) -> bool:
@@ -236,7 +236,7 @@ class Firmware:
         return True
 
     def clear_error(self, row: int) -> bool:
-        """Clear instruction: forget hardware errors whose cause is gone; False if one is not."""
+        """Clear instruction: clear hardware errors whose cause is gone; False if one remains."""
         self.bank["Hardware Error Status"][row] = 0
         self.protection.restart(np.array([row]))
         self.protection.check(self.plant)
@@ -261,19 +261,19 @@ class Firmware:
         self.apply_registers()
 
     def restore_power(self, rows: NDArray[np.intp]) -> None:
-        """Give the supply back: the servos start anew, their turns forgotten."""
+        """Give the supply back: the servos restart, and have lost their turns."""
         self.powered[rows] = True
         self.bank.reset(rows, keep=(), ram_only=True)
         self.power_up(rows)
 
-    # shafts to registers
+    # from shafts to registers
 
     def refresh_motion(self) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
         self._present_values.motion(self._frame)
 
     def refresh(self, address: int = 0, length: int = TABLE_BYTES) -> None:
-        """Present values, those at least that a read of this block shows."""
+        """Write the present values, at least those that a read of this block shows."""
         indirect = self.bank.indirect
         gather = indirect.covers(address, length)
         stop = address + length
@@ -285,28 +285,28 @@ class Firmware:
         if gather:
             indirect.gather()
 
-    # inside
+    # internals
 
-    def _aim(self) -> None:
+    def _set_drive_goals(self) -> None:
         goal = (self.bank["Goal Position"] - self._zero) * (self._sign / TICKS_PER_RAD)
         if self._holding:
             goal = np.where(self._held, self._goal, goal)
         self._goal = goal
         drive_goal = np.where(self._push != 0.0, self._push, goal) if self._pushed else goal
-        control_loops, told = self.control_loops, None
+        control_loops, updated = self.control_loops, None
         if control_loops.active:
-            control_loops.aim(goal)
+            control_loops.set_goals(goal)
             run = control_loops.position | control_loops.velocity
-            drive_goal, told = np.where(run, self.drive.goal_rad, drive_goal), ~run
+            drive_goal, updated = np.where(run, self.drive.goal_rad, drive_goal), ~run
         self.drive.goal_rad[:] = drive_goal
-        self.blocked_shaft.hold(told)
+        self.blocked_shaft.hold(updated)
 
     def _reset_turns(self, which: NDArray[np.bool_]) -> None:
         ticks = np.rint(self.plant.position_rad * self._sign * TICKS_PER_RAD) + CENTRE_TICKS
         self._turns[which] = np.floor(ticks / TICKS_PER_REV)[which]
 
-    def _stop(self, late: NDArray[np.bool_]) -> None:
-        """Hold where they are the servos whose watchdog has run out."""
+    def _hold(self, late: NDArray[np.bool_]) -> None:
+        """Hold the servos whose watchdog has run out where they are."""
         self._held |= late
         self._goal[late] = self.plant.position_rad[late]
         self.apply_registers()

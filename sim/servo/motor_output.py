@@ -15,7 +15,7 @@ from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 
 AT_LIMIT = 0.999
 """Share of its limit from which on a current is taken to be cut."""
-FAINT_V = 0.1
+LEAST_SUPPLY_V = 0.1
 """Less supply than this is none."""
 
 
@@ -37,5 +37,5 @@ class MotorOutput:
         drive, amps = self._drive, self._blocked_shaft.current_a()
         cut = (np.abs(amps) >= AT_LIMIT * self._blocked_shaft.limit_a()) & (drive.torque_on > 0.0)
         volts = amps * drive.resistance_ohm + drive.back_emf_v_s * velocity_rad_s
-        left = volts / np.maximum(drive.supply_v, FAINT_V)
+        left = volts / np.maximum(drive.supply_v, LEAST_SUPPLY_V)
         return np.where(cut, np.clip(left, -1.0, 1.0), pwm)

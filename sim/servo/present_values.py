@@ -1,4 +1,4 @@
-"""What shafts and time show in the registers: present values, trajectories, flags of motion."""
+"""Present values: what the registers show of shafts, trajectories, motion and time."""
 
 import math
 

@@ -22,7 +22,7 @@ class Trajectory:
         self.velocity = np.zeros(servos)
         self.goal = np.zeros(servos)
         self.acceleration = np.zeros(servos)
-        """What the last step did, for the feed-forward."""
+        """Of the last step, for the feed-forward."""
         self.kind = np.zeros(servos, np.uint8)
         """Moving Status bits of the profile in use."""
         self._speed = np.full(servos, np.inf)
@@ -33,21 +33,21 @@ class Trajectory:
         """(S,) goal not reached by the trajectory."""
         return np.asarray((self.position != self.goal) | (self.velocity != 0.0))
 
-    def place(self, which: Bools, position: Floats) -> None:
-        """Start afresh at a place, at rest."""
+    def restart(self, which: Bools, position: Floats) -> None:
+        """Restart at a position, at rest."""
         self.position[which] = self.goal[which] = position[which]
         self.velocity[which] = self.acceleration[which] = 0.0
 
-    def aim(self, goal: Floats, velocity: Floats, ramp: Floats, timed: Bools) -> None:
-        """Take new goals, rad, with the profile registers as they are now."""
+    def set_goals(self, goal: Floats, velocity: Floats, ramp: Floats, timed: Bools) -> None:
+        """Take new goals, rad, with the present profile registers."""
         new = goal != self.goal
         if not new.any():
             return
-        way = np.abs(goal - self.position)
+        distance = np.abs(goal - self.position)
         total_s = velocity * 1e-3
         ramp_s = np.minimum(ramp * 1e-3, 0.5 * total_s)
         with np.errstate(divide="ignore", invalid="ignore"):
-            timed_speed = np.where(total_s > 0.0, way / (total_s - ramp_s), np.inf)
+            timed_speed = np.where(total_s > 0.0, distance / (total_s - ramp_s), np.inf)
             timed_ramp = np.where(ramp_s > 0.0, timed_speed / ramp_s, np.inf)
         speed = np.where(velocity > 0.0, velocity * VELOCITY_UNIT_RAD_S, np.inf)
         slope = np.where(ramp > 0.0, ramp * ACCELERATION_UNIT_RAD_S2, np.inf)
@@ -56,22 +56,24 @@ class Trajectory:
         self.goal[new] = goal[new]
         step = ~np.isfinite(self._speed)
         with np.errstate(invalid="ignore", over="ignore"):
-            short = way * self._ramp < self._speed**2
+            short = distance * self._ramp < self._speed**2
         kind = np.where(np.isfinite(self._ramp), np.where(short, TRIANGULAR, TRAPEZOIDAL), 0x10)
         self.kind[new] = np.where(step, STEP, kind)[new]
 
     def advance(self, seconds: float) -> None:
         """Move on by one step of the control loop."""
-        way = self.goal - self.position
+        distance = self.goal - self.position
         step = ~np.isfinite(self._speed)
         with np.errstate(invalid="ignore"):
             brake = self._ramp * seconds
-            root = np.sqrt(1.0 + 8.0 * np.abs(way) / np.maximum(brake * seconds, 1e-300))
+            root = np.sqrt(1.0 + 8.0 * np.abs(distance) / np.maximum(brake * seconds, 1e-300))
             limit = np.where(np.isfinite(brake), 0.5 * brake * (root - 1.0), np.inf)
-        wanted = np.sign(way) * np.minimum.reduce([self._speed, limit, np.abs(way) / seconds])
-        change = np.clip(wanted - self.velocity, -brake, brake)
+        velocity_goal = np.sign(distance) * np.minimum.reduce(
+            [self._speed, limit, np.abs(distance) / seconds]
+        )
+        change = np.clip(velocity_goal - self.velocity, -brake, brake)
         velocity = np.where(step, 0.0, self.velocity + np.where(np.isnan(change), 0.0, change))
-        arrived = step | (np.abs(way - velocity * seconds) < 1e-9)
+        arrived = step | (np.abs(distance - velocity * seconds) < 1e-9)
         self.acceleration[:] = np.where(step, 0.0, (velocity - self.velocity) / seconds)
         self.position[:] = np.where(arrived, self.goal, self.position + velocity * seconds)
         self.velocity[:] = np.where(arrived, 0.0, velocity)

@@ -1,4 +1,4 @@
-"""What a servo guards itself against: heat, a blocked shaft, a supply out of range.
+"""Protections of a servo: against heat, a blocked shaft, a supply out of range.
 
 Detected faults go to Hardware Error Status(70); those in the mask of Shutdown(63) switch the torque
 off until a reboot (e-manual, Shutdown).
@@ -28,7 +28,7 @@ from snakewalk.sim.servo.servo_loops import (
 from snakewalk.sim.servo.supply import Supply
 
 SLICE_S = 0.05
-"""How often this is looked at; the shafts are seen far more often."""
+"""Period of the checks."""
 SLOW = 0.05
 """Share of the no-load speed below which a motor is taken to be held (ours)."""
 STARVED = 0.6
@@ -99,11 +99,11 @@ class Protection:
         """Rows of the servos on a cable, and what they draw at rest, A."""
 
     def alarms(self, row: int) -> Mapping[str, int]:
-        """What a servo can detect."""
+        """Errors that a servo can detect, and their bits."""
         return ALARMS_330 if self._bank.has(row, "PWM Slope") else ALARMS
 
     def supply(self, volts: float | None, rows: NDArray[np.intp] | None = None) -> None:
-        """Change the supply of all, or of ``rows``; None: as it was."""
+        """Change the supply of all, or of ``rows``; None: back to the usual voltage."""
         self._supply.change(volts, rows)
 
     def heat(self, rows: NDArray[np.intp], celsius: float) -> None:
@@ -111,11 +111,11 @@ class Protection:
         self.temperature_c[rows] = celsius
 
     def detect(self, rows: NDArray[np.intp], error: int) -> None:
-        """Let servos find an error: shown, and off with the torque if Shutdown(63) says so."""
+        """Raise an error of some servos; it ends the torque if Shutdown(63) lists it."""
         self._set_errors(np.isin(np.arange(len(self._bank)), rows) * error)
 
     def restart(self, rows: NDArray[np.intp]) -> None:
-        """Forget what led up to an overload; heat stays."""
+        """Restart the count of an overload; heat stays."""
         self._blocked_s[rows] = 0.0
 
     def pass_time(self, seconds: float) -> None:

@@ -1,4 +1,4 @@
-"""Bus Watchdog(98): a servo that hears nothing for its time stops where it is.
+"""Bus Watchdog(98): a servo that receives nothing for its time stops where it is.
 
 Any instruction packet feeds the watchdogs of all, whoever it is for, while torque is on; one that
 has run out reads -1 until 0 is written. (e-manual, Bus Watchdog.)

@@ -1,6 +1,6 @@
-"""An exchange on the bus, packet by packet, in words: who asked what, and who answered.
+"""Decoder of an exchange on the bus into words, packet by packet.
 
-It learns as it listens: pings tell the models, questions tell what an answer's bytes mean.
+Pings give the models of the servos; an instruction gives the meaning of its replies' bytes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -37,7 +37,7 @@ class DecodedPacket:
     servo_id: int
     """254: all; -1: not known."""
     name: str
-    """Instruction, or what came of it."""
+    """Instruction, or its result."""
     values: Mapping[str, object]
     """Registers by servo and name, where they are known."""
     raw: str
@@ -56,9 +56,9 @@ class DecodedPacket:
 
 
 class Decoder:
-    """Bytes of a bus in, lines out; ``model`` is taken for servos that no ping has told about.
+    """Bytes of a bus in, lines out; ``model`` is that of servos that no ping has identified.
 
-    ``models`` are those that are known beforehand, by ID.
+    ``models`` are those known beforehand, by ID.
     """
 
     def __init__(self, model: str = "XM430-W350", models: Mapping[int, str] | None = None) -> None:

@@ -70,7 +70,9 @@ def test_velocity_mode_ramps_by_its_profile_acceleration() -> None:
 def test_a_profile_takes_the_time_of_its_shape(velocity: int, acceleration: int, kind: int) -> None:
     path, goal = Trajectory(1), np.array([1.0])
     speed, slope = velocity * VELOCITY_UNIT_RAD_S, acceleration * ACCELERATION_UNIT_RAD_S2
-    path.aim(goal, np.array([float(velocity)]), np.array([float(acceleration)]), np.array([False]))
+    path.set_goals(
+        goal, np.array([float(velocity)]), np.array([float(acceleration)]), np.array([False])
+    )
     assert path.kind[0] == kind
     steps, fastest = 0, 0.0
     while path.ongoing[0]:
@@ -90,7 +92,7 @@ def test_a_profile_takes_the_time_of_its_shape(velocity: int, acceleration: int,
 
 def test_a_time_based_profile_arrives_on_time() -> None:
     path = Trajectory(2)
-    path.aim(np.array([1.0, -0.3]), np.full(2, 800.0), np.full(2, 200.0), np.full(2, True))
+    path.set_goals(np.array([1.0, -0.3]), np.full(2, 800.0), np.full(2, 200.0), np.full(2, True))
     for _ in range(790):
         path.advance(1e-3)
     assert path.ongoing.all()
