@@ -9,9 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 
 NEIGHBOURS = 9
 """Points that decide together, [PT] 2.4."""
@@ -31,7 +30,7 @@ class PulseSpeed:
     """(S, N) root mean square of Theta_n over the neighbourhood, rad a point: the weight."""
     error_rad: Floats
     """(S, N) root mean square of what the shifted angles leave over."""
-    frame: NDArray[np.int64]
+    frame: Ints
     """(S,) index of the later frame of each pair."""
     step: int
     """Frames from the earlier to the later of a pair; speeds are divided by it."""
@@ -45,7 +44,7 @@ class PulseSpeed:
 
 def measure_pulse_speed(
     angles_rad: Floats,
-    number: NDArray[np.int64],
+    number: Ints,
     step: int = 1,
     most: int = 12,
     *,
@@ -101,7 +100,7 @@ def measure_pulse_speed(
     )
 
 
-def _pairs(number: NDArray[np.int64], step: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _pairs(number: Ints, step: int) -> tuple[Ints, Ints]:
     """Indices of later and earlier frames that are ``step`` apart."""
     at = np.searchsorted(number, number - step)
     later = np.flatnonzero(number[at] == number - step)

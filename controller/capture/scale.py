@@ -2,9 +2,8 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Image
+from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 
 _FAMILIES = (
@@ -16,7 +15,7 @@ _FAMILIES = (
 )
 
 
-def scale_of_length(length_m: float, length_px: NDArray[np.float64]) -> float:
+def scale_of_length(length_m: float, length_px: Floats) -> float:
     """Metres a pixel of an animal that is ``length_m`` long, from its length in every frame.
 
     Raises:

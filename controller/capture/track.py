@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.resample import equal_arc_length, tangent_angles
 
@@ -58,7 +57,7 @@ def track_from_points(
     rate_hz: float,
     *,
     scale_m: float | None = None,
-    frame: NDArray[np.int64] | None = None,
+    frame: Ints | None = None,
     rate_assumed: bool = False,
     source: str = "not stated",
     licence: str = "not stated",

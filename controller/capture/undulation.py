@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.controller.capture.resample import body_points, equal_arc_length
 from snakewalk.controller.capture.track import Track
 
@@ -59,9 +58,7 @@ def measure_undulation(track: Track, frequency_hz: float) -> Undulation:
     return Undulation(np.sqrt(2.0) * swing.std(axis=0), np.sqrt(2.0) * side.std(axis=0))
 
 
-def along_speed(
-    body: Floats, number: NDArray[np.int64], step: int
-) -> tuple[Floats, NDArray[np.int64]]:
+def along_speed(body: Floats, number: Ints, step: int) -> tuple[Floats, Ints]:
     """Speed of each point along the body's own tangent there, and at which frames.
 
     Args:

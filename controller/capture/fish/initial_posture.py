@@ -7,10 +7,9 @@ so the build decides: both orientations are matched, and the better one is kept.
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from skimage.morphology import skeletonize
 
-from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.controller.capture.fish.model import FishModel
 from snakewalk.controller.capture.fish.postures import midline_angles
 
@@ -67,7 +66,7 @@ def _beyond(points: Floats, reach: float) -> Floats:
     return np.asarray(points[0] + step / max(float(np.hypot(*step)), 1e-9) * reach)
 
 
-def _longest_path(bones: Bools) -> NDArray[np.int64] | None:
+def _longest_path(bones: Bools) -> Ints | None:
     """Pixels (P, 2), row and column, of the longest shortest path in any part of the skeleton."""
     pixels = {(int(r), int(c)) for r, c in np.argwhere(bones)}
     best: list[tuple[int, int]] = []

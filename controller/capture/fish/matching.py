@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.fish.raster import Grey, Window, draw_area, draw_edge, draw_pieces
+from snakewalk.config.arrays import Bools, Floats, Image
+from snakewalk.controller.capture.fish.raster import Window, draw_area, draw_edge, draw_pieces
 
 EDGE_WEIGHT = 0.3
 """W of Eq. 3."""
@@ -15,7 +15,7 @@ LEAST_VALUE = 0.3
 """A posture of a smaller V explains nothing: the fish is lost."""
 
 
-def agreement(drawn: Grey, observed: Grey) -> float:
+def agreement(drawn: Image, observed: Image) -> float:
     """Eq. 1 and 2: ``(f(P and S) - f(P xor S)) / f(P)``; 1 for the same area, below it otherwise.
 
     With shaded pixels the smaller of two values is their AND and the difference their XOR; so
@@ -32,9 +32,9 @@ def agreement(drawn: Grey, observed: Grey) -> float:
 class SilhouetteFrame:
     """One frame of one camera."""
 
-    grey: Grey
+    grey: Image
     """(H, W) as filmed."""
-    mask: NDArray[np.bool_]
+    mask: Bools
     """(H, W) where the fish differs from the background."""
     reason: str = ""
     """Why the frame cannot be used; empty for a good one."""
@@ -81,7 +81,7 @@ class Target:
         draw_area(self._canvas, self.window, outline_px)
         return self._soften(self._canvas)
 
-    def _soften(self, area: Grey) -> NDArray[np.float32]:
+    def _soften(self, area: Image) -> NDArray[np.float32]:
         width = 2 * self._thickness + 1
         blurred = cv2.blur(area, (width, width))
         return np.asarray(blurred, dtype=np.float32) * np.float32(1.0 / 255.0)
@@ -97,7 +97,7 @@ class Target:
         return area + EDGE_WEIGHT * agreement(np.asarray(rim, dtype=np.uint8), self._edge)
 
 
-def _edges(grey: Grey, area: Grey, width_px: int) -> Grey | None:
+def _edges(grey: Image, area: Image, width_px: int) -> Image | None:
     """Canny edges near the silhouette's rim, ``width_px`` wide; None where there are none.
 
     Thresholds come from the contrast between fish and surroundings. Marks on the back and marks on

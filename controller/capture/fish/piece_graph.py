@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.fish.postures import Postures
 from snakewalk.controller.capture.fish.segments import Kind, MotionSegment
@@ -48,7 +47,7 @@ class PieceGraph:
     classes: int = CLASSES
 
     @cached_property
-    def _class(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _class(self) -> tuple[Ints, Ints]:
         begin = np.array([piece.begin_speed for piece in self.pieces])
         end = np.array([piece.end_speed for piece in self.pieces])
         return speed_classes(begin, end, self.classes)
@@ -83,9 +82,7 @@ class PieceGraph:
         return np.flatnonzero(apart <= apart.min() + 1e-12).tolist(), False
 
 
-def speed_classes(
-    begin: Floats, end: Floats, classes: int = CLASSES
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def speed_classes(begin: Floats, end: Floats, classes: int = CLASSES) -> tuple[Ints, Ints]:
     """Classes of equal width from 0 to the largest speed that occurs, for both ends."""
     top = max(float(begin.max(initial=0.0)), float(end.max(initial=0.0)), 1e-12)
     return tuple(  # type: ignore[return-value]

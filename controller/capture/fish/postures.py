@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.fish.model import turn_shares
 from snakewalk.controller.capture.resample import SEGMENTS, equal_arc_length, tangent_angles
@@ -46,7 +45,7 @@ class Postures:
         return len(self.head_rad)
 
     @property
-    def found(self) -> NDArray[np.bool_]:
+    def found(self) -> Bools:
         """(T,) whether there is a posture."""
         return np.isfinite(self.head_rad)
 

@@ -11,10 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Image
 from snakewalk.controller.capture.fish.model import FishModel
 
-Grey = NDArray[np.uint8]
 _SHIFT = 4  # cv2 takes coordinates in sixteenths of a pixel
 
 
@@ -35,7 +34,7 @@ class Window:
         """Rows and columns of the canvas."""
         return max(1, round(self.height * self.scale)), max(1, round(self.width * self.scale))
 
-    def crop(self, image: Grey) -> Grey:
+    def crop(self, image: Image) -> Image:
         """Return this part of ``image``, averaged down."""
         part = image[self.top : self.top + self.height, self.left : self.left + self.width]
         rows, columns = self.shape
@@ -53,14 +52,14 @@ class Window:
         return np.clip(np.rint(fixed), -(2**24), 2**24).astype(np.int32)
 
 
-def draw_area(canvas: Grey, window: Window, outline_px: Floats) -> None:
+def draw_area(canvas: Image, window: Window, outline_px: Floats) -> None:
     """Fill an outline (n, 2) on a cleared canvas."""
     canvas[:] = 0
     points = window.sixteenths(outline_px)
     cv2.fillPoly(canvas, [points], 255, lineType=cv2.LINE_AA, shift=_SHIFT)
 
 
-def draw_edge(canvas: Grey, window: Window, outline_px: Floats, thickness: int) -> None:
+def draw_edge(canvas: Image, window: Window, outline_px: Floats, thickness: int) -> None:
     """Draw an outline (n, 2) as a line ``thickness`` canvas pixels wide on a cleared canvas."""
     canvas[:] = 0
     points = window.sixteenths(outline_px)
@@ -89,7 +88,7 @@ def side_outline(model: FishModel, midline_px: Floats, head_rad: float) -> list[
     return [np.asarray(cv2.convexHull(pair)[:, 0, :], dtype=float) for pair in pairs]
 
 
-def draw_pieces(canvas: Grey, window: Window, pieces_px: list[Floats]) -> None:
+def draw_pieces(canvas: Image, window: Window, pieces_px: list[Floats]) -> None:
     """Fill convex pieces on a cleared canvas."""
     canvas[:] = 0
     points = window.sixteenths(np.concatenate(pieces_px))

@@ -10,8 +10,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, shift
 from scipy.spatial import cKDTree
 
-from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.fish.raster import Grey
+from snakewalk.config.arrays import Floats, Image
 
 _FINE = 240  # places along the body at which it is drawn
 
@@ -57,11 +56,11 @@ class FishScene:
         self._back = gaussian_filter(self._rng.normal(size=(64, _FINE)), 3.0)
         self._back *= self.conditions.marks / self._back.std()
 
-    def background(self) -> Grey:
+    def background(self) -> Image:
         """(H, W) the empty scene, filmed once."""
         return self._film(self._ground)
 
-    def top(self, midline_px: Floats, half_width_px: Floats) -> Grey:
+    def top(self, midline_px: Floats, half_width_px: Floats) -> Image:
         """(H, W) the fish from above: midline (P, 2), x right and y up; half widths (S,)."""
         points, width = _fine(midline_px, half_width_px)
         image = self._ground.copy()
@@ -74,7 +73,7 @@ class FishScene:
         grey = self.conditions.fish + self._back[across, near].reshape(x.shape)
         return self._put(image, rows, columns, covered, grey)
 
-    def side(self, midline_px: Floats, half_wide_px: Floats, half_high_px: Floats) -> Grey:
+    def side(self, midline_px: Floats, half_wide_px: Floats, half_high_px: Floats) -> Image:
         """(H, W) the fish from the side: spine (P, 2) in x and height; half axes (P,) of sections.
 
         Each section appears as an ellipse, ``half_wide_px`` along x.
@@ -96,7 +95,7 @@ class FishScene:
 
     def _put(
         self, image: Floats, rows: slice, columns: slice, covered: Floats, grey: Floats
-    ) -> Grey:
+    ) -> Image:
         whole = np.zeros_like(image)
         whole[rows, columns] = covered
         if self.conditions.shadow:
@@ -105,7 +104,7 @@ class FishScene:
         image[rows, columns] += covered * (grey - image[rows, columns])
         return self._film(image)
 
-    def _film(self, image: Floats) -> Grey:
+    def _film(self, image: Floats) -> Image:
         seen = gaussian_filter(image, self.conditions.blur_px) if self.conditions.blur_px else image
         seen = seen + self._rng.normal(size=image.shape) * self.conditions.noise
         return np.clip(np.rint(seen), 0, 255).astype(np.uint8)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from skimage.morphology import skeletonize
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats, Image, Indices
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
 from snakewalk.controller.capture.image.thin_body_fit import THIN_PX, fitted
@@ -60,7 +60,7 @@ def no_skeleton(status: FrameStatus) -> Skeleton:
     return Skeleton(nan[:, :2].copy(), nan[:, 2].copy(), float("nan"), status)
 
 
-def skeleton_of(mask: NDArray[np.bool_]) -> Skeleton:
+def skeleton_of(mask: Bools) -> Skeleton:
     """Skeleton of a body given as a mask (H, W) of one component, holes of the image filled or not.
 
     Never raises on a mask: an empty, round, looped or branching one has a status other than
@@ -138,7 +138,7 @@ def skeleton_of_level(
     return Skeleton(points, radius, even.chord * SEGMENTS / step, FrameStatus.GOOD)
 
 
-def _width(mask: NDArray[np.bool_]) -> float | None:
+def _width(mask: Bools) -> float | None:
     """Width of a long body from area and outline, px: ``A = L w``, ``U = 2 (L + w)``."""
     contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
@@ -251,7 +251,7 @@ def _sample(image: NDArray[np.generic], points: Floats) -> Floats:
     return np.asarray(found, dtype=float).reshape(points.shape[:-1])
 
 
-def _largest(mask: NDArray[np.bool_]) -> NDArray[np.uint8] | None:
+def _largest(mask: Bools) -> Image | None:
     """(h, w) the largest part, 1 inside; None where there is nothing."""
     count, label, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     if count < 2:
@@ -260,7 +260,7 @@ def _largest(mask: NDArray[np.bool_]) -> NDArray[np.uint8] | None:
     return np.asarray(label == best, dtype=np.uint8)
 
 
-def _filled(solid: NDArray[np.uint8], hole_px: float) -> tuple[NDArray[np.uint8], bool]:
+def _filled(solid: Image, hole_px: float) -> tuple[Image, bool]:
     """Holes filled, and whether one was larger than ``hole_px``, so that the body encloses it."""
     count, label, stats, _ = cv2.connectedComponentsWithStats(1 - solid, connectivity=8)
     outside = label[0, 0]
@@ -269,7 +269,7 @@ def _filled(solid: NDArray[np.uint8], hole_px: float) -> tuple[NDArray[np.uint8]
     return (label != outside).astype(np.uint8), bool(looped)
 
 
-def _longest_path(thin: NDArray[np.bool_]) -> tuple[Floats, float] | None:
+def _longest_path(thin: Bools) -> tuple[Floats, float] | None:
     """The longest path between two ends (K, 2) x, y, and how far off it another part reaches."""
     rows, columns = np.nonzero(thin)
     if len(rows) < 3:
@@ -286,7 +286,7 @@ def _longest_path(thin: NDArray[np.bool_]) -> tuple[Floats, float] | None:
 
 
 def _paths_from(
-    rows: NDArray[np.intp], columns: NDArray[np.intp], shape: tuple[int, ...], start: list[int]
+    rows: Indices, columns: Indices, shape: tuple[int, ...], start: list[int]
 ) -> tuple[list[float], list[int]]:
     """Shortest paths over the pixels of a thin line from ``start``: lengths and predecessors."""
     wide = shape[1]

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Image
+from snakewalk.config.arrays import Bools, Image
 from snakewalk.controller.capture.frame_status import FrameStatus
 
 _MARGIN = 4
@@ -43,7 +43,7 @@ class Silhouette:
     status: FrameStatus
 
     @property
-    def mask(self) -> NDArray[np.bool_]:
+    def mask(self) -> Bools:
         """(h, w) the body."""
         return np.asarray(self.level > self.threshold)
 

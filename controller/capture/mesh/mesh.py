@@ -8,9 +8,8 @@ mirror at the ellipse's centre, as the text may be read, would put a seam along 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.controller.capture.mesh.body_model import BodyModel
 
 AROUND = 32
@@ -28,7 +27,7 @@ class Mesh:
     """(V, 3) unit length, outwards."""
     uv: Floats
     """(V, 2) place in the texture: along the body from the head, and across it from right (0)."""
-    faces: NDArray[np.int64]
+    faces: Ints
     """(F, 3) indices of vertices."""
 
 
@@ -93,7 +92,7 @@ def _round_tips(model: BodyModel, s: Floats) -> Floats:
     return np.asarray(np.sqrt(np.clip(1.0 - np.clip(1.0 - near, 0.0, 1.0) ** 2, 0.0, None)))
 
 
-def _faces(points: int, around: int) -> NDArray[np.int64]:
+def _faces(points: int, around: int) -> Ints:
     """Two triangles for each side between rings, and a fan at each tip."""
     k = np.arange(around)
     after = (k + 1) % around
@@ -106,7 +105,7 @@ def _faces(points: int, around: int) -> NDArray[np.int64]:
     return np.concatenate([sides, front, back]).astype(np.int64)
 
 
-def _normals(vertices: Floats, faces: NDArray[np.int64]) -> Floats:
+def _normals(vertices: Floats, faces: Ints) -> Floats:
     """Mean of the faces around each vertex, by area."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     face = np.cross(b - a, c - a)

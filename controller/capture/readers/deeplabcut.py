@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.keypoints import track_from_keypoints
 from snakewalk.controller.capture.track import Track
@@ -105,7 +104,7 @@ def _track(
     file: Path,
     columns: list[Column],
     values: Floats,
-    frame: NDArray[np.int64] | None,
+    frame: Ints | None,
     rate_hz: float | None,
     least_score: float | None,
 ) -> Track:

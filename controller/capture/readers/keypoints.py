@@ -3,9 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.track import Track, track_from_points
 
@@ -20,7 +19,7 @@ def track_from_keypoints(
     *,
     rate_hz: float | None,
     least_score: float,
-    frame: NDArray[np.int64] | None = None,
+    frame: Ints | None = None,
 ) -> Track:
     """Make a track of keypoints in the order of the file, head first.
 
