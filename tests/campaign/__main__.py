@@ -42,7 +42,7 @@ def main() -> None:
         text = given.doc.read_text(encoding="utf-8")
         head, tail = text.split(BEGIN)[0], text.split(END)[-1]
         given.doc.write_text(f"{head}{BEGIN}\n{shown}\n{END}{tail}", encoding="utf-8")
-    if whole.sins:
+    if whole.violations:
         raise SystemExit(1)
 
 

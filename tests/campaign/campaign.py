@@ -46,7 +46,7 @@ class Tally:
     complaints: list[str] = field(default_factory=list)
 
     @property
-    def sins(self) -> int:
+    def violations(self) -> int:
         """What must be zero."""
         values = (self.beyond_limit, self.too_fast, self.old, self.foreign, self.not_held)
         return sum(values) + self.too_long + self.unsafe_trips

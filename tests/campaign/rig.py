@@ -53,7 +53,7 @@ class Witness:
     complaints: list[str] = field(default_factory=list)
 
     @property
-    def sins(self) -> int:
+    def violations(self) -> int:
         """All of them."""
         return self.beyond_limit + self.too_fast + self.old + self.foreign + self.not_held
 

@@ -18,14 +18,14 @@ from .scenarios import KINDS, SCENARIOS
 def test_each_kind_of_fault(kind: str) -> None:
     whole, _ = campaign([((kind,), KINDS.index(kind))], cycles=80)
     assert whole.complaints == []
-    assert whole.sins == 0
+    assert whole.violations == 0
 
 
 def test_some_pairs_of_faults() -> None:
     pairs = [kinds for kinds in SCENARIOS if len(kinds) == 2][::14]
     whole, by_kind = campaign([(kinds, k) for k, kinds in enumerate(pairs)], cycles=60)
     assert whole.complaints == []
-    assert whole.sins == 0
+    assert whole.violations == 0
     assert whole.trips + whole.brought_back > 5
     assert whole.missing > 20
     assert len(by_kind) > 15
@@ -62,7 +62,7 @@ def test_the_witness_sees_old_foreign_and_changed_values() -> None:
     rig.restart()
     rig.line.clock.advance(0.02)
     good = rig.read()
-    assert rig.witness.sins == 0
+    assert rig.witness.violations == 0
     rig._cycle += 1
     rig._check_values(good, None)
     assert rig.witness.old == JOINTS
