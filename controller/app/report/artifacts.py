@@ -61,7 +61,7 @@ def build_report(record: RunRecord, out_dir: Path, film: Path | None = None) -> 
     numbers = write_summary(record, out_dir)
     film_on_page = "" if film is None else film_html(film, out_dir)
     require_extra("the report needs", "matplotlib")
-    from snakewalk.controller.app.report.figures.all import sections  # noqa: PLC0415  an extra
+    from snakewalk.controller.app.report.figures.sections import sections  # noqa: PLC0415  an extra
 
     header = record.header
     config = {

@@ -87,7 +87,7 @@ def sniff(
     ],
     baud: Annotated[int, typer.Option(help="of the device, bit/s")] = 1_000_000,
     model: Annotated[
-        str, typer.Option(help="of servos that no ping has told about; AX-12A: Protocol 1.0")
+        str, typer.Option(help="of servos whose model no ping has shown; AX-12A: Protocol 1.0")
     ] = "XM430-W350",
     through: Annotated[
         bool, typer.Option("--through", help="stand between a client and the device")

@@ -74,7 +74,7 @@ def show_file(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Show the actions of a repertoire: way, turn and closure error of a cycle."""
+    """Show the actions of a repertoire: speed, turn and closure error of a cycle."""
     from snakewalk.controller.repertoire.repertoire import load_repertoire  # noqa: PLC0415
 
     repertoire = load_repertoire(file)
@@ -126,7 +126,7 @@ def carry_out(
     if picture is not None:
         from snakewalk.controller.app.report.plots import repertoire as plots  # noqa: PLC0415
 
-        plots.draw_way(job, ran.finished.record, picture)
+        plots.draw_route(job, ran.finished.record, picture)
     return ran.facts() | {"log": str(log)} | artifacts.to_dict(), ran.complete
 
 

@@ -1,4 +1,4 @@
-"""The map: ground, path and waypoints, and the body on its way."""
+"""Map of a run: ground, path and waypoints, and the body at several times."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -115,10 +115,10 @@ def _bodies(axes: Axes, record: RunRecord) -> None:
     known = np.flatnonzero(np.isfinite(pose.links_m).all(axis=(1, 2)))
     if len(known) == 0:
         return
-    way_m = np.cumsum(np.hypot(*np.diff(pose.centre_m[known, :2], axis=0, prepend=[[0, 0]]).T))
-    way_m -= way_m[0]
-    count = 1 + max(1, int(way_m[-1] / (_BODY_SPACING * robot.length_m)))
-    chosen = known[np.searchsorted(way_m, np.linspace(0.0, way_m[-1], count))]
+    along_m = np.cumsum(np.hypot(*np.diff(pose.centre_m[known, :2], axis=0, prepend=[[0, 0]]).T))
+    along_m -= along_m[0]
+    count = 1 + max(1, int(along_m[-1] / (_BODY_SPACING * robot.length_m)))
+    chosen = known[np.searchsorted(along_m, np.linspace(0.0, along_m[-1], count))]
     for k, row in enumerate(chosen):
         strength = 0.25 + 0.6 * k / max(len(chosen) - 1, 1)
         outline = body_outline_m(pose.links_m[row, :, :2], robot.link_length_m, robot.body_radius_m)

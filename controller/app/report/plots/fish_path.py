@@ -1,4 +1,4 @@
-"""What synthesis made: segments in their own frame, what may follow what, and the new way."""
+"""A synthesised motion: segments in their own frame, the graph of pieces, and the new path."""
 
 from pathlib import Path
 
@@ -82,7 +82,7 @@ def _graph(axes: Axes, made: SynthesisedMotion) -> None:
 
 
 def _way(axes: Axes, made: SynthesisedMotion, options: SynthesisOptions) -> None:
-    """Bodies along the new way, joins as dots, control points as circles."""
+    """Bodies along the new path, joins as dots, control points as circles."""
     motion = made.motion
     points = motion.points()
     some = np.unique(np.linspace(0, motion.frames - 1, _BODIES).astype(int))

@@ -1,4 +1,4 @@
-"""Pictures: the ways of the actions, and a plan beside what the body did."""
+"""Pictures of a repertoire: the actions' displacements, and a planned route beside the real one."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ SHADES = ("0.6", "#2c6fbb", "#c0392b")
 
 
 def draw_actions(repertoire: Repertoire, path: Path) -> None:
-    """Draw two cycles of each action: way of the centre, body at the beginning and the end."""
+    """Draw two cycles of each action: track of the centre, body at the beginning and the end."""
     from matplotlib.figure import Figure  # noqa: PLC0415  an extra
 
     figure = Figure(figsize=(9.0, 0.95 * len(repertoire.segments)), layout="constrained")
@@ -26,12 +26,12 @@ def draw_actions(repertoire: Repertoire, path: Path) -> None:
         begin = Frame.flat(0.0, 0.0, 0.0)
         one = replay(segment, begin)
         two = replay(segment, one.end)
-        way = np.concatenate([one.origin_m, two.origin_m])
+        track = np.concatenate([one.origin_m, two.origin_m])
         first = begin.to_world_m(segment.link_m[-1])
         for shape, shade in zip((first, one.link_m[-1], two.link_m[-1]), SHADES, strict=True):
             axis.plot(shape[:, 0], shape[:, 1], color=shade, lw=2.5, solid_capstyle="round")
             axis.plot(*shape[0, :2], "o", color=shade, ms=5)
-        axis.plot(way[:, 0], way[:, 1], color="0.2", lw=0.9, ls=":")
+        axis.plot(track[:, 0], track[:, 1], color="0.2", lw=0.9, ls=":")
         turn = segment.turn_rad_s * segment.duration_s
         axis.set_title(
             f"{segment.name}: {segment.speed_m_s:.2f} m/s, {turn:+.2f} rad a cycle of "
@@ -44,7 +44,7 @@ def draw_actions(repertoire: Repertoire, path: Path) -> None:
     save_picture(figure, path, dpi=90)
 
 
-def draw_way(job: RepertoireRun, record: RunRecord, path: Path) -> None:
+def draw_route(job: RepertoireRun, record: RunRecord, path: Path) -> None:
     """Draw the route as planned, and where the centre of the body went."""
     from matplotlib.figure import Figure  # noqa: PLC0415  an extra
 
@@ -54,8 +54,8 @@ def draw_way(job: RepertoireRun, record: RunRecord, path: Path) -> None:
     planned = []
     for at, action in zip(pose, job.route.actions, strict=False):
         planned.append(replay(job.repertoire.segments[action], Frame.flat(*at)).origin_m)
-    way = np.concatenate(planned)
-    axis.plot(way[:, 0], way[:, 1], color=SHADES[1], lw=1.2, label="predicted, all actions")
+    track = np.concatenate(planned)
+    axis.plot(track[:, 0], track[:, 1], color=SHADES[1], lw=1.2, label="predicted, all actions")
     axis.plot(pose[:, 0], pose[:, 1], "o", color=SHADES[1], ms=4, label="ends of cycles")
     found = record.pose.centre_m
     label = "simulated, planned again each cycle" if job.replan else "simulated, without looking"

@@ -30,10 +30,10 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
     for panel, gait in zip(axes.flat, gaits, strict=False):
         for colour, robot in zip(_COLOURS, robots, strict=False):
             some = [r for r in rows if (r["gait"], r["robot"]) == (gait, robot) and r["cycles"]]
-            way = [pace(row) for row in some]
+            paces = [pace(row) for row in some]
             cost = [number(r, "cost_of_transport") for r in some]
-            panel.scatter(way, cost, s=9, color=colour, alpha=0.75, linewidths=0, label=robot)
-            for r, x, y in zip(some, way, cost, strict=True):
+            panel.scatter(paces, cost, s=9, color=colour, alpha=0.75, linewidths=0, label=robot)
+            for r, x, y in zip(some, paces, cost, strict=True):
                 if r["number"] == "0":
                     panel.scatter([x], [y], s=60, facecolors="none", edgecolors=colour)
         panel.set_title(gait, fontsize=10)
