@@ -5,13 +5,13 @@ shapes is made once for a recording and is not part of it; nor are imports.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.rows import Row, cpu_s
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
+from snakewalk.controller.walk.shape_filters import passes_all
 from snakewalk.controller.walk.synthesis import synthesise
 from snakewalk.controller.walk.walker import Walker
 
@@ -38,11 +38,8 @@ def run() -> list[Row]:
     law = SpeedLaw.printed(0.1)
     ground = GroundStep(world())
 
-    def usable(body_rad: NDArray[np.float64]) -> bool:
-        return not any(is_bad(body_rad[None])[0] for is_bad in prepared.shape_filters.values())
-
     def synthesis() -> object:
-        walker = Walker(shapes, prepared.run.walk, usable)
+        walker = Walker(shapes, prepared.run.walk, passes_all(prepared.shape_filters))
         plan = synthesise(
             walker.track, law, FRAMES, DT_S, segment_m, grow=lambda _: walker.decide(0.0, 0.0)
         )

@@ -53,8 +53,8 @@ class SpaceCurve:
             raise InputError("a backbone curve's points are finite, no two in a row the same")
         spline = CubicSpline(np.concatenate([[0.0], steps.cumsum()]), points)
         fine = np.linspace(0.0, spline.x[-1], 20 * len(points) + 2000)
-        way = np.linalg.norm(np.diff(spline(fine), axis=0), axis=1)
-        run = np.concatenate([[0.0], way.cumsum()])
+        steps = np.linalg.norm(np.diff(spline(fine), axis=0), axis=1)
+        run = np.concatenate([[0.0], steps.cumsum()])
         if run[-1] < robot.length_m * (1.0 - 1e-6):
             raise InputError(
                 f"the curve is {run[-1]:.3f} m long; robot {robot.name} has {robot.length_m:.3f} m"

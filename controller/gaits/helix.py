@@ -102,8 +102,8 @@ class _Helix(Gait):
     def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
         p = self.params
         hand = -1 if p.left_handed else 1
-        way = hand * (-1 if p.backward else 1) * (-1 if self.inside else 1)
-        return helix_joints_rad(robot, way * phase_rad, self._radius_m(), p.rise_rad, hand)
+        direction = hand * (-1 if p.backward else 1) * (-1 if self.inside else 1)
+        return helix_joints_rad(robot, direction * phase_rad, self._radius_m(), p.rise_rad, hand)
 
     def advance_m(self) -> float:
         """Along the axis in a cycle, without slip: ``2 pi r cos g``."""

@@ -46,7 +46,7 @@ class SpineParameters(GaitParameters):
 def spine_bends_rad(
     phase_rad: Floats, joints: int, p: SpineParameters, edges: Floats | None = None
 ) -> Floats:
-    """(T, joints) bends of a chain of ``joints + 1`` links laid along the spine at phases (T,).
+    """(T, joints) bends of a chain of ``joints + 1`` links along the spine at phases (T,).
 
     The spine ``y(u)``, u from 0 at the head to 2 pi, is divided into parts of equal arc length (or
     at the shares ``edges`` of it) before its headings are read: they are those of rigid links, not

@@ -1,6 +1,6 @@
 """The head's pose from an overhead camera, carried from frame to frame by dead reckoning.
 
-A frame says where the body was when it was taken; what the joints have done since then is added
+A frame shows where the body was when it was taken; the joints' motion since then is added
 by dead reckoning. So the pose is a frame that drifts, placed anew in the world at each image.
 """
 
@@ -22,7 +22,7 @@ from snakewalk.drivers.types import BodyPose, JointState
 MISFIT = 0.5
 """Largest error of a fit that is used, in lengths of a link."""
 DECISIVE = 0.25
-"""Of the worse fit's error: a fit this much better says alone which end is the head."""
+"""Share of the worse fit's error: a fit this much better decides alone which end is the head."""
 GAP_S = 0.2
 """A longer time without a frame that can be used is reported."""
 HISTORY_S = 2.0

@@ -81,7 +81,7 @@ def _along(line_m: Floats, arc: Floats, at: Floats) -> tuple[Floats, Floats]:
 def _shift_along(
     links: Floats, ahead: Floats, away: Floats, weight: Floats, shifted_m: float
 ) -> float:
-    """How much further along the line the links lie, if the body's bends tell.
+    """How much further along the line the links lie, where the body's bends show it.
 
     One step of least squares for slide, shift and turn together; tips that are lost or stick out
     move the middle by a few millimetres, and a straight body leaves it there.

@@ -2,7 +2,7 @@
 
 The ground step places the links' middle line on the ground; pitch goals then bring the link centres
 as near to it as the robot can. A robot without pitch joints can only tilt as a whole, and the
-residual says how badly it lies.
+residual is the misfit.
 """
 
 from dataclasses import dataclass

@@ -182,9 +182,9 @@ def _remaining_s(
     """(n,) estimate of the remaining time, s."""
     which = np.minimum(count, len(goals) - 1)
     to = goals[which] - pose[:, :2]
-    way = np.hypot(to[:, 0], to[:, 1])
+    distance = np.hypot(to[:, 0], to[:, 1])
     off = np.arctan2(to[:, 1], to[:, 0]) - pose[:, 2] - primitives.course_rad
-    left = (np.maximum(way - radius_m, 0.0) + after[which]) / primitives.speed_m_s
+    left = (np.maximum(distance - radius_m, 0.0) + after[which]) / primitives.speed_m_s
     return np.where(
         count >= len(goals), 0.0, left + 0.5 * np.abs(wrap(off)) / primitives.turn_rad_s
     )

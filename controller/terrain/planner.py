@@ -98,7 +98,7 @@ class TerrainPlanner:
         )
 
     def _unsafe(self, path: SplinePath, start: Floats, relief: Relief) -> Floats:
-        """Arc lengths where a path is on unsafe ground, past the way out of a bad start."""
+        """Arc lengths where a path is on unsafe ground, after it has left an unsafe start."""
         s = np.linspace(0.0, path.length_m, max(2, int(path.length_m / _CHECK_STEP_M) + 1))
         safe = relief.safe(*path.position(s).T)
         if not relief.safe(*start):

@@ -88,7 +88,7 @@ def test_a_hidden_tail_does_not_pull_a_bent_body_back() -> None:
 
 
 @dataclass
-class Scene:
+class ScriptedCamera:
     """A camera that hands over a list of frames, each ``delay_s`` after it was taken."""
 
     frames: list[LineDetection]
@@ -116,9 +116,11 @@ def detection(time_s: float, pose: BodyPose, bend: np.ndarray) -> LineDetection:
     return LineDetection(time_s, line[::-1].copy(), FrameStatus.GOOD)
 
 
-def believer(scene: Scene, said: list[str], start=(0.0, 0.0), heading=0.0) -> CameraPose:
+def camera_pose(
+    camera: ScriptedCamera, said: list[str], start=(0.0, 0.0), heading=0.0
+) -> CameraPose:
     friction = FrictionConfig()
-    return CameraPose(ROBOT, scene, DeadReckoning(ROBOT, friction, start, heading), said.append)
+    return CameraPose(ROBOT, camera, DeadReckoning(ROBOT, friction, start, heading), said.append)
 
 
 def test_a_late_frame_is_laid_to_the_joints_of_its_own_time() -> None:
@@ -127,7 +129,7 @@ def test_a_late_frame_is_laid_to_the_joints_of_its_own_time() -> None:
     states = [state_at(0.02 * k, wave(0.4, 0.08 * k)) for k in range(60)]
     true = [reckoning(state) for state in states]
     frames = [detection(states[k].time_s, true[k], states[k].position_rad) for k in range(0, 60, 3)]
-    pose = believer(Scene(frames), [], start=(0.5, -0.5), heading=0.8)
+    pose = camera_pose(ScriptedCamera(frames), [], start=(0.5, -0.5), heading=0.8)
     for state, truth in zip(states, true, strict=True):
         found = pose(state)
         np.testing.assert_allclose(found.head_in_world_m[:2], truth.head_in_world_m[:2], atol=0.004)
@@ -139,7 +141,7 @@ def test_a_late_frame_is_laid_to_the_joints_of_its_own_time() -> None:
 def test_a_body_laid_straight_has_its_head_where_the_run_says() -> None:
     straight = np.zeros(16)
     truth = pose_at(np.array([0.1, 0.05]), 0.1)
-    pose = believer(Scene([detection(0.0, truth, straight)]), [])
+    pose = camera_pose(ScriptedCamera([detection(0.0, truth, straight)]), [])
     found = pose(state_at(0.0, straight))
     np.testing.assert_allclose(found.head_in_world_m[:2], (0.1, 0.05), atol=1e-3)
     assert turn_between(found.heading_rad, 0.1) < 1e-3
@@ -148,7 +150,7 @@ def test_a_body_laid_straight_has_its_head_where_the_run_says() -> None:
 def test_a_body_laid_the_wrong_way_round_is_found_at_its_first_bend() -> None:
     bend = np.where(NUMBER < 8, 0.25, 0.0)
     truth = pose_at(np.array([-1.1, 0.0]), 3.0)
-    pose = believer(Scene([detection(0.0, truth, bend)]), [])
+    pose = camera_pose(ScriptedCamera([detection(0.0, truth, bend)]), [])
     found = pose(state_at(0.0, bend))
     np.testing.assert_allclose(found.head_in_world_m[:2], (-1.1, 0.0), atol=4e-3)
 
@@ -161,7 +163,7 @@ def test_frames_that_cannot_be_used_are_bridged_and_told() -> None:
     frames += [LineDetection(k / 30.0, nothing, FrameStatus.CUT) for k in range(1, 20)]
     frames += [detection(k / 30.0, truth, bend) for k in range(20, 30)]
     said: list[str] = []
-    pose = believer(Scene(frames, start=frames[0]), said, heading=0.4)
+    pose = camera_pose(ScriptedCamera(frames, start=frames[0]), said, heading=0.4)
     for k in range(50):
         found = pose(state_at(0.02 * k, bend))
         np.testing.assert_allclose(found.head_in_world_m[:2], (0.3, 0.3), atol=1e-3)
@@ -177,7 +179,7 @@ def test_something_else_than_the_robot_is_not_believed() -> None:
     good = detection(0.0, truth, bend)
     stick = replace(good, time_s=0.1, line_m=np.linspace((1.0, 1.0), (1.0, 2.2), 101))
     said: list[str] = []
-    pose = believer(Scene([good, stick]), said)
+    pose = camera_pose(ScriptedCamera([good, stick]), said)
     for k in range(30):
         found = pose(state_at(0.02 * k, bend))
     np.testing.assert_allclose(found.head_in_world_m[:2], (0.0, 0.0), atol=1e-3)

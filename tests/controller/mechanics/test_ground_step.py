@@ -41,36 +41,36 @@ def test_segment_lengths_are_exact_and_every_point_touches(
     seed: int, height_m: float, turn: float, known: str
 ) -> None:
     ground = rough(seed, height_m)  # up to 80 degrees
-    laid = GroundStep(ground).place(WAVE + turn, (0.1, -0.2), R, TAPERED, known)
-    lengths = np.linalg.norm(np.diff(laid.points_m, axis=0), axis=1)
+    placed = GroundStep(ground).place(WAVE + turn, (0.1, -0.2), R, TAPERED, known)
+    lengths = np.linalg.norm(np.diff(placed.points_m, axis=0), axis=1)
     np.testing.assert_allclose(lengths, R, rtol=1e-12)
-    lifted = ground.elevation_m(laid.points_m[:, 0], laid.points_m[:, 1]) + TAPERED
-    np.testing.assert_allclose(laid.points_m[:, 2], lifted, atol=1e-9 * R)
-    np.testing.assert_allclose(laid.gap_m, 0.0, atol=1e-9 * R)
+    lifted = ground.elevation_m(placed.points_m[:, 0], placed.points_m[:, 1]) + TAPERED
+    np.testing.assert_allclose(placed.points_m[:, 2], lifted, atol=1e-9 * R)
+    np.testing.assert_allclose(placed.gap_m, 0.0, atol=1e-9 * R)
 
 
 def test_segments_keep_their_heading_and_say_their_pitch() -> None:
-    laid = GroundStep(rough(3, 0.04)).place(WAVE, (0.0, 0.0), R, TAPERED)
-    step = laid.points_m[:-1] - laid.points_m[1:]
+    placed = GroundStep(rough(3, 0.04)).place(WAVE, (0.0, 0.0), R, TAPERED)
+    step = placed.points_m[:-1] - placed.points_m[1:]
     np.testing.assert_allclose(np.arctan2(step[:, 1], step[:, 0]), WAVE, atol=1e-9)
-    np.testing.assert_allclose(np.arcsin(step[:, 2] / R), laid.pitch_rad, atol=1e-9)
-    assert laid.steepest_rad == np.abs(laid.pitch_rad).max() > 0.1
+    np.testing.assert_allclose(np.arcsin(step[:, 2] / R), placed.pitch_rad, atol=1e-9)
+    assert placed.steepest_rad == np.abs(placed.pitch_rad).max() > 0.1
 
 
 @given(st.floats(-1.2, 1.2), st.floats(-4, 4))
 def test_on_an_incline_the_pitch_is_the_slope_in_the_direction_of_travel(
     incline: float, heading: float
 ) -> None:
-    laid = GroundStep(slope(incline)).place(np.full(20, heading), (0.0, 0.0), 0.05, 0.03)
+    placed = GroundStep(slope(incline)).place(np.full(20, heading), (0.0, 0.0), 0.05, 0.03)
     expected = np.arctan(np.tan(incline) * np.cos(heading))
-    np.testing.assert_allclose(laid.pitch_rad, expected, atol=1e-8)
+    np.testing.assert_allclose(placed.pitch_rad, expected, atol=1e-8)
 
 
 def test_on_a_level_floor_a_tapered_body_tilts_by_its_taper_alone() -> None:
     half = np.linspace(0.03, 0.01, 101)  # thick at the head
-    laid = GroundStep(None).place(WAVE, (0.0, 0.0), R, half)
-    np.testing.assert_allclose(laid.points_m[:, 2], half, atol=1e-12)
-    np.testing.assert_allclose(laid.pitch_rad, np.arcsin(0.0002 / R), rtol=1e-9)
+    placed = GroundStep(None).place(WAVE, (0.0, 0.0), R, half)
+    np.testing.assert_allclose(placed.points_m[:, 2], half, atol=1e-12)
+    np.testing.assert_allclose(placed.pitch_rad, np.arcsin(0.0002 / R), rtol=1e-9)
 
 
 def test_tail_first_and_head_first_give_the_same_body() -> None:
@@ -95,30 +95,30 @@ def test_a_cliff_is_climbed_and_a_body_hangs_over_the_next() -> None:
     z = np.zeros((4, 41))
     z[:, 20:28] = 0.5  # a block with faces of 0.1 m, steeper than 78 degrees
     ground = HeightField(z, 0.1, -2.0, -0.2)
-    laid = GroundStep(ground).place(np.zeros(30), (-0.6, 0.0), 0.08, 0.0)
-    np.testing.assert_allclose(np.linalg.norm(np.diff(laid.points_m, axis=0), axis=1), 0.08)
-    np.testing.assert_allclose(laid.gap_m, 0.0, atol=1e-9)
-    assert laid.points_m[:, 2].max() == pytest.approx(0.5)
-    assert laid.points_m[0, 2] == pytest.approx(0.0, abs=1e-9)
+    placed = GroundStep(ground).place(np.zeros(30), (-0.6, 0.0), 0.08, 0.0)
+    np.testing.assert_allclose(np.linalg.norm(np.diff(placed.points_m, axis=0), axis=1), 0.08)
+    np.testing.assert_allclose(placed.gap_m, 0.0, atol=1e-9)
+    assert placed.points_m[:, 2].max() == pytest.approx(0.5)
+    assert placed.points_m[0, 2] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_taper_steeper_than_the_half_circle_stands_upright_and_says_so() -> None:
     half = np.zeros(4)
     half[1] = 0.5
-    for laid in (
+    for placed in (
         GroundStep(None).place(np.zeros(3), (0.0, 0.0), 0.1, half),
         GroundStep(None).place(np.zeros((2, 3)), (0.0, 0.0), 0.1, half),
     ):
         # the third point reaches 0.1 of 0.5; the head then comes down to the floor, in reach
-        gap = np.atleast_2d(laid.gap_m)[0]
+        gap = np.atleast_2d(placed.gap_m)[0]
         np.testing.assert_allclose(gap, [0.0, -0.4, 0.0, 0.0], atol=1e-12)
-        assert np.atleast_2d(laid.pitch_rad)[0, 1] == pytest.approx(np.pi / 2)
+        assert np.atleast_2d(placed.pitch_rad)[0, 1] == pytest.approx(np.pi / 2)
 
 
 def test_beyond_the_border_the_edge_goes_on_level() -> None:
-    laid = GroundStep(slope(0.3)).place(np.zeros(50), (4.0, 0.0), 0.1, 0.0)
-    assert laid.points_m[0, 0] > 5.5
-    np.testing.assert_allclose(laid.pitch_rad[:20], 0.0, atol=1e-8)
+    placed = GroundStep(slope(0.3)).place(np.zeros(50), (4.0, 0.0), 0.1, 0.0)
+    assert placed.points_m[0, 0] > 5.5
+    np.testing.assert_allclose(placed.pitch_rad[:20], 0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize("plane", [ground_step._plane, ground_step._plane.py_func])

@@ -137,8 +137,8 @@ def test_a_walk_of_states_feeds_it_and_the_ground_carries_it() -> None:
     shapes = embedded("worm-like").angles_rad
     walker = Walker(shapes - shapes.mean(axis=1, keepdims=True), WalkConfig())
     run = synthesise(walker.track, LAW, 80, DT, R, lambda _: walker.decide(0.0, 0.0))
-    laid = GroundStep(None).place(run.angles_rad, run.points_m[:, -1], R, 0.03)
-    np.testing.assert_allclose(laid.points_m[..., :2], run.points_m, atol=1e-9)
+    placed = GroundStep(None).place(run.angles_rad, run.points_m[:, -1], R, 0.03)
+    np.testing.assert_allclose(placed.points_m[..., :2], run.points_m, atol=1e-9)
 
 
 def test_states_are_chosen_by_their_waves() -> None:

@@ -239,9 +239,9 @@ def test_the_robot_s_profile_is_the_look_s_skin() -> None:
 def test_the_robot_s_profile_is_the_ground_step_s_heights() -> None:
     robot = load_robot("yaw16").model_copy(update={"body_profile": PROFILE})
     half = half_heights_m(robot, 51)
-    laid = GroundStep(None).place(np.zeros(51), (0.0, 0.0), robot.length_m / 51, half)
-    np.testing.assert_allclose(laid.points_m[:, 2], half, atol=1e-9)
-    steps = np.linalg.norm(np.diff(laid.points_m, axis=0), axis=1)
+    placed = GroundStep(None).place(np.zeros(51), (0.0, 0.0), robot.length_m / 51, half)
+    np.testing.assert_allclose(placed.points_m[:, 2], half, atol=1e-9)
+    steps = np.linalg.norm(np.diff(placed.points_m, axis=0), axis=1)
     np.testing.assert_allclose(steps, robot.length_m / 51, rtol=1e-9)
 
 
