@@ -55,6 +55,24 @@ def test_group_reads_and_writes_run_over_all_models(code: int) -> None:
         assert [int.from_bytes(a.params, "little") for a in answers] == shown.tolist()
 
 
+@pytest.mark.parametrize(("servo", "model"), [(2, "XL430-W250"), (5, "XL330-M288")])
+def test_each_servo_has_the_control_table_of_its_model(servo: int, model: str) -> None:
+    alone = bench_line(parse_chain(f"{servo}:{model}"))
+    (mixed,) = ask(koch(), servo, Instruction.READ, bytes((0, 0, 147, 0)))
+    (single,) = ask(alone, servo, Instruction.READ, bytes((0, 0, 147, 0)))
+    assert mixed == single
+
+
+@pytest.mark.parametrize("servo", [1, 2, 3])
+def test_indirect_data_of_one_servo_leaves_the_others_alone(servo: int) -> None:
+    line = koch()
+    assert write(line, servo, 168, 65, 2) == 0  # Indirect Address 1 points at the LED
+    assert write(line, servo, 224, 1, 1) == 0
+    assert line.bank["LED"].tolist() == [int(each == servo) for each in range(1, 7)]
+    (status,) = ask(line, servo, Instruction.READ, bytes((224, 0, 1, 0)))
+    assert status.params == b"\x01"
+
+
 def test_wrong_chains_are_refused() -> None:
     with pytest.raises(InputError, match="names no model"):
         parse_chain("1-2:,3:XL330-M288")
