@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,8 +48,7 @@ _SETTLE_S = 0.3
 _LATCHED = suppress(SafetyTrippedError)
 
 
-@dataclass(frozen=True, slots=True)
-class Progress:
+class Progress(NamedTuple):
     """State of a run after the command of a cycle has been sent."""
 
     time_s: float

@@ -95,9 +95,8 @@ class Pilot:
         self._time_law = time_law
         self._pace = pace
         self._goal_rad = time_law.goal_rad()
-        self._speed_rad_s = np.zeros(len(self._goal_rad))
-        self._gain_rad_s2 = np.zeros(len(self._goal_rad))
-        self._last_s = self._saved_s = 0.0
+        self._last_rad = self._earlier_rad = self._goal_rad
+        self._last_s = self._earlier_s = self._saved_s = 0.0
         self._plan = plan
         self._pitch_fitter = pitch_fitter
         self._fall_back = fall_back or (lambda lost: None)
@@ -155,7 +154,12 @@ class Pilot:
 
     def velocity_rad_s(self) -> Floats:
         """(J,) from the last steps: the speed of half a step ago, carried on by its change."""
-        return np.asarray(self._speed_rad_s + 0.5 * self._last_s * self._gain_rad_s2)
+        if self._last_s == 0.0:
+            return np.zeros(len(self._goal_rad))
+        speed = (self._goal_rad - self._last_rad) / self._last_s
+        before = (self._last_rad - self._earlier_rad) / (self._earlier_s or 1.0)
+        gain_rad_s2 = (speed - before) / (0.5 * (self._last_s + self._earlier_s))
+        return np.asarray(speed + 0.5 * self._last_s * gain_rad_s2)
 
     def pace(self) -> Pace:
         """The robot's limits: what comes next is not known."""
@@ -164,6 +168,7 @@ class Pilot:
     def begin(self, view: BodyView) -> Floats:
         """Fit the first shape to the ground under the body; returns the first targets (J,)."""
         self._goal_rad = self._on_ground(self._time_law.goal_rad(), 0.0, view)
+        self._last_rad = self._earlier_rad = self._goal_rad
         return self._goal_rad
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
@@ -173,10 +178,8 @@ class Pilot:
             return self._goal_rad
         dt_s, self._saved_s = self._saved_s, 0.0
         goal = self._steer(dt_s, view)
-        speed = (goal - self._goal_rad) / dt_s
-        between_s = 0.5 * (dt_s + self._last_s)
-        self._gain_rad_s2 = (speed - self._speed_rad_s) / between_s
-        self._goal_rad, self._speed_rad_s, self._last_s = goal, speed, dt_s
+        self._earlier_rad, self._last_rad, self._goal_rad = self._last_rad, self._goal_rad, goal
+        self._earlier_s, self._last_s = self._last_s, dt_s
         return goal
 
     def _steer(self, dt_s: float, view: BodyView) -> Floats:
