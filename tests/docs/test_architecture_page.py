@@ -14,7 +14,7 @@ LONGEST = {
     "From a shape's coefficients to a joint goal": 12,
     "From radians to bytes": 8,
     "From bytes to radians": 8,
-    "A servo's fault, from its cause to the report": 12,
+    "A servo's fault, from its cause to the report": 10,
     "`snakewalk run`, from the command to the loop": 15,
 }
 
@@ -60,6 +60,11 @@ def test_a_way_of_data_is_short_and_true(heading: str) -> None:
         if not (ROOT / file).is_file() or name not in names_in(ROOT / file)
     ]
     assert wrong == []
+
+
+def test_every_file_named_on_the_page_exists() -> None:
+    named = re.findall(r"`((?:config|drivers|sim|controller|tests)/[\w/]+\.py)`", PAGE)
+    assert [file for file in named if not (ROOT / file).is_file()] == []
 
 
 def test_no_way_is_left_unchecked() -> None:
