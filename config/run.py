@@ -10,7 +10,7 @@ from snakewalk.config.gait import GaitConfig
 from snakewalk.config.playback import PlaybackConfig
 
 MotionName = Literal[
-    "walk", "walk-printed", "walk-blind", "serpenoid", "gait", "playback", "repertoire"
+    "walk", "walk-printed", "walk-blind", "serpenoid", "gait", "playback", "repertoire", "source"
 ]
 
 
@@ -72,9 +72,11 @@ class RunConfig(Strict):
     robot: str = Field("yaw16", description="a shipped robot's name or a TOML path")
     world: str = Field("flat", description="a shipped world's name or a TOML path")
     track: str = Field("worm-like", description="a shipped recording's name or a file")
-    motion: MotionName = "walk"
+    motion: MotionName = Field(
+        "walk", description="source: a motion source of your own, run by `prepare_source`"
+    )
     waypoints_m: tuple[tuple[float, float], ...] = Field(
-        (), description="in order; every motion but a gait needs one"
+        (), description="in order; gait, playback and source need none"
     )
     start_m: tuple[float, float] = Field((0.0, 0.0), description="where the head starts")
     start_heading_rad: float | None = Field(None, description="default: towards the path")
@@ -98,6 +100,6 @@ class RunConfig(Strict):
     def _motion_has_its_table(self) -> Self:
         if self.motion == "gait" and self.gait is None:
             raise ValueError("motion gait needs a table [gait] with its name")
-        if self.motion not in {"gait", "playback"} and not self.waypoints_m:
+        if self.motion not in {"gait", "playback", "source"} and not self.waypoints_m:
             raise ValueError("waypoints_m: at least one is needed")
         return self

@@ -1,58 +1,58 @@
-"""Move the joints by a motion source of your own, on simulated servos.
+"""Move the body by a motion source of your own: over the physics, or on servos.
 
-python examples/own_motion.py --angle 0.8
+python examples/own_motion.py --amplitude 0.3
+python examples/own_motion.py --port /dev/ttyUSB0 --out runs/own
 """
 
 import argparse
+import tempfile
+from pathlib import Path
 
 import numpy as np
 
 import snakewalk as sw
 
 
-class Nod:
-    """Bends the middle joint and straightens it again; implements ``MotionSource``."""
+class Wave:
+    """A wave that travels along the body, faster and faster in the first second."""
 
-    needs, done = sw.Needs(yaw=True), False
+    needs, done = sw.Needs(yaw=True, wheels=True), False
 
-    def __init__(self, robot: sw.RobotConfig, angle_rad: float) -> None:
-        self._bend_rad: np.ndarray = np.eye(robot.joint_count)[7] * angle_rad
-        self._rate = robot.joint_speed_limit_rad_s / abs(angle_rad)  # half of the limit is used
-        self._time_s = 0.0
+    def __init__(self, robot: sw.RobotConfig, amplitude_rad: float, rate_rad_s: float) -> None:
+        self._phase_rad = -2.0 * np.pi * np.arange(robot.joint_count) / robot.joint_count
+        self._amplitude, self._rate_max, self._rate = amplitude_rad, rate_rad_s, 0.0
 
     def goal_rad(self) -> np.ndarray:
-        return np.asarray(self._bend_rad * 0.5 * (1.0 - np.cos(self._rate * self._time_s)))
+        return np.asarray(self._amplitude * np.sin(self._phase_rad))
 
     def velocity_rad_s(self) -> np.ndarray:
-        return np.asarray(self._bend_rad * 0.5 * self._rate * np.sin(self._rate * self._time_s))
+        return np.asarray(self._amplitude * self._rate * np.cos(self._phase_rad))
 
     def pace(self) -> sw.Pace:
-        fastest = 0.5 * np.abs(self._bend_rad) * self._rate
-        return sw.Pace(fastest, fastest * self._rate)
+        fastest = np.full(len(self._phase_rad), self._amplitude * self._rate_max)
+        return sw.Pace(fastest, fastest * (self._rate_max + 1.0))
 
     def step(self, dt_s: float, view: sw.BodyView) -> np.ndarray:
-        self._time_s = min(self._time_s + dt_s, 2.0 * np.pi / self._rate)
-        self.done = self._rate * self._time_s >= 2.0 * np.pi
+        self._rate = min(self._rate + self._rate_max * dt_s, self._rate_max)
+        self._phase_rad = self._phase_rad + self._rate * dt_s
         return self.goal_rad()
 
 
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--angle", type=float, default=0.6, help="rad")
-    angle_rad = options.parse_args().angle
-    robot, bus = sw.load_robot("yaw16"), sw.ServoBus("1-16")
-    chain = sw.ServoChain(sw.DynamixelBus(bus.line), robot)
-    source: sw.MotionSource = Nod(robot, angle_rad)
-    head = sw.BodyPose(0.0, np.zeros(3), np.eye(3))  # on a bench nothing measures it
-    limits = sw.SafetyLimits.from_config(robot, sw.SafetyConfig())
-    with sw.SafeLink(chain, limits, chain.clock) as link:
-        link.enable()
-        for _ in sw.ticks(chain.clock, period_s=0.02, until_s=60.0):
-            view = sw.body_in_world(robot, head, link.read().position_rad)
-            link.write(sw.JointCommand(chain.clock.now_s(), source.step(0.02, view)))
-            if source.done:
-                break
-    print(f"joint 8 bent by {angle_rad} rad and back, {chain.clock.now_s():.2f} s in simulation")
+    options.add_argument("--amplitude", type=float, default=0.4, help="rad")
+    options.add_argument("--port", help="of the servos; without it, the simulator")
+    options.add_argument("--out", type=Path, help="folder of the log; without it, a temporary one")
+    given = options.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            prepared = sw.prepare_source(lambda robot: Wave(robot, given.amplitude, 3.0), seconds=8)
+            finished = sw.execute(prepared, given.out or Path(folder), given.port)
+        except sw.InputError as error:  # nothing has moved yet
+            raise SystemExit(str(error)) from None
+    print(f"the body went {finished.summary.travelled_m:.2f} m in {finished.summary.cycles} cycles")
+    if given.out:
+        print(f"snakewalk report {finished.log}")
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.runs.gait_run import GaitRun, MakeOperator
 from snakewalk.controller.app.runs.playback_run import PlaybackRun
 from snakewalk.controller.app.runs.prepared_run import PreparedRun
+from snakewalk.controller.app.runs.source_run import MakeSource, SourceRun
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.capture.readers.load import track_beside
 from snakewalk.controller.gaits.gait import Gait
@@ -29,7 +30,7 @@ from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.drivers.bus.budget import chain_budget
 
 GAIT_PITCH_CURRENT_A = 1.5
-"""Goal current of the pitch joints in a gait that lifts: soft ones would not carry the links."""
+"""Goal current of the pitch joints in a motion that lifts: soft ones would not carry the links."""
 
 
 def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
@@ -45,6 +46,11 @@ def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Prepa
         return PlaybackRun(run, robot, world)
     if run.motion == "repertoire":
         raise InputError(f"run {run.name}: made again by: snakewalk repertoire run PLAN")
+    if run.motion == "source":
+        raise InputError(
+            f"run {run.name}: its motion was the user's own, which no configuration holds; its "
+            "goals are sent again by: snakewalk replay LOG; a new run is made by prepare_source"
+        )
     if not run.waypoints_m:
         raise InputError(f"run {run.name}: a {run.motion} needs waypoints")
     return WalkRun(run, robot, world)
@@ -67,6 +73,8 @@ def prepare_walk(name: str, **changes: object) -> WalkRun:
         raise InputError(f"run {run.name}: a gait is run by: snakewalk gait run NAME")
     if run.motion == "repertoire":
         raise InputError(f"run {run.name}: planned by: snakewalk plan --with repertoire")
+    if run.motion == "source":
+        raise InputError(f"run {run.name}: a source of your own is run by prepare_source")
     robot = load_robot(run.robot, beside)
     _check_wire(run, robot)
     return WalkRun(run, robot, load_world(run.world, beside))
@@ -131,7 +139,9 @@ def prepare_gait(
         "command line",
     )
     _check_wire(run, body)
-    return GaitRun(run, _with_gait_gains(body, gaits), load_world(run.world), make_operator)
+    soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
+    body = _with_gains(body, pitch=pitch, soft=soft)
+    return GaitRun(run, body, load_world(run.world), make_operator)
 
 
 def prepare_playback(
@@ -160,6 +170,41 @@ def prepare_playback(
     return replace(prepared, run=run.model_copy(update=limit))
 
 
+def prepare_source(
+    make: MakeSource,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    seconds: float = 20.0,
+    seed: int = 0,
+    name: str = "source",
+) -> SourceRun:
+    """Prepare a run of your own motion source, of at most ``seconds``; it ends earlier when done.
+
+    ``make`` takes the robot and returns a fresh source at each call: one is stepped on paper before
+    torque is on, another one in the run.
+
+    Raises:
+        InputError: the robot lacks joints that the source needs, or its cycle does not fit the
+            wire; limits of the joints are checked by ``execute``.
+
+    """
+    body = load_robot(robot or "yaw16")
+    needs = make(body).needs
+    needs.check(body, "the motion source")
+    fields = {
+        "name": name,
+        "robot": body.name,
+        "world": world or "flat",
+        "motion": "source",
+        "seed": seed,
+        "time_limit_s": seconds,
+    }
+    run = checked(RunConfig, fields, "prepare_source")
+    _check_wire(run, body)
+    return SourceRun(run, _with_gains(body, pitch=needs.pitch), load_world(run.world), make)
+
+
 def _check_wire(run: RunConfig, robot: RobotConfig) -> None:
     """Refuse a cycle that takes longer on the wire than its period.
 
@@ -185,14 +230,13 @@ def _gait_by_name(
     return make_gait(known.gait, dict(known.parameters) | (parameters or {})), known
 
 
-def _with_gait_gains(robot: RobotConfig, gaits: Sequence[Gait]) -> RobotConfig:
-    """Set the servos up for gaits: pitch joints that carry links, all softer where a gait asks."""
+def _with_gains(robot: RobotConfig, *, pitch: bool, soft: Sequence[int] = ()) -> RobotConfig:
+    """Set the servos up: pitch joints that carry links, all as soft as the least of ``soft``."""
     servo = robot.servo
     changes: dict[str, float] = {}
-    if any(gait.needs.pitch for gait in gaits):
+    if pitch:
         changes["pitch_p_gain"] = max(servo.pitch_p_gain, servo.position_p_gain)
         changes["pitch_current_limit_a"] = max(servo.pitch_current_limit_a, GAIT_PITCH_CURRENT_A)
-    soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
     if soft:
         changes["position_p_gain"] = changes["pitch_p_gain"] = min(soft)
     return robot.model_copy(update={"servo": servo.model_copy(update=changes)})

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
+from snakewalk.controller.app.runs import repertoire_run
 from snakewalk.controller.app.runs.backend import Backend, simulated
 from snakewalk.controller.app.runs.factory import prepare_run
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.metrics.comparison import Comparison, compare
-from snakewalk.controller.runlog.record import InitialPose, RunRecord
+from snakewalk.controller.runlog.record import Header, InitialPose, RunRecord
 from snakewalk.controller.runlog.writer import RunLog, VerdictKind
 from snakewalk.drivers.types import BodyPose, JointCommand
 
@@ -134,10 +135,19 @@ def _backend(record: RunRecord) -> Backend:
     header = record.header
     initial_pose = header.initial_pose
     if initial_pose is None:
-        prepared = prepare_run(header.run, header.robot, header.world)
         first = record.cycle.measured_rad[0]
         known = first if np.isfinite(first).all() else np.zeros(header.robot.joint_count)
-        initial_pose = InitialPose(prepared.start_heading_rad, known)
+        initial_pose = InitialPose(_start_heading_rad(header), known)
     return simulated(
         header.run, header.robot, header.world, build_ground(header.world), initial_pose
     )
+
+
+def _start_heading_rad(header: Header) -> float:
+    """Mean heading of a run on servos, also where its log alone does not hold the whole motion."""
+    run = header.run
+    if run.motion == "source":
+        return run.start_heading_rad or 0.0
+    if run.motion == "repertoire":
+        return repertoire_run.start_heading_rad(run)
+    return prepare_run(run, header.robot, header.world).start_heading_rad
