@@ -21,7 +21,7 @@ class _Lasting(_Fault):
     for_s: float | None = Field(None, gt=0.0, description="how long; not given: to the end")
 
 
-class Noise(_Lasting):
+class NoiseFault(_Lasting):
     """Packets that a bad cable or a busy host changes; each packet has ``chance``."""
 
     kind: Literal["drop", "corrupt", "truncate", "duplicate", "delay", "late"]
@@ -42,14 +42,14 @@ class Noise(_Lasting):
         return self
 
 
-class Servo(_Lasting):
+class ServoFault(_Lasting):
     """Servos that fall silent, jam, lose their supply, or share an ID."""
 
     kind: Literal["mute", "stuck", "brown_out"]
     ids: tuple[ServoId, ...] = Field(min_length=1)
 
 
-class Clash(_Lasting):
+class ClashFault(_Lasting):
     """One servo takes the ID of another."""
 
     kind: Literal["clash"]
@@ -57,14 +57,14 @@ class Clash(_Lasting):
     takes: ServoId
 
 
-class Trip(_Fault):
+class TripFault(_Fault):
     """Servos detect an error (Hardware Error Status(70)), reboot, or get hot."""
 
     kind: Literal["reboot", "overload", "overheating", "voltage", "encoder", "shock"]
     ids: tuple[ServoId, ...] = Field(min_length=1)
 
 
-class Heat(_Fault):
+class HeatFault(_Fault):
     """The housing of servos has a temperature, from which they cool down or trip."""
 
     kind: Literal["heat"]
@@ -72,7 +72,7 @@ class Heat(_Fault):
     celsius: float = Field(ge=-20.0, le=200.0)
 
 
-class Supply(_Lasting):
+class SupplyFault(_Lasting):
     """The supply of some servos, or of the whole bus, has another voltage."""
 
     kind: Literal["supply"]
@@ -80,28 +80,36 @@ class Supply(_Lasting):
     ids: tuple[ServoId, ...] = Field((), description="of these servos only; not given: of all")
 
 
-class Unplug(_Lasting):
+class UnplugFault(_Lasting):
     """The cable behind one servo is out: all that follow in the chain lose bus and supply."""
 
     kind: Literal["unplug"]
     behind: ServoId
 
 
-class Stall(_Fault):
+class StallFault(_Fault):
     """The host does not run for a while: what it was going to send goes out later."""
 
     kind: Literal["stall"]
     for_s: float = Field(gt=0.0)
 
 
-class Port(_Lasting):
+class PortFault(_Lasting):
     """The port vanishes, as an adapter does that is pulled out, and comes back."""
 
     kind: Literal["port"]
 
 
 Fault = Annotated[
-    Noise | Servo | Clash | Trip | Heat | Supply | Unplug | Stall | Port,
+    NoiseFault
+    | ServoFault
+    | ClashFault
+    | TripFault
+    | HeatFault
+    | SupplyFault
+    | UnplugFault
+    | StallFault
+    | PortFault,
     Field(discriminator="kind"),
 ]
 

@@ -18,6 +18,6 @@ class FrameStatus(StrEnum):
     BLOB = "not a long body"
 
     @property
-    def usable(self) -> bool:
+    def has_points(self) -> bool:
         """Whether the frame holds points."""
         return self in {FrameStatus.GOOD, FrameStatus.ROUGH}

@@ -74,7 +74,7 @@ def measure_pulse_speed(
     later, earlier = _pairs(number, step)
     now, before = angles_rad[later], angles_rad[earlier]
     if not heading_known:
-        before = before + _turn(now, before)[:, None]
+        before = before + _body_rotation(now, before)[:, None]
     best = np.full(now.shape, np.inf)
     shift = np.full(now.shape, np.nan)
     for u in range(1 - most, most + 1):
@@ -131,8 +131,8 @@ def _sums(values: Floats) -> Floats:
     return np.asarray(sliding_window_view(values, NEIGHBOURS, axis=1).sum(axis=-1))
 
 
-def _turn(now: Floats, before: Floats) -> Floats:
-    """Turn of the whole body (S,) that, with one shift for all of it, explains a frame best."""
+def _body_rotation(now: Floats, before: Floats) -> Floats:
+    """Rotation of the whole body (S,) that, with one shift for all of it, explains a frame best."""
     slope = np.gradient(before, axis=1)
     change = now - before
     flat = slope - slope.mean(axis=1, keepdims=True)

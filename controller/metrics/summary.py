@@ -16,6 +16,9 @@ from snakewalk.controller.metrics.timing import skipped_cycles, wire_use
 from snakewalk.controller.metrics.tracking import lag_s, tracking_error_rad
 from snakewalk.controller.runlog.record import RunRecord
 
+_KEYS = {"paths_replanned": "paths_laid_again"}
+"""Names that ``summary.json`` spells otherwise: programs read its keys."""
+
 
 @dataclass(frozen=True, slots=True)
 class RunSummary:
@@ -46,7 +49,7 @@ class RunSummary:
     waypoint_times_s: tuple[float, ...]
     duration_s: float | None
     path_length_m: float | None
-    paths_laid_again: int
+    paths_replanned: int
     """How often the path was replanned."""
     travelled_m: float | None
     path_error_mean_m: float | None
@@ -92,7 +95,7 @@ class RunSummary:
 
     def to_dict(self) -> dict[str, Any]:
         """Keys and values of ``summary.json``."""
-        return asdict(self)
+        return {_KEYS.get(key, key): value for key, value in asdict(self).items()}
 
 
 def summary(record: RunRecord) -> RunSummary:
@@ -126,7 +129,7 @@ def summary(record: RunRecord) -> RunSummary:
         waypoint_times_s=tuple(known for t in times if (known := _digits(t)) is not None),
         duration_s=_digits(record.end_s),
         path_length_m=_digits(length_m(header.plan.path_m)),
-        paths_laid_again=len(record.paths) - 1,
+        paths_replanned=len(record.paths) - 1,
         travelled_m=_digits(travelled_m(pose)),
         path_error_mean_m=_digits(_mean(off_path)),
         path_error_max_m=_digits(_peak(off_path)),

@@ -103,7 +103,7 @@ DONE_RAD, DONE_RAD_S = 0.01, 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class GaitTransition:
     """A change of gait, computed and ready to begin."""
 
     at_s: float
@@ -130,7 +130,7 @@ class CpgMotion:
         self._settled = self._change
         self._now_s = self._left_s = self._part_s = 0.0
         self._next: tuple[Part, ...] = ()
-        self._scheduled: tuple[Change, ...] = ()
+        self._scheduled: tuple[GaitTransition, ...] = ()
 
     @property
     def done(self) -> bool:
@@ -174,7 +174,7 @@ class CpgMotion:
         self._scheduled = tuple(planned)
         return over_s
 
-    def _plan(self, gait: Gait | None) -> Change:
+    def _plan(self, gait: Gait | None) -> GaitTransition:
         """Plan a change from how the oscillators go now."""
         if gait is None:
             pattern, needs = Pattern.rest(self.cpg.pattern.offset_rad), self.needs
@@ -184,9 +184,9 @@ class CpgMotion:
             pattern, needs = Pattern.of(gait, self.robot, cycle.rate_rad_s), gait.needs
             settled = cycle.pace()
         parts, under_way = quickest_change(self.cpg, pattern, self._limit)
-        return Change(self._now_s, parts, needs, settled, under_way, stops=gait is None)
+        return GaitTransition(self._now_s, parts, needs, settled, under_way, stops=gait is None)
 
-    def _begin(self, change: Change) -> float:
+    def _begin(self, change: GaitTransition) -> float:
         """Begin a change; returns how long it takes, s."""
         self._scheduled = ()
         change.parts[0].begin(self.cpg)

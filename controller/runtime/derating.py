@@ -55,7 +55,7 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
 
     """
     heat, amps, volts = state.temperature_c, current_a, state.voltage_v
-    limit_c, limit_a, least_v = (
+    limit_c, limit_a, voltage_min_v = (
         safety.temperature_limit_c,
         safety.current_limit_a,
         safety.voltage_min_v,
@@ -69,10 +69,10 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
             limit_a,
         ),
         (
-            _falling(-volts, -least_v - VOLTAGE_BAND_V, -least_v - VOLTAGE_EDGE_V),
+            _falling(-volts, -voltage_min_v - VOLTAGE_BAND_V, -voltage_min_v - VOLTAGE_EDGE_V),
             volts,
             "{:.1f} V",
-            least_v,
+            voltage_min_v,
         ),
     )
     rates, values, unit, limit = min(ratings, key=lambda each: float(each[0].min()))
@@ -94,9 +94,9 @@ def _is_unlimited(
     share: float,
     heat_c: Floats,
     voltage_v: Floats,
-    most_a: float,
-    most_c: float,
-    least_v: float,
+    current_max_a: float,
+    temperature_max_c: float,
+    voltage_min_v: float,
 ) -> bool:
     """Average magnitudes of currents into ``mean_a``; whether ``allowed`` finds nothing to limit.
 
@@ -105,7 +105,11 @@ def _is_unlimited(
     well = True
     for joint in range(len(mean_a)):
         mean_a[joint] += share * (abs(current_a[joint]) - mean_a[joint])
-        if not mean_a[joint] <= most_a or heat_c[joint] > most_c or voltage_v[joint] < least_v:
+        if (
+            not mean_a[joint] <= current_max_a
+            or heat_c[joint] > temperature_max_c
+            or voltage_v[joint] < voltage_min_v
+        ):
             well = False
     return well
 

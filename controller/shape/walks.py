@@ -73,13 +73,13 @@ def walk(
     }[rule]
     counts_fresh = {"snake": False, "snake-printed": True}.get(rule)
     limit = graph.states**2 if max_steps is None else max_steps
-    while state.step < limit and state.seen < graph.states:
+    while state.step < limit and state.visited < graph.states:
         state.move(choose(state.near[state.path[-1]]), counts_fresh)
     return Walk(
         path=np.array(state.path, dtype=np.int64),
         selected=np.array(state.selected, dtype=np.int64),
         failures=np.array(state.failures, dtype=np.int64),
-        covered=state.seen == graph.states,
+        covered=state.visited == graph.states,
     )
 
 
@@ -114,10 +114,10 @@ class _WalkState:
         self.failures = [0] * graph.states
         self.last = [-1] * graph.states
         self.path = [start]
-        self.stack = [start]
+        self.branches = [start]
         self.selected[start] = 1
         self.last[start] = 0
-        self.seen = 1
+        self.visited = 1
 
     @property
     def step(self) -> int:
@@ -128,7 +128,7 @@ class _WalkState:
         fresh = self.selected[to] == 0
         if counts_fresh is not None and fresh is counts_fresh:
             self.failures[self.path[-1]] += 1
-        self.seen += fresh
+        self.visited += fresh
         self.selected[to] += 1
         self.path.append(to)
         self.last[to] = self.step
@@ -150,10 +150,10 @@ class _WalkState:
         """Depth first: the unvisited neighbour of highest degree, else back the way it came."""
         fresh = self._fresh(near)
         if fresh:
-            self.stack.append(max(fresh, key=self.degree.__getitem__))
+            self.branches.append(max(fresh, key=self.degree.__getitem__))
         else:
-            self.stack.pop()  # never the start: back there with nothing fresh, all has been seen
-        return self.stack[-1]
+            self.branches.pop()  # never the start: back there with nothing fresh, all has been seen
+        return self.branches[-1]
 
     def free(self, near: list[int], rng: np.random.Generator) -> int:
         """Any unvisited neighbour, else any."""

@@ -90,10 +90,10 @@ class GroupReadRequest:
                 return reply
         return self._salvage_fast(raw) if self.fast else self._salvage_plain(raw)
 
-    def regular(self, found: int, data: Bytes, error: Bytes) -> GroupReadReply:
-        """Regular reply: ``found`` is what the frame reader returned; ``data`` is kept."""
+    def regular(self, status: int, data: Bytes, error: Bytes) -> GroupReadReply:
+        """Regular reply: ``status`` is what the frame reader returned; ``data`` is kept."""
         everyone = self._all
-        if found == FLAWLESS:
+        if status == FLAWLESS:
             return GroupReadReply(data, everyone, self._no_error, everyone, clean=True, whole=True)
         error = error.copy()
         return GroupReadReply(data, (error & _RESULT) == 0, error, everyone, clean=True, whole=True)
@@ -111,38 +111,38 @@ class GroupReadRequest:
         """The reply if it is regular, else None."""
         data = np.empty((len(self.ids), self.length), np.uint8)
         if self.fast:
-            found = read_fast(raw, self.heads[0], self._id_bytes, data, self._error)
+            status = read_fast(raw, self.heads[0], self._id_bytes, data, self._error)
         else:
-            found = read_plain(raw, self.heads, data, self._error)
-        if found == IRREGULAR:
+            status = read_plain(raw, self.heads, data, self._error)
+        if status == IRREGULAR:
             return None
-        return self.regular(found, data, self._error)
+        return self.regular(status, data, self._error)
 
     def _salvage_plain(self, raw: bytes) -> GroupReadReply:
         reader = PacketParser()
         packets = reader.feed(raw)
         unexpected = reader.dropped_bytes + reader.pending
-        found: dict[int, StatusPacket] = {}
+        by_id: dict[int, StatusPacket] = {}
         twice: set[int] = set()
         for packet in packets:
             if not isinstance(packet, StatusPacket) or packet.servo_id not in self._index:
                 unexpected += 1
             elif len(packet.params) not in (self.length, 0):
                 unexpected += 1  # the reply to another, older request
-            elif packet.servo_id in found:
+            elif packet.servo_id in by_id:
                 twice.add(packet.servo_id)
             else:
-                found[packet.servo_id] = packet
+                by_id[packet.servo_id] = packet
         for servo_id in twice:
-            del found[servo_id]  # which of the two is new cannot be known
-        return self._partial(found, clean=not unexpected and not twice)
+            del by_id[servo_id]  # which of the two is new cannot be known
+        return self._partial(by_id, clean=not unexpected and not twice)
 
     def _salvage_fast(self, raw: bytes) -> GroupReadReply:
         """Results in front of the first damage, each proved by its CRC of everything so far."""
-        found: dict[int, StatusPacket] = {}
+        by_id: dict[int, StatusPacket] = {}
         start = raw.find(self._fast_head)
         if start < 0:
-            return self._partial(found, clean=not raw)
+            return self._partial(by_id, clean=not raw)
         at = start + len(self._fast_head)
         crc = crc16(raw[start:at])
         for servo_id in self.ids:
@@ -152,17 +152,17 @@ class GroupReadRequest:
             crc = crc16(share[:-2], crc)
             if crc != share[-2] | share[-1] << 8:
                 break
-            found[servo_id] = StatusPacket(servo_id, share[0], share[2:-2])
+            by_id[servo_id] = StatusPacket(servo_id, share[0], share[2:-2])
             crc = crc16(share[-2:], crc)
             at += self.frame_bytes
-        return self._partial(found, clean=start == 0 and at == len(raw))
+        return self._partial(by_id, clean=start == 0 and at == len(raw))
 
-    def _partial(self, found: dict[int, StatusPacket], *, clean: bool) -> GroupReadReply:
+    def _partial(self, by_id: dict[int, StatusPacket], *, clean: bool) -> GroupReadReply:
         count = len(self.ids)
         data = np.zeros((count, self.length), np.uint8)
         valid, answered = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
         error = np.zeros(count, np.uint8)
-        for servo_id, packet in found.items():
+        for servo_id, packet in by_id.items():
             k = self._index[servo_id]
             answered[k], error[k] = True, packet.error
             # an error status may lack data: a reply, but no value

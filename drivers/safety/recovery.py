@@ -16,7 +16,7 @@ Policy = Literal["stop", "confirm", "resume"]
 _RETRY_S = 0.1
 
 
-class Comparison(Protocol):
+class ChainComparison(Protocol):
     """The chain as found after an interruption; as a string, one line for the operator."""
 
     @property
@@ -25,7 +25,7 @@ class Comparison(Protocol):
         ...
 
 
-C = TypeVar("C", bound=Comparison)
+C = TypeVar("C", bound=ChainComparison)
 
 
 class RecoverableLink(Protocol[C]):

@@ -19,7 +19,7 @@ CENTRE_TICKS, TICKS_PER_RAD = 512, 1023.0 / np.radians(300.0)
 SPEED_UNIT_RAD_S = 0.111 * 2.0 * np.pi / 60.0
 """Moving Speed(32), Present Speed(38)."""
 SLICE_S = 2e-3
-FAINT = 1e-9
+WHEEL_GAIN = 1e-9
 CLOCKWISE = 0x400
 """Bit 10: the direction of speeds and loads."""
 TURN_RAD = 2.0 * np.pi
@@ -217,13 +217,13 @@ class Ax12Servos:
         slope = np.where(right, self["CW Compliance Slope"], self["CCW Compliance Slope"])
         inside = np.abs(error) * TICKS_PER_RAD <= margin
         push = np.where(speed & CLOCKWISE, -1.0, 1.0) * (speed & 1023) / 1023.0
-        gain = np.where(wheel | inside, FAINT, TICKS_PER_RAD / slope)
+        gain = np.where(wheel | inside, WHEEL_GAIN, TICKS_PER_RAD / slope)
         drive.torque_on[:] = on
         drive.p_gain_per_rad[:] = gain
         aim = np.where(
             inside, shaft, self._trajectory.position - np.sign(error) * margin / TICKS_PER_RAD
         )
-        drive.goal_rad[:] = np.where(wheel, push / FAINT, aim)
+        drive.goal_rad[:] = np.where(wheel, push / WHEEL_GAIN, aim)
         drive.pwm_limit[:] = np.minimum(self["Torque Limit"], self["Max Torque"]) / 1023.0
         drive.current_limit_a[:] = np.inf
         self.blocked_shaft.hold()

@@ -133,9 +133,9 @@ class FaultPlayer:
         self.stalls: list[tuple[float, float]] = []
         """Pauses of the host: begin on the line's clock, and length, s."""
         for fault in faults.fault:
-            if isinstance(fault, plan.Noise):
+            if isinstance(fault, plan.NoiseFault):
                 self.noise.add(fault)
-            elif isinstance(fault, plan.Stall):
+            elif isinstance(fault, plan.StallFault):
                 self.stalls.append((self._start_s + fault.at_s, fault.for_s))
             else:
                 self._schedule(fault)
@@ -163,12 +163,12 @@ class FaultPlayer:
                 for each in named
                 if each not in self._rows
             ]
-            if isinstance(fault, plan.Trip) and fault.kind != "reboot":
+            if isinstance(fault, plan.TripFault) and fault.kind != "reboot":
                 wrong += self._undetectable(fault, where)
         if wrong:
             raise ConfigError(wrong)
 
-    def _undetectable(self, fault: plan.Trip, where: str) -> list[str]:
+    def _undetectable(self, fault: plan.TripFault, where: str) -> list[str]:
         """Messages about an error that a named servo cannot detect."""
         known = {
             each: self._servos.protection.alarms(self._rows[each])
@@ -204,22 +204,22 @@ class FaultPlayer:
         line, servos = self._line, self._servos
         protection = servos.protection
         rows = np.array([self._rows[each] for each in getattr(fault, "ids", ())], np.intp)
-        if isinstance(fault, plan.Port):
+        if isinstance(fault, plan.PortFault):
             return line.disconnect, line.reconnect
-        if isinstance(fault, plan.Supply):
+        if isinstance(fault, plan.SupplyFault):
             some = rows if len(rows) else None
             return lambda: protection.supply(fault.volts, some), lambda: protection.supply(
                 None, some
             )
-        if isinstance(fault, plan.Unplug):
+        if isinstance(fault, plan.UnplugFault):
             behind = np.arange(self._rows[fault.behind] + 1, len(line.ids()))
             return lambda: servos.cut_power(behind), lambda: servos.restore_power(behind)
-        if isinstance(fault, plan.Clash):
+        if isinstance(fault, plan.ClashFault):
             row = self._rows[fault.id]
             return lambda: line.rename(row, fault.takes), lambda: line.rename(row, fault.id)
-        if isinstance(fault, plan.Heat):
+        if isinstance(fault, plan.HeatFault):
             return lambda: protection.heat(rows, fault.celsius), None
-        if isinstance(fault, plan.Trip):
+        if isinstance(fault, plan.TripFault):
             return lambda: self._trip(rows, fault.kind), None
         return self._servo_actions(fault, rows)
 

@@ -22,11 +22,11 @@ class Noise:
         self._random = source
         self._start_s = start_s
         self._senders = senders
-        self._faults: list[plan.Noise] = []
+        self._faults: list[plan.NoiseFault] = []
         self.counts: dict[str, int] = {}
         """Packets changed so far, by kind."""
 
-    def add(self, fault: plan.Noise) -> None:
+    def add(self, fault: plan.NoiseFault) -> None:
         """Add a fault; those of a file act in its order."""
         self._faults.append(fault)
 
@@ -52,7 +52,7 @@ class Noise:
             packets = [new for packet in packets for new in self._one(fault, *packet)]
         return packets
 
-    def _applies(self, fault: plan.Noise, data: bytes, now_s: float, of: str) -> bool:
+    def _applies(self, fault: plan.NoiseFault, data: bytes, now_s: float, of: str) -> bool:
         since_s = now_s - self._start_s - fault.at_s
         if fault.of not in (of, "both") or since_s < 0.0:
             return False
@@ -62,7 +62,7 @@ class Noise:
             return False
         return fault.chance >= 1.0 or self._random.random() < fault.chance
 
-    def _one(self, fault: plan.Noise, slow_s: float, data: bytes) -> list[tuple[float, bytes]]:
+    def _one(self, fault: plan.NoiseFault, slow_s: float, data: bytes) -> list[tuple[float, bytes]]:
         if fault.kind == "drop" or not data:
             return []
         if fault.kind == "corrupt":

@@ -69,7 +69,7 @@ def ax12_rows(servos: Ax12Servos) -> Rows:
     shown = ("ID", "Goal Position", *(name for name in CELLS if name.startswith("Present")))
     rows: Rows = []
     for row in range(len(servos)):
-        seen: dict[str, object] = {
+        values: dict[str, object] = {
             name.lower().removeprefix("present "): int(servos[name][row]) for name in shown
         }
         alarms = {
@@ -77,5 +77,5 @@ def ax12_rows(servos: Ax12Servos) -> Rows:
             "error": int(servos.protection.shown[row]),
             "power": bool(servos.powered[row]),
         }
-        rows.append(seen | alarms)
+        rows.append(values | alarms)
     return rows

@@ -46,7 +46,7 @@ def page(
     body = [
         f"<header><p class='kind'>snakewalk run</p><h1>{escape(str(numbers.run))}</h1>",
         f"<p class='{_mood(numbers)} outcome'>{escape(str(numbers.outcome))}</p>{note}",
-        f"<p class='verdict'>{escape(_verdict(numbers))}</p>",
+        f"<p class='verdict'>{escape(_headline(numbers))}</p>",
         f"<p class='facts'>{_facts(numbers)}</p></header>",
         f"<section class='tiles'>{''.join(_tiles(numbers))}</section>",
         film,
@@ -70,7 +70,7 @@ def _mood(n: RunSummary) -> str:
     return "good" if n.waypoints_reached == n.waypoints else "fair"
 
 
-def _verdict(n: RunSummary) -> str:
+def _headline(n: RunSummary) -> str:
     """One sentence: how far it came, how fast, how well it kept to its path, whether on time."""
     where = "on the simulator" if n.backend == "sim" else f"on {n.backend}"
     late = n.missed_deadlines

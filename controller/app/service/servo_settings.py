@@ -42,7 +42,7 @@ class SettingsRequest:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class SettingChange:
     """One register: its raw values now and then, and what the new one means."""
 
     register: str
@@ -57,7 +57,7 @@ class SettingsResult:
 
     servo: int
     """The ID by which it was addressed."""
-    changes: tuple[Change, ...]
+    changes: tuple[SettingChange, ...]
     written: bool
     """Whether the changes were written and read back."""
 
@@ -81,7 +81,7 @@ def open_servo(port: BytePort, servo_id: int, latency_s: float) -> DynamixelBus:
     return DynamixelBus(port, model_of(found.model_number), latency_s=latency_s)
 
 
-def plan(bus: DynamixelBus, servo_id: int, request: SettingsRequest) -> tuple[Change, ...]:
+def plan(bus: DynamixelBus, servo_id: int, request: SettingsRequest) -> tuple[SettingChange, ...]:
     """Registers that would change, in the order of writing; reads only.
 
     Raises:
@@ -99,7 +99,7 @@ def plan(bus: DynamixelBus, servo_id: int, request: SettingsRequest) -> tuple[Ch
         raise InputError(faults)
     now = {name: bus.read(servo_id, name) for name in values}
     changes = [
-        Change(name, now[name], value, meaning)
+        SettingChange(name, now[name], value, meaning)
         for name, (value, meaning) in values.items()
         if now[name] != value
     ]
@@ -108,11 +108,13 @@ def plan(bus: DynamixelBus, servo_id: int, request: SettingsRequest) -> tuple[Ch
     if low >= high:
         raise InputError(f"position limits {low} to {high} (raw): the lower is not below the upper")
     if changes and bus.read(servo_id, "Torque Enable"):
-        changes.insert(0, Change("Torque Enable", 1, 0, "off: the EEPROM is locked while it is on"))
+        changes.insert(
+            0, SettingChange("Torque Enable", 1, 0, "off: the EEPROM is locked while it is on")
+        )
     return tuple(changes)
 
 
-def apply(bus: DynamixelBus, servo_id: int, changes: tuple[Change, ...]) -> None:
+def apply(bus: DynamixelBus, servo_id: int, changes: tuple[SettingChange, ...]) -> None:
     """Write and read back; ID and baud rate last, since after them the servo is elsewhere.
 
     Raises:

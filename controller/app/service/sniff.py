@@ -15,7 +15,7 @@ CHUNK_BYTES = 4096
 WAIT_S = 0.1
 
 
-def listen(device: str, baud: int, for_s: float | None) -> Iterator[tuple[float, bytes]]:
+def receive(device: str, baud: int, for_s: float | None) -> Iterator[tuple[float, bytes]]:
     """(time in s, bytes) seen on ``device``; nothing is ever sent.
 
     Raises:

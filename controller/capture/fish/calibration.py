@@ -16,7 +16,7 @@ from snakewalk.controller.capture.fish.initial_posture import midline_starts, ro
 from snakewalk.controller.capture.fish.matching import SilhouetteFrame, Target
 from snakewalk.controller.capture.fish.model import STATIONS, FishModel
 from snakewalk.controller.capture.fish.pattern_search import pattern_search
-from snakewalk.controller.capture.fish.top_view import Match, TopView, search, window_of
+from snakewalk.controller.capture.fish.top_view import Match, TopViewFit, search, window_of
 
 SHORTEST_PX = 20.0
 
@@ -97,7 +97,7 @@ def _size(model: FishModel, frame: SilhouetteFrame, match: Match) -> tuple[float
         grown = model.sized(model.length_px * float(size[0]), width=float(size[1]))
         at = match.parameters.copy()
         at[:2] += ahead * size[2]
-        return TopView(target, grown).value(at)
+        return TopViewFit(target, grown).value(at)
 
     first = np.array([0.05, 0.1, 0.03 * model.length_px])
     found, _ = pattern_search(value, np.array([1.0, 1.0, 0.0]), first, halvings=4, evaluations=200)

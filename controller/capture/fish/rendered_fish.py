@@ -71,7 +71,7 @@ class FishScene:
         covered = np.clip(width[near] - far + 0.5, 0.0, 1.0).reshape(x.shape)
         across = np.clip(far / np.maximum(width[near], 1e-9) * 31.0, 0, 63).astype(int)
         grey = self.conditions.fish + self._back[across, near].reshape(x.shape)
-        return self._put(image, rows, columns, covered, grey)
+        return self._composite(image, rows, columns, covered, grey)
 
     def side(self, midline_px: Floats, half_wide_px: Floats, half_high_px: Floats) -> Image:
         """(H, W) the fish from the side: spine (P, 2) in x and height; half axes (P,) of sections.
@@ -91,9 +91,11 @@ class FishScene:
             slope = np.sqrt((x - cx) ** 2 / a**4 + (-y - cz) ** 2 / b**4)
             inside = np.maximum(inside, reach * (1.0 - reach) / np.maximum(slope, 1e-9))
         covered = np.clip(inside + 0.5, 0.0, 1.0)
-        return self._put(image, rows, columns, covered, np.full(x.shape, self.conditions.fish))
+        return self._composite(
+            image, rows, columns, covered, np.full(x.shape, self.conditions.fish)
+        )
 
-    def _put(
+    def _composite(
         self, image: Floats, rows: slice, columns: slice, covered: Floats, grey: Floats
     ) -> Image:
         whole = np.zeros_like(image)

@@ -60,7 +60,7 @@ def window_of(
     return Window(left, top, right - left, bottom - top, scale)
 
 
-class TopView:
+class TopViewFit:
     """A frame at one size, as a function of the posture's parameters (3 + J,)."""
 
     def __init__(self, target: Target, model: FishModel, weight: float = EDGE_WEIGHT) -> None:
@@ -112,7 +112,7 @@ def search(
         if window is None or not tried:
             return best
         target = Target(frame, window, blur)
-        view = TopView(target, model)
+        view = TopViewFit(target, model)
         stiffness = STIFFNESS * (4.0 / model.joints) ** 3 * model.length_px * scale
         ends = [
             refine(

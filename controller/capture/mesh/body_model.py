@@ -133,17 +133,17 @@ def body_model(
     return BodyModel(width, height, top.length_m, measured=True)
 
 
-def _median_radius(seen: Silhouettes) -> Floats:
+def _median_radius(body: Silhouettes) -> Floats:
     """(101,) radii over the body's length."""
-    whole = np.isfinite(seen.points).all(axis=(1, 2)) & np.isfinite(seen.radius).all(axis=1)
+    whole = np.isfinite(body.points).all(axis=(1, 2)) & np.isfinite(body.radius).all(axis=1)
     if not whole.any():
         raise InputError("body: no frame holds a whole skeleton with its widths")
-    chord = np.hypot(*np.diff(seen.points[whole], axis=1).transpose(2, 0, 1))
+    chord = np.hypot(*np.diff(body.points[whole], axis=1).transpose(2, 0, 1))
     length = chord.sum(axis=1)
     arc = np.concatenate([np.zeros((len(chord), 1)), np.cumsum(chord, axis=1)], axis=1)
     at = np.linspace(0.0, 1.0, SEGMENTS + 1)
     even = [
-        np.interp(at, a / d, r) / d for a, d, r in zip(arc, length, seen.radius[whole], strict=True)
+        np.interp(at, a / d, r) / d for a, d, r in zip(arc, length, body.radius[whole], strict=True)
     ]
     radius = np.median(even, axis=0)
     if not (radius >= 0.0).all() or radius.max() <= 0.0:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from rich.console import Group
 
-    from snakewalk.controller.app.service.servo_settings import Change
+    from snakewalk.controller.app.service.servo_settings import SettingChange
     from snakewalk.sim.line.sim_line import SimLine
     from snakewalk.sim.line.wire import Wire
     from snakewalk.sim.serve.chain_spec import ChainSpec
@@ -96,7 +96,7 @@ def sniff(
     as_json: Json = False,
 ) -> None:
     """Decode a live or recorded exchange packet by packet."""
-    from snakewalk.controller.app.service.sniff import listen, stand_between  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.app.service.sniff import receive, stand_between  # noqa: PLC0415  --help stays quick
     from snakewalk.sim.ax12.decode import Decoder1  # noqa: PLC0415
     from snakewalk.sim.ax12.table import MODEL as AX12  # noqa: PLC0415
     from snakewalk.sim.sniff.decode import Decoder  # noqa: PLC0415
@@ -113,7 +113,7 @@ def sniff(
     elif through:
         pieces = stand_between(str(source), baud, for_s)
     else:
-        pieces = listen(str(source), baud, for_s)
+        pieces = receive(str(source), baud, for_s)
     try:
         for time_s, data in pieces:
             for line in decoder.feed(time_s, data):
@@ -225,15 +225,15 @@ class _Shown:
     recent: str
 
 
-def _view(seen: _Shown) -> "Group":
+def _view(shown: _Shown) -> "Group":
     from rich.console import Group  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
-    table = Table(*(seen.rows[0] if seen.rows else ()), box=None, header_style="bold")
-    for row in seen.rows:
+    table = Table(*(shown.rows[0] if shown.rows else ()), box=None, header_style="bold")
+    for row in shown.rows:
         style = "red" if row["error"] or not row["power"] else "" if row["torque"] else "dim"
         table.add_row(*(str(value) for value in row.values()), style=style)
-    return Group(Text(seen.counts, style="bold"), table, Text(seen.recent, style="dim"))
+    return Group(Text(shown.counts, style="bold"), table, Text(shown.recent, style="dim"))
 
 
 def bus_set(
@@ -293,7 +293,7 @@ def bus_set(
         console.print("written and read back" if written else "nothing written")
 
 
-def _show(servo_id: int, model: str, changes: "tuple[Change, ...]") -> None:
+def _show(servo_id: int, model: str, changes: "tuple[SettingChange, ...]") -> None:
     if not changes:
         console.print(f"servo {servo_id} ({model}): nothing to change")
         return

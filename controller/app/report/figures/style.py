@@ -18,7 +18,7 @@ from snakewalk.controller.app.result_files import atomic_write
 
 INK: Final = "#22303c"
 GREY: Final = "#8796a5"
-FAINT: Final = "#d9e0e6"
+PALE: Final = "#d9e0e6"
 BLUE: Final = "#0072b2"
 SKY: Final = "#56b4e9"
 GREEN: Final = "#009e73"

@@ -14,10 +14,10 @@ from matplotlib.ticker import MaxNLocator
 from snakewalk.controller.app.report.figures.style import (
     AMBER,
     BLUE,
-    FAINT,
     GREEN,
     GREY,
     INK,
+    PALE,
     save_picture,
     style,
 )
@@ -75,7 +75,7 @@ def _tracks(axes: Axes, found: Analysis) -> None:
         axes.set_title("shapes (places not recorded)")
         return
     some = np.unique(np.linspace(0, len(body) - 1, _BODIES).astype(int))
-    axes.add_collection(LineCollection(list(body[some]), linewidths=1.0, colors=FAINT, zorder=1))
+    axes.add_collection(LineCollection(list(body[some]), linewidths=1.0, colors=PALE, zorder=1))
     middle = body.shape[1] // 2
     for point, colour, name in ((-1, AMBER, "tail"), (middle, GREEN, "middle"), (0, BLUE, "head")):
         x, y = body[:, point].T

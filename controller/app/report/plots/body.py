@@ -23,7 +23,7 @@ def draw_body(
     model: BodyModel,
     mesh: Mesh,
     texture: Image | None,
-    seen: tuple[Image, Floats, Floats] | None,
+    silhouette: tuple[Image, Floats, Floats] | None,
 ) -> None:
     """Write one picture in the format of its ending.
 
@@ -32,7 +32,7 @@ def draw_body(
         model: cross sections.
         mesh: the solid.
         texture: unrolled skin, if there is one.
-        seen: image, skeleton (P, 2) and radii (P,) in its pixels, if there is one.
+        silhouette: image, skeleton (P, 2) and radii (P,) in its pixels, if there is one.
 
     Raises:
         InputError: an ending that is no picture's.
@@ -43,11 +43,11 @@ def draw_body(
         figure = Figure(figsize=(9.0, 4.2), layout="constrained", dpi=88)
         halves: Any = figure.subfigures(1, 2, width_ratios=[1.0, 1.6])
         left, right = halves
-        if seen is None or texture is None:
+        if silhouette is None or texture is None:
             _sections(left.subplots(1, 1), model)
         else:
             first, second, third = left.subplots(3, 1, height_ratios=[2.2, 0.7, 1.4])
-            _place(first, *seen)
+            _place(first, *silhouette)
             second.imshow(texture, aspect="auto")
             second.set_axis_off()
             second.set_title("skin unrolled, head at the left")

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.app.report.figures.style import ANGLES, FAINT, GREY
+from snakewalk.controller.app.report.figures.style import ANGLES, GREY, PALE
 from snakewalk.controller.capture.track import Track
 
 _COLUMNS = 330  # more cannot be seen
@@ -38,7 +38,7 @@ def body_map(
     full = np.full((frame[-1] + 1, values.shape[1]), np.nan)
     full[frame[rows]] = values
     top = float(np.nanpercentile(np.abs(values), 99.0)) if limit is None else limit
-    axes.set_facecolor(FAINT)
+    axes.set_facecolor(PALE)
     image = axes.imshow(
         _thin(full).T,
         aspect="auto",

@@ -32,7 +32,7 @@ def drawn(
     how = cv2.INTER_AREA if factor < 1.0 else cv2.INTER_NEAREST
     colour = image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     canvas[: size[1], : size[0]] = cv2.resize(colour, size, interpolation=how)
-    if status.usable:
+    if status.has_points:
         line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
         thick = 2 if max(size) > 2 * _TILE_PX else 1
         cv2.polylines(canvas, [line], False, _BODY, thick, cv2.LINE_AA, 4)
@@ -70,7 +70,7 @@ def contact_sheet(
 
 def _tile(image: Image, points_px: Floats, status: FrameStatus) -> Image:
     """The animal and a little around it; all of a frame in which it was not found."""
-    if status.usable:
+    if status.has_points:
         reach = 0.12 * float(np.hypot(*np.diff(points_px, axis=0).T).sum()) + 6.0
         left, top = np.maximum(points_px.min(axis=0) - reach, 0.0).astype(int)
         right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int)

@@ -12,10 +12,10 @@ from matplotlib.patches import Circle
 from snakewalk.controller.app.recordings.fish_synthesis import SynthesisedMotion, SynthesisOptions
 from snakewalk.controller.app.report.figures.style import (
     BLUE,
-    FAINT,
     GREEN,
     GREY,
     INK,
+    PALE,
     RED,
     save_picture,
     style,
@@ -41,7 +41,7 @@ def draw_synthesis(file: Path, made: SynthesisedMotion, options: SynthesisOption
         left, right = upper.subplots(1, 2, squeeze=False)[0]
         _pieces(left, made)
         _graph(right, made)
-        _way(lower.subplots(1, 1), made, options)
+        _path(lower.subplots(1, 1), made, options)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
@@ -66,7 +66,7 @@ def _graph(axes: Axes, made: SynthesisedMotion) -> None:
     place = np.column_stack([np.cos(angle), np.sin(angle)])
     allowed = [(a, b) for a in range(count) for b in pieces.permitted(a)]
     used = list(zip(made.sequence.order, made.sequence.order[1:], strict=False))
-    for joins, colour, width in ((allowed, FAINT, 0.6), (used, INK, 1.1)):
+    for joins, colour, width in ((allowed, PALE, 0.6), (used, INK, 1.1)):
         lines = [np.stack([place[a], 0.25 * (place[a] + place[b]), place[b]]) for a, b in joins]
         axes.add_collection(LineCollection(lines, colors=colour, linewidths=width))
     for k, piece in enumerate(pieces.pieces):
@@ -81,7 +81,7 @@ def _graph(axes: Axes, made: SynthesisedMotion) -> None:
     axes.set_title("what may follow what (dark: used)")
 
 
-def _way(axes: Axes, made: SynthesisedMotion, options: SynthesisOptions) -> None:
+def _path(axes: Axes, made: SynthesisedMotion, options: SynthesisOptions) -> None:
     """Bodies along the new path, joins as dots, control points as circles."""
     motion = made.motion
     points = motion.points()

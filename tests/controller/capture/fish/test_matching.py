@@ -14,7 +14,7 @@ from snakewalk.controller.capture.fish.postures import Postures
 from snakewalk.controller.capture.fish.raster import Window
 from snakewalk.controller.capture.fish.rendered_fish import FilmConditions
 from snakewalk.controller.capture.fish.swimmer import Stroke, swim
-from snakewalk.controller.capture.fish.top_view import TopView, search
+from snakewalk.controller.capture.fish.top_view import TopViewFit, search
 from tests.helpers.pools import film, side_film
 
 TRUTH = swim()
@@ -90,7 +90,7 @@ def test_an_edge_one_pixel_wide_says_nothing_two_pixels_away_and_a_wide_one_does
 
     def scores(width: int) -> list[float]:
         view = Target(top[0], window, width)
-        shape = TopView(view, model, 1.0)
+        shape = TopViewFit(view, model, 1.0)
         return [
             view.edge(shape.outline(at + np.array([0, dy, 0, 0, 0, 0, 0]))) for dy in (3.0, 4.5)
         ]
@@ -110,7 +110,7 @@ def test_coordinates_in_turn_stop_on_a_ridge_where_least_squares_goes_on() -> No
     for seen, k, place in zip(top, frames, base, strict=True):
         truth = np.array([*place, TRUTH.head_rad[k], *TRUTH.angles_rad[k]])
         window = Window(0, 0, seen.grey.shape[1], seen.grey.shape[0], 1.0)
-        view = TopView(Target(seen, window, 3), model, 0.3)
+        view = TopViewFit(Target(seen, window, 3), model, 0.3)
         steps = np.array([1.0, 1.0, 0.02, 0.05, 0.05, 0.05, 0.05])
         found, _ = pattern_search(view.value, truth + off, steps, halvings=3)
         printed.append(np.abs(found - truth)[3:].mean())
