@@ -12,6 +12,7 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.report.artifacts import Artifacts
+    from snakewalk.controller.metrics.summary import RunSummary
     from snakewalk.controller.runlog.record import RunRecord
 
 console = Console(highlight=False)
@@ -57,12 +58,17 @@ def _text(value: object) -> str:
 
 
 def write_artifacts(
-    record: "RunRecord", folder: Path, *, film: bool, fine: bool = False
+    record: "RunRecord",
+    folder: Path,
+    numbers: "RunSummary | None" = None,
+    *,
+    film: bool,
+    fine: bool = False,
 ) -> "Artifacts":
     """Make the report and the film of a run; print on standard error what could not be made."""
     from snakewalk.controller.app.report.artifacts import make_artifacts  # noqa: PLC0415  heavy; --help stays quick
 
-    made = make_artifacts(record, folder, film=film, fine=fine)
+    made = make_artifacts(record, folder, numbers, film=film, fine=fine)
     for line in made.notes:
         print(f"snakewalk: {line}", file=sys.stderr)
     return made

@@ -34,10 +34,16 @@ class Artifacts:
 
 
 def make_artifacts(
-    record: RunRecord, folder: Path, *, film: bool = True, fine: bool = False
+    record: RunRecord,
+    folder: Path,
+    numbers: RunSummary | None = None,
+    *,
+    film: bool = True,
+    fine: bool = False,
 ) -> Artifacts:
     """Make ``folder/film.mp4``, ``folder/summary.json`` and ``folder/report.html`` from a record.
 
+    ``numbers`` is the record's summary as ``execute`` returns it; without it, it is computed.
     What this machine cannot make (no simulator, no matplotlib, no OpenGL) is noted and left out: a
     run is not lost for want of its pictures. Shows progress on standard error.
     """
@@ -45,20 +51,27 @@ def make_artifacts(
     made = _film(record, folder / FILM, fine, notes) if film else None
     report = None
     try:
-        report = build_report(record, folder, made)
+        report = build_report(record, folder, made, numbers)
     except InputError as error:
         notes += [f"no report: {line}" for line in error.faults]
     return Artifacts(report, made, tuple(notes))
 
 
-def build_report(record: RunRecord, out_dir: Path, film: Path | None = None) -> Path:
+def build_report(
+    record: RunRecord,
+    out_dir: Path,
+    film: Path | None = None,
+    numbers: RunSummary | None = None,
+) -> Path:
     """Make ``out_dir/report.html`` (returned) and ``out_dir/summary.json`` from a record alone.
+
+    ``numbers`` is the record's summary where it is known.
 
     Raises:
         InputError: the film cannot be used, or matplotlib is not installed.
 
     """
-    numbers = write_summary(record, out_dir)
+    numbers = write_summary(summary(record) if numbers is None else numbers, out_dir)
     film_on_page = "" if film is None else film_html(film, out_dir)
     require_extra("the report needs", "matplotlib")
     from snakewalk.controller.app.report.figures.sections import sections  # noqa: PLC0415  an extra
@@ -76,9 +89,8 @@ def build_report(record: RunRecord, out_dir: Path, film: Path | None = None) -> 
     return path
 
 
-def write_summary(record: RunRecord, out_dir: Path) -> RunSummary:
+def write_summary(numbers: RunSummary, out_dir: Path) -> RunSummary:
     """Write ``out_dir/summary.json`` and return the numbers; needs no matplotlib."""
-    numbers = summary(record)
     text = json.dumps(numbers.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
     with atomic_write(out_dir / SUMMARY) as part:
         part.write_text(text + "\n", encoding="utf-8")

@@ -8,7 +8,7 @@ from snakewalk.controller.app.report.artifacts import write_summary
 from snakewalk.controller.app.runs.backend import metal, simulated
 from snakewalk.controller.app.runs.pose_provider import PoseProvider, pose_faults, pose_provider
 from snakewalk.controller.app.runs.prepared_run import PreparedRun
-from snakewalk.controller.metrics.summary import RunSummary
+from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
@@ -107,7 +107,8 @@ def execute(
             )
             outcome = drive.run()
     record = read_log(log_path)
-    return Finished(outcome, log_path, record, write_summary(record, folder), pose, source)
+    numbers = write_summary(summary(record), folder)
+    return Finished(outcome, log_path, record, numbers, pose, source)
 
 
 def _torque_constant_n_m_a(model: str) -> float:

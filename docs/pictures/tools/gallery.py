@@ -25,7 +25,7 @@ def gallery(folder: Path, names: list[str]) -> None:
         with TemporaryDirectory() as place:
             out = Path(place)
             finished = execute(prepare_gait(name, seconds=RUN_S), out)
-            made = make_artifacts(finished.record, out)
+            made = make_artifacts(finished.record, out, finished.summary)
             if made.film is None:
                 raise SystemExit(f"{name}: no film: {' '.join(made.notes)}")
             pictures = _last(made.film)

@@ -82,7 +82,7 @@ def run_gait(
         paced = prepared.make_operator is not None and port is None
         on_progress = _in_real_time(bar.on_progress) if paced else bar.on_progress
         finished = execute(prepared, folder, port, on_progress=on_progress, on_event=bar.on_event)
-    artifacts = write_artifacts(finished.record, folder, film=film)
+    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     result: dict[str, object] = {
         "gait": prepared.config.name,
         "robot": prepared.robot.name,

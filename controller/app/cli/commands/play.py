@@ -41,7 +41,7 @@ def play(
         finished = execute(
             prepared, folder, port, on_progress=bar.on_progress, on_event=bar.on_event
         )
-    artifacts = write_artifacts(finished.record, folder, film=film)
+    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     result: dict[str, object] = {
         "recording": track,
         "robot": prepared.robot.name,

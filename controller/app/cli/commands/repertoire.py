@@ -121,13 +121,13 @@ def carry_out(
     folder = default_folder(job) if out is None else out
     with TimeBar(job.run.name, job.route.duration_s) as progress:
         ran = run_route(job, folder, port, progress.on_progress)
-    log = ran.finished.log
-    artifacts = write_artifacts(ran.finished.record, folder, film=film)
+    finished = ran.finished
+    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     if picture is not None:
         from snakewalk.controller.app.report.plots import repertoire as plots  # noqa: PLC0415
 
-        plots.draw_route(job, ran.finished.record, picture)
-    return ran.facts() | {"log": str(log)} | artifacts.to_dict(), ran.complete
+        plots.draw_route(job, finished.record, picture)
+    return ran.facts() | {"log": str(finished.log)} | artifacts.to_dict(), ran.complete
 
 
 def _show_actions(file: Path, repertoire: "Repertoire", as_json: bool) -> None:

@@ -62,7 +62,7 @@ def run(
             on_event=bar.on_event,
         )
     outcome = finished.outcome
-    artifacts = write_artifacts(finished.record, folder, film=film)
+    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     show(
         {
             "run": name,

@@ -3,6 +3,7 @@
 import base64
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
@@ -69,6 +70,13 @@ def test_the_page_stands_alone(make: Make, tmp_path: Path) -> None:
 def test_a_run_that_hardly_began_has_a_page(make: Make, tmp_path: Path, seconds: float) -> None:
     page_path = build_report(read_log(make(tmp_path / "run.mcap", seconds=seconds)), tmp_path)
     assert "0 of 4" in page_path.read_text(encoding="utf-8")
+
+
+def test_a_summary_that_is_known_is_not_computed_again(record: RunRecord, tmp_path: Path) -> None:
+    numbers = replace(summary(record), run="as known")
+    report = build_report(record, tmp_path, numbers=numbers)
+    assert "<h1>as known</h1>" in report.read_text(encoding="utf-8")
+    assert '"run": "as known"' in (tmp_path / "summary.json").read_text(encoding="utf-8")
 
 
 def test_what_the_log_says_is_text_not_markup(record: RunRecord) -> None:
