@@ -58,6 +58,10 @@ class ProgressBar:
             self._task, completed=done, total=total, description=description, note=note
         )
 
+    def advance(self) -> None:
+        """Show that one more is done."""
+        self._progress.advance(self._task)
+
     def hide(self) -> None:
         """Take the bar away: what it stood for failed."""
         self._progress.update(self._task, visible=False)

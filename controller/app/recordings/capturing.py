@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.progress import Progress
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.progress import ProgressBar
 from snakewalk.controller.app.report.plots.capture import contact_sheet, overlay_film, step_picture
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.capture.body_detector import BodyDetector, make_detector
@@ -88,8 +88,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             ground = some[0] if detector.background is None else detector.background
             m_per_px = scale_of_marker(options.marker, ground)
     fixed = not options.cropped and len({frame.shape for frame in some}) == 1
-    with Progress(console=console, transient=True) as progress:
-        task = progress.add_task("frames", total=footage.count)
+    with ProgressBar("frames", footage.count, transient=True) as bar:
         captured = capture(
             footage.read(),
             detector,
@@ -97,7 +96,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             name=str(options.recording),
             head_px=head_px,
             fixed=fixed,
-            on_progress=lambda: progress.advance(task),
+            on_progress=bar.advance,
         )
         if options.length_m is not None:
             m_per_px = scale_of_length(options.length_m, captured.length_px)
@@ -116,8 +115,8 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             image = next(islice(footage.read(), number, None))
             step_picture(options.steps, image, detector, captured.points_px[number])
         if options.overlay is not None:
-            task = progress.add_task("overlay film", total=footage.count)
-            overlay_film(options.overlay, footage.read(), captured, lambda: progress.advance(task))
+            bar.update(0, footage.count, description="overlay film")
+            overlay_film(options.overlay, footage.read(), captured, bar.advance)
     return _facts(options, footage, detector, captured, m_per_px)
 
 

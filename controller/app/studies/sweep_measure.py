@@ -1,7 +1,7 @@
 """One point of a sweep on the physics: through bus, safety layer and simulated servos."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,19 +16,37 @@ from snakewalk.controller.metrics.displacement import SKIPPED_S, gait_displaceme
 from snakewalk.controller.metrics.effort import Winding, effort
 from snakewalk.sim.servo.motor import MOTORS
 
-Row = dict[str, object]
-MEASURED = (
-    "ended", "cycles", "ran_hz", "forward_bl_cycle", "left_bl_cycle", "turn_rad_cycle",
-    "speed_m_s", "climb_m_s", "power_w", "cost_of_transport", "slip", "peak_current_a",
-    "peak_torque_n_m", "peak_temperature_c", "tracking_max_rad", "least_rate",
-)  # fmt: skip
-"""What a point is measured for; ``ran_hz``: cycles a second that the joints could follow."""
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """A point's results, in five digits; None: not known. The fields are columns of a table."""
+
+    ended: str
+    """``ran to its end``, the trip, or ``refused: ...``: then nothing else is known."""
+    cycles: int | None = None
+    ran_hz: float | None = None
+    """Cycles a second that the joints could follow."""
+    forward_bl_cycle: float | None = None
+    left_bl_cycle: float | None = None
+    turn_rad_cycle: float | None = None
+    speed_m_s: float | None = None
+    climb_m_s: float | None = None
+    power_w: float | None = None
+    cost_of_transport: float | None = None
+    slip: float | None = None
+    peak_current_a: float | None = None
+    peak_torque_n_m: float | None = None
+    peak_temperature_c: float | None = None
+    tracking_max_rad: float | None = None
+    least_rate: float | None = None
+
+
 FRICTION_SPREAD = 0.15
 SUPPLY_SPREAD = 0.05
 
 
-def measure(point: Point, vary: int | None = None) -> Row:
-    """Run a point and return what ``MEASURED`` names.
+def measure(point: Point, vary: int | None = None) -> Measurement:
+    """Run a point and return its results.
 
     ``vary`` draws other friction (up to 15 % off) and another supply (5 %), by its seed.
     """
@@ -46,33 +64,32 @@ def measure(point: Point, vary: int | None = None) -> Row:
         with TemporaryDirectory() as folder:
             finished = execute(prepared, Path(folder))
     except InputError as error:
-        return {"ended": f"refused: {error.faults[0]}"}
+        return Measurement(f"refused: {error.faults[0]}")
     record = finished.record
     start_s = next((e.time_s for e in record.events if e.kind == "start"), 0.0)
     ramp_s = max(0.0, record.end_s - start_s - point.seconds - 1.0)
     motor = MOTORS.get(record.header.robot.servo.model)
     winding = Winding(motor.resistance_ohm, motor.back_emf_v_s) if motor else None
-    way, cost = gait_displacement(record), effort(record, start_s + ramp_s + SKIPPED_S, winding)
+    moved, cost = gait_displacement(record), effort(record, start_s + ramp_s + SKIPPED_S, winding)
     numbers = finished.summary
-    found = {
-        "ended": finished.outcome.tripped or "ran to its end",
-        "cycles": way.cycles,
-        "ran_hz": way.frequency_hz,
-        "forward_bl_cycle": way.forward_bl,
-        "left_bl_cycle": way.left_bl,
-        "turn_rad_cycle": way.turn_rad,
-        "speed_m_s": way.speed_m_s,
-        "climb_m_s": cost.climb_m_s,
-        "power_w": cost.power_w,
-        "cost_of_transport": cost.cost_of_transport,
-        "slip": cost.slip,
-        "peak_current_a": numbers.peak_current_a,
-        "peak_torque_n_m": numbers.peak_torque_n_m,
-        "peak_temperature_c": numbers.peak_temperature_c,
-        "tracking_max_rad": numbers.tracking_max_rad,
-        "least_rate": finished.outcome.least_rate,
-    }
-    return {key: _digits(value) for key, value in found.items()}
+    return Measurement(
+        ended=finished.outcome.tripped or "ran to its end",
+        cycles=moved.cycles,
+        ran_hz=_digits(moved.frequency_hz),
+        forward_bl_cycle=_digits(moved.forward_bl),
+        left_bl_cycle=_digits(moved.left_bl),
+        turn_rad_cycle=_digits(moved.turn_rad),
+        speed_m_s=_digits(moved.speed_m_s),
+        climb_m_s=_digits(cost.climb_m_s),
+        power_w=_digits(cost.power_w),
+        cost_of_transport=_digits(cost.cost_of_transport),
+        slip=_digits(cost.slip),
+        peak_current_a=_digits(numbers.peak_current_a),
+        peak_torque_n_m=_digits(numbers.peak_torque_n_m),
+        peak_temperature_c=_digits(numbers.peak_temperature_c),
+        tracking_max_rad=_digits(numbers.tracking_max_rad),
+        least_rate=_digits(finished.outcome.least_rate),
+    )
 
 
 def _varied(prepared: GaitRun, rng: np.random.Generator) -> GaitRun:
@@ -94,8 +111,6 @@ def _varied(prepared: GaitRun, rng: np.random.Generator) -> GaitRun:
     )
 
 
-def _digits(value: object) -> object:
+def _digits(value: float | None) -> float | None:
     """Five digits, and None for what is not known: a table is read by people too."""
-    if not isinstance(value, float):
-        return value
-    return float(f"{value:.5g}") if math.isfinite(value) else None
+    return float(f"{value:.5g}") if value is not None and math.isfinite(value) else None

@@ -8,19 +8,21 @@ import csv
 import io
 import math
 import os
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.studies.sweep_measure import MEASURED, Row
+from snakewalk.controller.app.studies.sweep_measure import Measurement
 from snakewalk.controller.app.studies.sweep_points import Point
 from snakewalk.controller.gaits.gait import Aim
 from snakewalk.controller.gaits.registry import GAITS
 
 _PLACE = ("gait", "robot", "world", "number", "seed", "seconds")
+_MEASURED = tuple(field.name for field in fields(Measurement))
 _PARAMETERS = tuple(sorted({key for gait in GAITS.values() for key in gait.model.model_fields}))
-COLUMNS = (*_PLACE, *MEASURED, *_PARAMETERS)
+COLUMNS = (*_PLACE, *_MEASURED, *_PARAMETERS)
 """Empty where a gait has no such parameter, or nothing could be measured."""
 
 
@@ -84,11 +86,11 @@ class Table:
         """Those of ``points`` that the table does not hold yet."""
         return [point for point in points if point.key not in self._done]
 
-    def add(self, point: Point, row: Row) -> None:
+    def add(self, point: Point, row: Measurement) -> None:
         """Append a finished point."""
         place = dict(zip(_PLACE, point.key, strict=True))
         values = GAITS[point.gait].of(dict(point.parameters)).params.model_dump()
-        found = place | {k: v for k, v in (row | values).items() if v is not None}
+        found = place | {k: v for k, v in (asdict(row) | values).items() if v is not None}
         self._writer.writerow(found)
         self._file.flush()
         os.fsync(self._file.fileno())
@@ -103,30 +105,54 @@ def number(row: dict[str, str], key: str) -> float:
 UNITS: dict[Aim, str] = {"advance": "m/s", "climb": "m/s up", "turn": "rad/s"}
 
 
-def digest(rows: list[dict[str, str]]) -> list[dict[str, object]]:
+@dataclass(frozen=True, slots=True)
+class GaitDigest:
+    """A gait on a robot in a sweep, rounded for a reader; None: not known."""
+
+    gait: str
+    robot: str
+    points: int
+    tripped: int
+    """Points that did not run to their end."""
+    default_bl_cycle: float | None
+    """Body lengths a cycle, over ground, with the default parameters."""
+    most_bl_cycle: float | None
+    default_pace: float | None
+    most_pace: float | None
+    pace: str
+    """Unit of both paces."""
+    default_cost: float | None
+    """Cost of transport."""
+    least_cost: float | None
+    peak_torque_n_m: float | None
+    peak_c: float | None
+    default_slip: float | None
+
+
+def digest(rows: list[dict[str, str]]) -> list[GaitDigest]:
     """Return one row a gait and robot, in the order in which they appear."""
-    found: list[dict[str, object]] = []
+    found: list[GaitDigest] = []
     for gait, robot in dict.fromkeys((row["gait"], row["robot"]) for row in rows):
         some = [row for row in rows if (row["gait"], row["robot"]) == (gait, robot)]
         ran = [row for row in some if row["cycles"] and row["ended"] == "ran to its end"]
         first = next((row for row in ran if row["number"] == "0"), None)
         found.append(
-            {
-                "gait": gait,
-                "robot": robot,
-                "points": len(some),
-                "tripped": len(some) - len(ran),
-                "default_bl_cycle": _round(math.nan if first is None else way_bl(first), 3),
-                "most_bl_cycle": _round(_most([way_bl(row) for row in ran]), 3),
-                "default_pace": _round(math.nan if first is None else pace(first), 3),
-                "most_pace": _round(_most([pace(row) for row in ran]), 3),
-                "pace": UNITS[GAITS[gait].aim],
-                "default_cost": _round(_of(first, "cost_of_transport"), 2),
-                "least_cost": _round(-_most([-number(r, "cost_of_transport") for r in ran]), 2),
-                "peak_torque_n_m": _round(_peak(ran, "peak_torque_n_m"), 2),
-                "peak_c": _round(_peak(ran, "peak_temperature_c"), 1),
-                "default_slip": _round(_of(first, "slip"), 2),
-            }
+            GaitDigest(
+                gait=gait,
+                robot=robot,
+                points=len(some),
+                tripped=len(some) - len(ran),
+                default_bl_cycle=_round(math.nan if first is None else distance_bl(first), 3),
+                most_bl_cycle=_round(_most([distance_bl(row) for row in ran]), 3),
+                default_pace=_round(math.nan if first is None else pace(first), 3),
+                most_pace=_round(_most([pace(row) for row in ran]), 3),
+                pace=UNITS[GAITS[gait].aim],
+                default_cost=_round(_of(first, "cost_of_transport"), 2),
+                least_cost=_round(-_most([-number(r, "cost_of_transport") for r in ran]), 2),
+                peak_torque_n_m=_round(_peak(ran, "peak_torque_n_m"), 2),
+                peak_c=_round(_peak(ran, "peak_temperature_c"), 1),
+                default_slip=_round(_of(first, "slip"), 2),
+            )
         )
     return found
 
@@ -139,7 +165,7 @@ def pace(row: dict[str, str]) -> float:
     return abs(number(row, "climb_m_s" if aim == "climb" else "speed_m_s"))
 
 
-def way_bl(row: dict[str, str]) -> float:
+def distance_bl(row: dict[str, str]) -> float:
     """Body lengths a cycle, over ground."""
     return math.hypot(number(row, "forward_bl_cycle"), number(row, "left_bl_cycle"))
 

@@ -113,31 +113,55 @@ def _run_seed(item: tuple[Case, int], *, run: str, changes: Mapping[str, object]
     return run_trial(run, *item, changes)
 
 
-def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[dict[str, object]]:
+@dataclass(frozen=True, slots=True)
+class CaseSummary:
+    """The trials of one case, rounded for a reader; None: not known. The fields are columns."""
+
+    robot: str
+    motion: str
+    relief: float
+    slope_deg: float | None
+    complete: str
+    """``n of m`` runs."""
+    reached: float | None
+    passed_by: float | None
+    duration_s: float | None
+    path_error_m: float | None
+    eta: float | None
+    lead_max_rad: float | None
+    current_max_a: float | None
+    roll_max_deg: float | None
+    in_air: float | None
+    alarms: int
+    trips: int
+    why: str
+
+
+def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
     """One row a case: runs complete, means and extremes over its runs, and why others failed."""
-    rows: list[dict[str, object]] = []
+    rows: list[CaseSummary] = []
     for case in cases:
         some = sorted((t for t in found if t.case == case), key=lambda t: t.seed)
         rows.append(
-            {
-                "robot": case.robot or "",
-                "motion": case.motion,
-                "relief": case.relief,
-                "slope_deg": _mean([t.slope_median_deg for t in some], 1),
-                "complete": f"{sum(t.complete for t in some)} of {len(some)}",
-                "reached": _mean([t.reached for t in some], 2),
-                "passed_by": _mean([t.missed for t in some], 2),
-                "duration_s": _mean([t.duration_s for t in some], 1),
-                "path_error_m": _mean([t.path_error_m for t in some], 3),
-                "eta": _mean([t.eta for t in some], 2),
-                "lead_max_rad": _most([t.lead_max_rad for t in some], 3),
-                "current_max_a": _most([t.current_max_a for t in some], 2),
-                "roll_max_deg": _most([t.roll_max_deg for t in some], 0),
-                "in_air": _mean([t.in_air for t in some], 2),
-                "alarms": sum(t.alarms for t in some),
-                "trips": sum(t.tripped is not None for t in some),
-                "why": "; ".join(sorted({why for t in some if (why := reason(t))})),
-            }
+            CaseSummary(
+                robot=case.robot or "",
+                motion=case.motion,
+                relief=case.relief,
+                slope_deg=_mean([t.slope_median_deg for t in some], 1),
+                complete=f"{sum(t.complete for t in some)} of {len(some)}",
+                reached=_mean([t.reached for t in some], 2),
+                passed_by=_mean([t.missed for t in some], 2),
+                duration_s=_mean([t.duration_s for t in some], 1),
+                path_error_m=_mean([t.path_error_m for t in some], 3),
+                eta=_mean([t.eta for t in some], 2),
+                lead_max_rad=_most([t.lead_max_rad for t in some], 3),
+                current_max_a=_most([t.current_max_a for t in some], 2),
+                roll_max_deg=_most([t.roll_max_deg for t in some], 0),
+                in_air=_mean([t.in_air for t in some], 2),
+                alarms=sum(t.alarms for t in some),
+                trips=sum(t.tripped is not None for t in some),
+                why="; ".join(sorted({why for t in some if (why := reason(t))})),
+            )
         )
     return rows
 

@@ -17,7 +17,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.app.studies.pool import process_pool
-from snakewalk.controller.app.studies.sweep_measure import Row, measure
+from snakewalk.controller.app.studies.sweep_measure import Measurement, measure
 from snakewalk.controller.app.studies.sweep_points import Point, Space
 from snakewalk.controller.gaits.gait import Aim as Goal
 from snakewalk.controller.gaits.registry import make_gait
@@ -40,23 +40,23 @@ class Task:
     """Pace of the defaults."""
 
 
-def pace(row: Row, task: Task) -> float:
+def pace(row: Measurement, task: Task) -> float:
     """How fast it does what it is there for, m/s or rad/s; 0 where it did not run to its end."""
-    if row.get("ended") != "ran to its end" or row.get("speed_m_s") is None:
+    if row.ended != "ran to its end" or row.speed_m_s is None:
         return 0.0
     if task.goal == "turn":
-        return abs(_value(row, "turn_rad_cycle")) * _value(row, "ran_hz")
+        return abs(_value(row.turn_rad_cycle)) * _value(row.ran_hz)
     if task.goal == "climb":
-        return abs(_value(row, "climb_m_s"))
-    moved = _value(row, "forward_bl_cycle"), _value(row, "left_bl_cycle")
+        return abs(_value(row.climb_m_s))
+    moved = _value(row.forward_bl_cycle), _value(row.left_bl_cycle)
     share = (moved[0] * task.toward[0] + moved[1] * task.toward[1]) / max(math.hypot(*moved), 1e-12)
-    return max(0.0, _value(row, "speed_m_s") * share)
+    return max(0.0, _value(row.speed_m_s) * share)
 
 
-def loss(row: Row, task: Task) -> float:
+def loss(row: Measurement, task: Task) -> float:
     """What is made small; a gait that trips, is derated, or hardly moves is no answer."""
     speed = pace(row, task)
-    if speed <= 0.0 or _value(row, "least_rate") < 1.0:
+    if speed <= 0.0 or _value(row.least_rate) < 1.0:
         return _WORST
     if task.aim == "speed":
         return -speed
@@ -65,25 +65,24 @@ def loss(row: Row, task: Task) -> float:
     return cost(row, task)
 
 
-def task_of(row: Row, aim: Aim, goal: Goal) -> Task:
+def task_of(row: Measurement, aim: Aim, goal: Goal) -> Task:
     """Judge others by what the defaults do."""
-    forward, left = _value(row, "forward_bl_cycle"), _value(row, "left_bl_cycle")
+    forward, left = _value(row.forward_bl_cycle), _value(row.left_bl_cycle)
     size = math.hypot(forward, left)
     toward = (forward / size, left / size) if size > 1e-9 else (1.0, 0.0)
     task = Task(aim, goal, toward)
     return replace(task, least=pace(row, task))
 
 
-def cost(row: Row, task: Task) -> float:
+def cost(row: Measurement, task: Task) -> float:
     """Cost of transport, or joules a radian."""
     if task.goal == "turn":
-        return _value(row, "power_w") / pace(row, task)
-    return _value(row, "cost_of_transport")
+        return _value(row.power_w) / pace(row, task)
+    return _value(row.cost_of_transport)
 
 
-def _value(row: Row, key: str) -> float:
-    value = row.get(key)
-    return float(value) if isinstance(value, int | float) else math.nan
+def _value(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 _GENERATION = 8
@@ -144,7 +143,7 @@ def tune(
         first = measure(start)
         task = task_of(first, aim, kind.aim)
         if task.least <= 0.0:
-            raise InputError(f"{gait} on {robot}: the defaults do not move it: {first['ended']}")
+            raise InputError(f"{gait} on {robot}: the defaults do not move it: {first.ended}")
         done = 1
 
         def rate(work: Callable[[Floats], float], units: Iterable[Floats]) -> Sequence[float]:

@@ -1,6 +1,7 @@
 """``snakewalk sweep``: gaits on the physics over many parameters."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -71,7 +72,7 @@ def sweep(
             transient=False,
         ):
             table.add(point, row)
-    rows = digest(read_table(out))
+    rows = [asdict(one) for one in digest(read_table(out))]
     if picture is not None:
         from snakewalk.controller.app.report.plots.sweep import draw_sweep  # noqa: PLC0415
 

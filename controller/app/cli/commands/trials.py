@@ -76,7 +76,7 @@ def trials(
         study.trials(run, cases, seeds, workers, changes), run, len(cases) * seeds, transient=False
     ):
         found.append(done)
-    rows = study.table(found, cases)
+    rows = [asdict(one) for one in study.table(found, cases)]
     if as_json:
         print(json.dumps({"run": run, "table": rows, "trials": [asdict(t) for t in found]}))
         return

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from snakewalk.controller.app.studies.sweep_measure import Row, measure
+from snakewalk.controller.app.studies.sweep_measure import Measurement, measure
 from snakewalk.controller.app.studies.sweep_points import Point
 from snakewalk.controller.app.studies.tune import Task, loss
 
@@ -12,28 +12,31 @@ from snakewalk.controller.app.studies.tune import Task, loss
 def test_undulation_advances_costs_and_slips_less_than_it_goes() -> None:
     point = Point("lateral-undulation", "yaw16", "flat", 0, 0, 6.0)
     row = measure(point)
-    assert row["ended"] == "ran to its end"
-    assert float(row["forward_bl_cycle"]) > 0.3  # type: ignore[arg-type]
-    assert 0.0 < float(row["slip"]) < 0.6  # type: ignore[arg-type]
-    assert 0.05 < float(row["cost_of_transport"]) < 2.0  # type: ignore[arg-type]
+    assert row.ended == "ran to its end"
+    assert row.forward_bl_cycle is not None
+    assert row.forward_bl_cycle > 0.3
+    assert row.slip is not None
+    assert 0.0 < row.slip < 0.6
+    assert row.cost_of_transport is not None
+    assert 0.05 < row.cost_of_transport < 2.0
     assert measure(point) == row  # the same point gives the same row
     other = measure(point, vary=1)
-    assert other["speed_m_s"] != row["speed_m_s"]
+    assert other.speed_m_s != row.speed_m_s
 
 
 def test_a_gait_that_a_robot_refuses_is_a_row_and_no_crash() -> None:
     point = Point("lateral-undulation", "yaw16", "flat", 0, 0, 4.0)
     row = measure(replace(point, parameters={"winding_rad": 1.4, "turn_rad": 2.5, "waves": 3.0}))
-    assert str(row["ended"]).startswith("refused: ")
+    assert row.ended.startswith("refused: ")
 
 
-@pytest.mark.parametrize("missing", ["ended", "speed_m_s"])
-def test_unmeasured_points_never_win(missing: str) -> None:
+def test_unmeasured_points_never_win() -> None:
     row = ahead(1.0, 0.0)
     good = loss(row, SPEED)
     assert good == -1.0
-    assert loss(row | {missing: None}, SPEED) > good
-    assert loss(row | {"least_rate": 0.9}, SPEED) > good
+    assert loss(replace(row, ended="refused: no"), SPEED) > good
+    assert loss(replace(row, speed_m_s=None), SPEED) > good
+    assert loss(replace(row, least_rate=0.9), SPEED) > good
 
 
 def test_what_goes_elsewhere_is_another_gait() -> None:
@@ -45,7 +48,13 @@ def test_what_goes_elsewhere_is_another_gait() -> None:
 SPEED = Task("speed", "advance", (1.0, 0.0), 0.5)
 
 
-def ahead(forward: float, left: float) -> Row:
+def ahead(forward: float, left: float) -> Measurement:
     """A run at 1 m/s in this direction."""
-    found: Row = {"ended": "ran to its end", "speed_m_s": 1.0, "climb_m_s": 0.0, "least_rate": 1.0}
-    return found | {"forward_bl_cycle": forward, "left_bl_cycle": left}
+    return Measurement(
+        "ran to its end",
+        speed_m_s=1.0,
+        climb_m_s=0.0,
+        least_rate=1.0,
+        forward_bl_cycle=forward,
+        left_bl_cycle=left,
+    )

@@ -1,13 +1,15 @@
 """The table of a sweep survives a kill: no finished row is lost, none is run twice."""
 
+from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.studies.sweep_measure import MEASURED, Row
+from snakewalk.controller.app.studies.sweep_measure import Measurement
 from snakewalk.controller.app.studies.sweep_points import Point
 from snakewalk.controller.app.studies.sweep_table import COLUMNS, Table, digest, read_table
 
@@ -17,9 +19,10 @@ POINTS = [
 ]
 
 
-def row(way_bl: float) -> Row:
-    found: Row = dict.fromkeys(MEASURED, 1.0)
-    return found | {"ended": "ran to its end", "cycles": 5, "forward_bl_cycle": way_bl}
+def row(forward_bl: float) -> Measurement:
+    ones: dict[str, Any] = dict.fromkeys((field.name for field in fields(Measurement)), 1.0)
+    given = {"ended": "ran to its end", "cycles": 5, "forward_bl_cycle": forward_bl}
+    return Measurement(**ones | given)
 
 
 def test_columns_are_unique() -> None:
@@ -72,8 +75,8 @@ def test_digest_takes_the_defaults_and_the_best(tmp_path: Path) -> None:
         for point in POINTS:
             table.add(point, row(0.3 - 0.1 * abs(point.number - 3)))
         tripped = Point("lateral-undulation", "yaw16", "flat", 6, 0, 10.0)
-        table.add(tripped, {"ended": "refused: no"})
+        table.add(tripped, Measurement("refused: no"))
     (one,) = digest(read_table(path))
-    assert one["points"] == 7
-    assert one["tripped"] == 1
-    assert one["most_bl_cycle"] == pytest.approx(1.044, abs=1e-3)  # hypot(0.3, left 1.0)
+    assert one.points == 7
+    assert one.tripped == 1
+    assert one.most_bl_cycle == pytest.approx(1.044, abs=1e-3)  # hypot(0.3, left 1.0)
