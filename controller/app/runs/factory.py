@@ -71,6 +71,8 @@ def prepare_walk(name: str, **changes: object) -> WalkRun:
     run = checked(RunConfig, run.model_dump() | options, "command line")
     if run.motion == "gait":
         raise InputError(f"run {run.name}: a gait is run by: snakewalk gait run NAME")
+    if run.motion == "playback":
+        raise InputError(f"run {run.name}: a recording is played by: snakewalk play TRACK")
     if run.motion == "repertoire":
         raise InputError(f"run {run.name}: planned by: snakewalk plan --with repertoire")
     if run.motion == "source":

@@ -13,7 +13,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.app.report.artifacts import build_report
 from snakewalk.controller.app.runs.execute import Finished, execute
-from snakewalk.controller.app.runs.factory import prepare_run, prepare_source
+from snakewalk.controller.app.runs.factory import prepare_run, prepare_source, prepare_walk
 from snakewalk.controller.app.studies.replay import differences, replay
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.gaits.registry import make_gait
@@ -169,6 +169,13 @@ def test_a_run_is_not_made_again_from_its_log(finished: Finished) -> None:
     header = finished.record.header
     with pytest.raises(InputError, match=r"its motion was the user's own.*snakewalk replay LOG"):
         prepare_run(header.run, header.robot, header.world)
+
+
+@pytest.mark.parametrize("motion", ["gait", "playback", "repertoire", "source"])
+def test_no_walk_is_prepared_of_another_motion(motion: str) -> None:
+    gait = {"name": "rolling"} if motion == "gait" else None
+    with pytest.raises(InputError, match="run flat-square: "):
+        prepare_walk("flat-square", motion=motion, gait=gait)
 
 
 def test_a_run_on_a_port_is_replayed(tmp_path: Path) -> None:
