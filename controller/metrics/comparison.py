@@ -53,7 +53,7 @@ class Comparison:
         """Whether no digit differs."""
         return self.same and all(d.largest == 0.0 for d in self.differences)
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {
             "same": self.same,

@@ -43,7 +43,7 @@ class DecodedPacket:
     raw: str
     """Bytes in hexadecimal."""
 
-    def as_dict(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """For JSON."""
         return asdict(self)
 

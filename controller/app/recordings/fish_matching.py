@@ -33,7 +33,7 @@ class MatchFacts:
     left_over_deg: float | None = None
     """Of midlines: what the spine angles do not explain, root mean square."""
 
-    def as_dict(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """Return the facts that are known, for JSON."""
         values = {name: getattr(self, name) for name in MatchFacts.__slots__}
         return {name: value for name, value in values.items() if value is not None}

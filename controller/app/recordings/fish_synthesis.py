@@ -65,7 +65,7 @@ class SynthesisFacts:
     """Largest joint step where one piece ends and the next begins; None with one piece."""
     join_step_blended_deg: float | None = None
 
-    def as_dict(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """Return the facts that are known, for JSON."""
         values = {name: getattr(self, name) for name in SynthesisFacts.__slots__}
         return {name: value for name, value in values.items() if value is not None}

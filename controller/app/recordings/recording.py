@@ -61,7 +61,7 @@ class RecordingFacts:
     """Shapes refused, by reason, each counted for the first reason only."""
     pace: PaceFacts
 
-    def as_dict(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """Return all facts, those of the pace among the others, for JSON."""
         own = {name: getattr(self, name) for name in RecordingFacts.__slots__ if name != "pace"}
         return own | {name: getattr(self.pace, name) for name in PaceFacts.__slots__}

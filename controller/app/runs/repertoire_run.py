@@ -187,7 +187,7 @@ class RouteRun:
         """Whether every waypoint was reached without a trip."""
         return self.finished.outcome.complete(len(self.job.run.waypoints_m))
 
-    def facts(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """Numbers for a command's answer."""
         job, outcome, follower = self.job, self.finished.outcome, self.follower
         facts: dict[str, object] = {

@@ -16,7 +16,7 @@ class Finding:
     remedy: str = ""
     """What to do; empty where all is well."""
 
-    def as_dict(self) -> dict[str, str]:
+    def to_dict(self) -> dict[str, str]:
         """For JSON."""
         return asdict(self)
 

@@ -24,7 +24,7 @@ class ScanResult:
     firmware: int | None
     baud: int
 
-    def as_dict(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """For JSON."""
         return asdict(self)
 

@@ -61,7 +61,7 @@ class SettingsResult:
     written: bool
     """Whether the changes were written and read back."""
 
-    def as_dict(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """For JSON."""
         return asdict(self)
 

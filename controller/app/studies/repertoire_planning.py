@@ -200,7 +200,7 @@ class SearchCost:
         """Extrapolated: all candidates at the price of those that were run."""
         return self.candidates * self.physics_candidate_s
 
-    def facts(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """Numbers for a command's answer."""
         return {
             "search_s": round(self.candidates * self.candidate_s, 4),

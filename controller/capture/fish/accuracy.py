@@ -29,7 +29,7 @@ class Accuracy:
     height: Floats | None
     """(n,) absolute error of the height, body lengths, one shift of the film taken out."""
 
-    def facts(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """Medians and 95th percentiles, degrees and percent of body length."""
         spine = np.degrees(self.angles_rad)
         found: dict[str, object] = {

@@ -50,7 +50,7 @@ def test_unknown_equals_unknown_but_not_a_number(record: RunRecord) -> None:
     assert compare(hole, hole).same
     result = compare(record, hole)
     assert not result.same
-    assert json.loads(json.dumps(result.as_dict(), allow_nan=False))["same"] is False
+    assert json.loads(json.dumps(result.to_dict(), allow_nan=False))["same"] is False
 
 
 def test_a_shorter_replay_is_not_the_same(record: RunRecord) -> None:

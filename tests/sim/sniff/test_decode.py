@@ -88,7 +88,7 @@ def test_a_wrong_recording_names_its_line(tmp_path: Path) -> None:
 
 def test_lines_go_to_json() -> None:
     for line in decoded((1, Instruction.READ, bytes((132, 0, 4, 0)))):
-        assert json.loads(json.dumps(line.as_dict()))["servo_id"] == 1
+        assert json.loads(json.dumps(line.to_dict()))["servo_id"] == 1
 
 
 @pytest.mark.parametrize(

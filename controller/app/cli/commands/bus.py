@@ -117,7 +117,7 @@ def sniff(
     try:
         for time_s, data in pieces:
             for line in decoder.feed(time_s, data):
-                print(json.dumps(line.as_dict()) if as_json else line.text(), flush=live)
+                print(json.dumps(line.to_dict()) if as_json else line.text(), flush=live)
     except KeyboardInterrupt:
         print(file=sys.stderr)
 
@@ -288,7 +288,7 @@ def bus_set(
         if written:
             apply(bus, servo_id, changes)
     if as_json:
-        print(json.dumps(SettingsResult(servo_id, changes, written).as_dict()))
+        print(json.dumps(SettingsResult(servo_id, changes, written).to_dict()))
     elif changes:
         console.print("written and read back" if written else "nothing written")
 

@@ -46,7 +46,7 @@ def doctor(
             )
     grade = worst(findings)
     if as_json:
-        shown = [finding.as_dict() for finding in findings]
+        shown = [finding.to_dict() for finding in findings]
         print(
             json.dumps({"port": device, "robot": described.name, "worst": grade, "findings": shown})
         )

@@ -109,9 +109,9 @@ def match(
         from snakewalk.controller.app.report.plots.fish import draw_match  # noqa: PLC0415
 
         draw_match(picture, matched.postures, known, matched.film, footage)
-    facts = matched.facts.as_dict()
+    facts = matched.facts.to_dict()
     if accuracy is not None:
-        facts |= accuracy.facts()
+        facts |= accuracy.to_dict()
     show(facts | {"postures": str(output)}, as_json)
 
 
@@ -165,7 +165,7 @@ def synthesise(
         from snakewalk.controller.app.report.plots.fish_path import draw_synthesis  # noqa: PLC0415
 
         draw_synthesis(picture, made, options)
-    show(made.facts.as_dict() | {"track": str(output)}, as_json)
+    show(made.facts.to_dict() | {"track": str(output)}, as_json)
 
 
 def _check_npz(path: Path) -> None:

@@ -132,7 +132,7 @@ def _plan_with_repertoire(
     if physics:
         with ProgressBar("candidates on the physics", physics) as bar:
             cost = search_cost(job, physics, beam=beam, on_progress=bar.update)
-        found |= cost.facts()
+        found |= cost.to_dict()
     if out is not None:
         save_plan(job, out)
         found["plan"] = str(out)

@@ -127,7 +127,7 @@ def carry_out(
         from snakewalk.controller.app.report.plots import repertoire as plots  # noqa: PLC0415
 
         plots.draw_route(job, finished.record, picture)
-    return ran.facts() | {"log": str(finished.log)} | artifacts.to_dict(), ran.complete
+    return ran.to_dict() | {"log": str(finished.log)} | artifacts.to_dict(), ran.complete
 
 
 def _show_actions(file: Path, repertoire: "Repertoire", as_json: bool) -> None:

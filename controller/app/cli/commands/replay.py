@@ -38,7 +38,7 @@ def replay(
     comparison = replaying.differences(record, again, tolerance_rad, tolerance_m)
     if as_json:
         print(
-            json.dumps({"log": str(log), "backend": record.header.backend} | comparison.as_dict())
+            json.dumps({"log": str(log), "backend": record.header.backend} | comparison.to_dict())
         )
     else:
         for line in comparison.lines():

@@ -34,7 +34,7 @@ def scan(
     ):
         results = scanning.scan(line, baud or (), lambda step: status.update(f"{device}: {step}"))
     if as_json:
-        print(json.dumps({"port": device, "servos": [servo.as_dict() for servo in results]}))
+        print(json.dumps({"port": device, "servos": [servo.to_dict() for servo in results]}))
     elif results:
         table = Table("ID", "model", "firmware", "baud", box=None)
         for servo in results:

@@ -45,7 +45,7 @@ def track(
 
         draw([(one.track, Path(one.facts.recording).name) for one in found], picture)
     if as_json:
-        print(json.dumps([one.facts.as_dict() for one in found]))
+        print(json.dumps([one.facts.to_dict() for one in found]))
         return
     for one in found:
         _show(one.facts)
