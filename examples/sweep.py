@@ -31,7 +31,7 @@ def main() -> None:
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         for point, row in zip(planned.points, pool.map(sw.measure, planned.points), strict=True):
             values = ", ".join(f"{name} {value}" for name, value in point.parameters.items())
-            print(f"{point.gait}: {row['speed_m_s']} m/s, {row['ended']} ({values or 'defaults'})")
+            print(f"{point.gait}: {row.speed_m_s} m/s, {row.ended} ({values or 'defaults'})")
 
 
 if __name__ == "__main__":
