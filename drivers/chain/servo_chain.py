@@ -116,14 +116,7 @@ class ServoChain:
             self._budget(fast=self.inspection.fast_reads).check(self._rate_hz)
         configure(self._bus, self.robot, self._units)
         self._prepare_reads(fast=self.inspection.fast_reads)
-        self._reads = 0
-        state = self._first_state()
-        check_pose(self.robot, state.position_rad)
-        try:
-            return self._hold_and_arm(state)
-        except BaseException:
-            self.disable()
-            raise
+        return self._begin()
 
     def recheck(self) -> Recheck:
         """Compare the chain after an interruption with what it was; moves nothing.
@@ -151,6 +144,10 @@ class ServoChain:
         if found.faults:
             raise ChainError([str(fault) for fault in found.faults])
         configure(self._bus, self.robot, self._units, found.torque_off)
+        return self._begin()
+
+    def _begin(self) -> JointState:
+        """Read the first state, hold it and arm the watchdogs; torque is off if that fails."""
         self._reads = 0
         state = self._first_state()
         check_pose(self.robot, state.position_rad)
