@@ -23,7 +23,11 @@ PING = bytes.fromhex("FF FF FD 00 01 03 00 01 19 4E")
 
 
 def snakewalk(*words: str) -> subprocess.Popen[str]:
-    code = "from snakewalk.controller.app.cli.main import main; main()"
+    # a runner in the background has SIGINT ignored, which its children inherit
+    code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
+        "from snakewalk.controller.app.cli.main import main; main()"
+    )
     return subprocess.Popen(
         [sys.executable, "-c", code, *words],
         stdout=subprocess.PIPE,
