@@ -1,17 +1,13 @@
 """A run of a gait: its checks, its changes of gait, the live operator and the head steering."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.gait import GaitConfig
-from snakewalk.config.ground import build_ground
-from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import RunConfig
-from snakewalk.config.world import WorldConfig
-from snakewalk.controller.app.runs.prepared_run import plan_without_path, pose_with
+from snakewalk.controller.app.runs.prepared_run import PathlessRun, plan_without_path, pose_with
 from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.motion.cpg_motion import CpgMotion
@@ -27,24 +23,10 @@ MakeOperator = Callable[[GaitMotion, RobotConfig, OnEvent], MotionSource]
 
 
 @dataclass(frozen=True)
-class GaitRun:
+class GaitRun(PathlessRun):
     """A ``PreparedRun`` of a gait."""
 
-    run: RunConfig
-    robot: RobotConfig
-    world: WorldConfig
     make_operator: MakeOperator | None = None
-    gain: float = field(default=float("nan"), init=False)
-
-    @cached_property
-    def ground(self) -> HeightField | None:
-        """The world's height field; None on a flat floor."""
-        return build_ground(self.world)
-
-    @property
-    def start_heading_rad(self) -> float:
-        """Mean heading of the body at the start."""
-        return self.run.start_heading_rad or 0.0
 
     @property
     def config(self) -> GaitConfig:

@@ -1,18 +1,13 @@
 """A run that plays a recording in time on a robot."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.ground import build_ground
-from snakewalk.config.heightfield import HeightField
 from snakewalk.config.playback import PlaybackConfig
-from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import RunConfig
-from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.recordings.recorded_joints import recorded_joints
-from snakewalk.controller.app.runs.prepared_run import plan_without_path, pose_with
+from snakewalk.controller.app.runs.prepared_run import PathlessRun, plan_without_path, pose_with
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
@@ -20,23 +15,8 @@ from snakewalk.controller.runtime.drive import OnEvent
 
 
 @dataclass(frozen=True)
-class PlaybackRun:
+class PlaybackRun(PathlessRun):
     """A ``PreparedRun`` of a recording."""
-
-    run: RunConfig
-    robot: RobotConfig
-    world: WorldConfig
-    gain: float = field(default=float("nan"), init=False)
-
-    @cached_property
-    def ground(self) -> HeightField | None:
-        """The world's height field; None on a flat floor."""
-        return build_ground(self.world)
-
-    @property
-    def start_heading_rad(self) -> float:
-        """Mean heading of the body at the start."""
-        return self.run.start_heading_rad or 0.0
 
     @cached_property
     def joint_track(self) -> tuple[Floats, Floats]:

@@ -1,10 +1,13 @@
 """What is known of a run before a servo moves: the interface of every kind of motion."""
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
@@ -75,3 +78,27 @@ def plan_without_path(run: RunConfig) -> PlanSummary:
     """Summarise a plan that stays where it starts."""
     start = np.array([run.start_m, run.start_m], dtype=float)
     return PlanSummary(start, np.zeros((0, 2)), run.waypoint_radius_m)
+
+
+@dataclass(frozen=True)
+class PathlessRun:
+    """Base of prepared runs without a path."""
+
+    run: RunConfig
+    robot: RobotConfig
+    world: WorldConfig
+
+    @property
+    def gain(self) -> float:
+        """NaN: without a path no speed is predicted."""
+        return float("nan")
+
+    @cached_property
+    def ground(self) -> HeightField | None:
+        """The world's height field; None on a flat floor."""
+        return build_ground(self.world)
+
+    @property
+    def start_heading_rad(self) -> float:
+        """Mean heading of the body at the start."""
+        return self.run.start_heading_rad or 0.0

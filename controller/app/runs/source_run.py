@@ -1,19 +1,14 @@
 """A run of a user's own motion source, checked on paper before torque is on."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.ground import build_ground
-from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import RunConfig
-from snakewalk.config.world import WorldConfig
-from snakewalk.controller.app.runs.prepared_run import plan_without_path, pose_with
+from snakewalk.controller.app.runs.prepared_run import PathlessRun, plan_without_path, pose_with
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.motion.path_progress import path_progress
@@ -29,24 +24,10 @@ _SLACK = 1.0 + 1e-6
 
 
 @dataclass(frozen=True)
-class SourceRun:
+class SourceRun(PathlessRun):
     """A ``PreparedRun`` of a user's own motion source."""
 
-    run: RunConfig
-    robot: RobotConfig
-    world: WorldConfig
     make: MakeSource
-    gain: float = field(default=float("nan"), init=False)
-
-    @cached_property
-    def ground(self) -> HeightField | None:
-        """The world's height field; None on a flat floor."""
-        return build_ground(self.world)
-
-    @property
-    def start_heading_rad(self) -> float:
-        """Mean heading of the body at the start."""
-        return self.run.start_heading_rad or 0.0
 
     def initial_pose(self) -> InitialPose:
         """Return the shape that the source begins with."""
