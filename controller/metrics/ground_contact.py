@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.runlog.record import RunRecord
 
@@ -16,7 +17,7 @@ class GroundContact:
     """Over all cycles of a run."""
 
     roll_max_rad: float
-    """Largest roll of the head link to a side."""
+    """Largest roll of the head link to a side; pi upside down."""
     in_air: float
     """Share of links in the air, mean."""
 
@@ -34,5 +35,10 @@ def ground_contact(record: RunRecord, ground: HeightField | None) -> GroundConta
         lean = record.header.robot.body_radius_m * (np.sqrt(1.0 + gx**2 + gy**2) - 1.0)
         rest = ground.elevation_m(x, y) + lean
     gap = z - rest - record.header.robot.body_radius_m
-    roll = np.arcsin(np.clip(pose.rotation[:, 2, 1], -1.0, 1.0))
-    return GroundContact(float(np.abs(roll).max()), float((gap > CLEAR_M).mean()))
+    roll = np.abs(roll_rad(pose.rotation))
+    return GroundContact(float(roll.max()), float((gap > CLEAR_M).mean()))
+
+
+def roll_rad(rotation: Floats) -> Floats:
+    """Roll (n,) of a link about its own axis, from -pi to pi, by its frames (n, 3, 3)."""
+    return np.asarray(np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2]))

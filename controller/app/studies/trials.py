@@ -1,10 +1,9 @@
-"""One job over many seeds, motions, robots and steepnesses, on a process pool."""
+"""Runs over many seeds, motions, robots and steepnesses, on a process pool."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,14 +14,18 @@ from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.app.studies.pool import each
+from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
 from snakewalk.controller.terrain.summary import path_relief
+
+_START_DRAWS = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
     """What distinguishes one row of the table; None leaves the run's own."""
 
+    run: str
     motion: str
     robot: str | None = None
     relief: float = 1.0
@@ -35,14 +38,19 @@ class Trial:
 
     case: Case
     seed: int
-    waypoints: int
+    start_m: tuple[float, float] | None = None
+    """Where the head started; None where the run could not be prepared."""
+    waypoints: int = 0
     complete: bool = False
     reached: int = 0
     missed: int = 0
+    """How often a waypoint was passed by."""
     duration_s: float = math.nan
     slope_median_deg: float = math.nan
     """Of the path."""
     path_error_m: float = math.nan
+    """Mean."""
+    path_error_max_m: float = math.nan
     eta: float = math.nan
     """Forward speed over pulse speed."""
     lead_max_rad: float = math.nan
@@ -53,88 +61,163 @@ class Trial:
     """Share of links that do not touch the ground, mean."""
     alarms: int = 0
     """For missing advance."""
-    tripped: str | None = None
-    refused: str | None = None
-    """Why the plan was refused, where it was."""
+    cause: str = ""
+    """Of a run that is not complete: that of ``metrics.failure``, or ``refused`` or ``error``."""
+    why: str = ""
+    """The same in a sentence."""
+
+    @property
+    def first_pass(self) -> bool:
+        """Whether every waypoint was reached and none was passed by."""
+        return self.complete and self.missed == 0
 
 
-def prepare_case(run: str, case: Case, seed: int, changes: Mapping[str, object]) -> WalkRun:
-    """Prepare one trial's run."""
+def prepare_case(case: Case, seed: int, spread_m: float, changes: Mapping[str, object]) -> WalkRun:
+    """Prepare one trial's run; its start is moved by a normal deviate, drawn from the seed.
+
+    A start on unsafe ground is drawn again, so that the moved start does not fail by itself.
+
+    Raises:
+        InputError: the run cannot be prepared, or there is no safe ground about its start.
+
+    """
     robot = {"robot": case.robot} if case.robot is not None else {}
-    found = prepare_walk(run, motion=case.motion, seed=seed, **(dict(changes) | robot))
-    if case.relief == 1.0:
+    found = prepare_walk(case.run, motion=case.motion, seed=seed, **(dict(changes) | robot))
+    if case.relief != 1.0:
+        found = replace(found, world=found.world.with_relief(case.relief))
+    if spread_m == 0.0:
         return found
-    return replace(found, world=found.world.with_relief(case.relief))
+    relief, start_m = found.planner.relief, np.array(found.run.start_m)
+    rng = np.random.default_rng(seed)
+    for _ in range(_START_DRAWS):
+        x_m, y_m = start_m + spread_m * rng.standard_normal(2)
+        if relief is None or relief.safe(x_m, y_m):
+            moved = found.run.model_copy(update={"start_m": (float(x_m), float(y_m))})
+            return replace(found, run=moved)
+    raise InputError(
+        f"run {found.run.name}: no safe ground within {spread_m:g} m of the start "
+        f"({start_m[0]:.2f}, {start_m[1]:.2f}); move the start or give --start-spread 0"
+    )
 
 
-def run_trial(run: str, case: Case, seed: int, changes: Mapping[str, object]) -> Trial:
-    """Simulate one run; its log is not kept."""
-    prepared = prepare_case(run, case, seed, changes)
-    waypoints = len(prepared.run.waypoints_m)
-    relief = path_relief(prepared.planner, prepared.path)
-    slope_deg = float(np.degrees(relief.median_slope_rad))
+def is_fixed(case: Case, spread_m: float, changes: Mapping[str, object]) -> bool:
+    """Whether all seeds give the same run, so that it counts once.
+
+    The seed draws the start, the walk's shapes and a camera's noise, and nothing of a serpenoid.
+    """
+    run = prepare_case(case, 0, 0.0, changes).run
+    return spread_m == 0.0 and run.motion == "serpenoid" and run.pose != "camera"
+
+
+def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, object]) -> Trial:
+    """Simulate one run; its log is not kept. A run that ends in an exception is a trial as well."""
+    trial = Trial(case, seed)
+    try:
+        prepared = prepare_case(case, seed, spread_m, changes)
+        slope_rad = path_relief(prepared.planner, prepared.path).median_slope_rad
+        trial = replace(
+            trial,
+            start_m=prepared.run.start_m,
+            waypoints=len(prepared.run.waypoints_m),
+            slope_median_deg=float(np.degrees(slope_rad)),
+        )
+        return _measured(trial, prepared)
+    except InputError as error:
+        return replace(trial, cause="refused", why=f"refused: {error.faults[0]}")
+    except Exception as error:  # the other runs go on
+        return replace(trial, cause="error", why=f"{type(error).__name__}: {error}")
+
+
+def _measured(trial: Trial, prepared: WalkRun) -> Trial:
     with TemporaryDirectory() as folder:
-        try:
-            finished = execute(prepared, Path(folder))
-        except InputError as error:
-            return Trial(case, seed, waypoints, slope_median_deg=slope_deg, refused=error.faults[0])
+        finished = execute(prepared, Path(folder))
         stood = ground_contact(finished.record, prepared.ground)
     numbers, outcome = finished.summary, finished.outcome
-    return Trial(
-        case=case,
-        seed=seed,
-        waypoints=waypoints,
-        complete=outcome.complete(waypoints),
+    complete = outcome.complete(trial.waypoints)
+    ended = None if complete else failure(finished.record)
+    return replace(
+        trial,
+        complete=complete,
         reached=outcome.reached,
         missed=outcome.missed,
         duration_s=outcome.duration_s,
-        slope_median_deg=slope_deg,
         path_error_m=_number(numbers.path_error_mean_m),
+        path_error_max_m=_number(numbers.path_error_max_m),
         eta=_number(numbers.eta),
         lead_max_rad=_number(numbers.tracking_max_rad),
         current_max_a=_number(numbers.peak_current_a),
         roll_max_deg=float(np.degrees(stood.roll_max_rad)),
         in_air=stood.in_air,
         alarms=outcome.alarms,
-        tripped=outcome.tripped,
+        cause="" if ended is None else ended.cause,
+        why="" if ended is None else ended.text,
     )
 
 
+def plan_trials(
+    cases: Sequence[Case], seeds: Sequence[int], spread_m: float, changes: Mapping[str, object]
+) -> list[tuple[Case, int]]:
+    """List what is to be run: a case of which all seeds give the same run stands once.
+
+    Raises:
+        InputError: a case cannot be prepared.
+
+    """
+    return [
+        (case, seed)
+        for case in cases
+        for seed in (seeds[:1] if is_fixed(case, spread_m, changes) else seeds)
+    ]
+
+
 def trials(
-    run: str, cases: Sequence[Case], seeds: int, workers: int, changes: Mapping[str, object]
+    planned: Sequence[tuple[Case, int]],
+    workers: int,
+    *,
+    spread_m: float,
+    changes: Mapping[str, object],
 ) -> Iterator[Trial]:
-    """Yield trials as they finish; ``changes`` replace fields of the run where not None."""
-    work = partial(_run_seed, run=run, changes=changes)
-    for _, trial in each(work, list(product(cases, range(seeds))), workers=workers):
+    """Yield the planned trials as they finish; ``changes`` replace fields of the runs."""
+    work = partial(_run_seed, spread_m=spread_m, changes=changes)
+    for _, trial in each(work, planned, workers=workers):
         yield trial
 
 
-def _run_seed(item: tuple[Case, int], *, run: str, changes: Mapping[str, object]) -> Trial:
-    return run_trial(run, *item, changes)
+def _run_seed(item: tuple[Case, int], *, spread_m: float, changes: Mapping[str, object]) -> Trial:
+    return run_trial(*item, spread_m, changes)
 
 
 @dataclass(frozen=True, slots=True)
 class CaseSummary:
     """The trials of one case, rounded for a reader; None: not known. The fields are columns."""
 
+    run: str
     robot: str
     motion: str
     relief: float
+    runs: int
     slope_deg: float | None
     complete: str
     """``n of m`` runs."""
+    complete_95: tuple[float, float]
+    """Interval of the share of complete runs (Wilson, 95 %)."""
+    first_pass: int
+    """Complete runs that passed no waypoint by."""
+    first_pass_95: tuple[float, float]
     reached: float | None
-    passed_by: float | None
+    passed_by: int
+    """In all runs, also in those that are not complete."""
     duration_s: float | None
     path_error_m: float | None
+    path_error_max_m: float | None
     eta: float | None
     lead_max_rad: float | None
     current_max_a: float | None
     roll_max_deg: float | None
     in_air: float | None
     alarms: int
-    trips: int
     why: str
+    """Causes of failure, how many runs each."""
 
 
 def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
@@ -142,43 +225,56 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
     rows: list[CaseSummary] = []
     for case in cases:
         some = sorted((t for t in found if t.case == case), key=lambda t: t.seed)
+        complete, first = sum(t.complete for t in some), sum(t.first_pass for t in some)
         rows.append(
             CaseSummary(
+                run=case.run,
                 robot=case.robot or "",
                 motion=case.motion,
                 relief=case.relief,
+                runs=len(some),
                 slope_deg=_mean([t.slope_median_deg for t in some], 1),
-                complete=f"{sum(t.complete for t in some)} of {len(some)}",
+                complete=f"{complete} of {len(some)}",
+                complete_95=wilson(complete, len(some)),
+                first_pass=first,
+                first_pass_95=wilson(first, len(some)),
                 reached=_mean([t.reached for t in some], 2),
-                passed_by=_mean([t.missed for t in some], 2),
+                passed_by=sum(t.missed for t in some),
                 duration_s=_mean([t.duration_s for t in some], 1),
                 path_error_m=_mean([t.path_error_m for t in some], 3),
+                path_error_max_m=_most([t.path_error_max_m for t in some], 2),
                 eta=_mean([t.eta for t in some], 2),
                 lead_max_rad=_most([t.lead_max_rad for t in some], 3),
                 current_max_a=_most([t.current_max_a for t in some], 2),
                 roll_max_deg=_most([t.roll_max_deg for t in some], 0),
                 in_air=_mean([t.in_air for t in some], 2),
                 alarms=sum(t.alarms for t in some),
-                trips=sum(t.tripped is not None for t in some),
-                why="; ".join(sorted({why for t in some if (why := reason(t))})),
+                why=_causes([t for t in some if not t.complete]),
             )
         )
     return rows
 
 
-def reason(trial: Trial) -> str:
-    """Why a trial is not complete, in words; empty if it is."""
-    if trial.complete:
-        return ""
-    if trial.refused:
-        return f"refused: {trial.refused}"
-    if trial.tripped:
-        return trial.tripped.partition(": ")[2] or trial.tripped
-    if trial.roll_max_deg > 60.0:
-        return "rolls over"
-    if trial.alarms:
-        return "slips"
-    return "passes by" if trial.missed else "out of time"
+def wilson(successes: int, runs: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share by E. B. Wilson (1927), three digits; (0, 1) of no run.
+
+    Unlike the normal approximation it holds for few runs and for shares of 0 and 1.
+    """
+    if runs == 0:
+        return 0.0, 1.0
+    z = 1.959964  # normal quantile of 97.5 %
+    share, square = successes / runs, z * z / runs
+    middle = (share + square / 2.0) / (1.0 + square)
+    half = z * math.sqrt((share * (1.0 - share) + square / 4.0) / runs) / (1.0 + square)
+    return round(max(middle - half, 0.0), 3), round(min(middle + half, 1.0), 3)
+
+
+def _causes(failed: Sequence[Trial]) -> str:
+    """Causes by how often they occur; what the software did not foresee, in full."""
+    words = [t.why if t.cause in {"safety", "refused", "error"} else t.cause for t in failed]
+    counts = {word: words.count(word) for word in sorted(set(words))}
+    most = sorted(counts.items(), key=lambda item: -item[1])
+    return "; ".join(f"{count} {word}" for word, count in most)
 
 
 def _number(value: object) -> float:

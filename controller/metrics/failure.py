@@ -1,0 +1,107 @@
+"""Failure of a run along waypoints: what ended it, told from its log."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.metrics.ground_contact import roll_rad
+from snakewalk.controller.metrics.path_error import length_m, path_error_m, waypoint_times_s
+from snakewalk.controller.runlog.record import RunRecord
+
+Cause = Literal["safety", "roll", "joint", "slip", "climb", "steering", "time"]
+
+ROLL_LIMIT_RAD = float(np.radians(60.0))
+"""Beyond this roll of the head link the body counts as rolled over (ours)."""
+WINDOW_S = 30.0
+"""The end of a run that is judged (ours): several body lengths of travel."""
+CLAMP_SHARE = 0.2
+"""Share of cycles with a clamped goal from which on the joints do not follow (ours)."""
+PROGRESS_SHARE = 0.5
+"""Progress along the path over advance of the body, below which it goes elsewhere (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """Why a run did not reach every waypoint."""
+
+    cause: Cause
+    """The first that holds, in this order: safety stopped the run; the body rolled over at any
+    time; the joints did not follow; the body advanced too little, on a climb or on other ground; it
+    advanced, but not towards the waypoints; it was on its way and ran out of time."""
+    text: str
+    """With the numbers that say so."""
+
+
+def failure(record: RunRecord) -> Failure | None:
+    """Return what ended a run; None if it reached every waypoint, or had none, without a trip.
+
+    All but roll and trip is judged over the last ``WINDOW_S`` seconds.
+    """
+    plan, pose, cycle = record.header.plan, record.pose, record.cycle
+    trip = next((event.text for event in record.events if event.kind == "trip"), None)
+    if trip is not None:
+        return Failure("safety", f"stopped by safety: {trip}")
+    if len(waypoint_times_s(pose, plan)) == len(plan.waypoints_m):
+        return None
+    roll = np.abs(roll_rad(pose.rotation))
+    over = np.flatnonzero(roll > ROLL_LIMIT_RAD)
+    if len(over):
+        return Failure(
+            "roll",
+            f"rolled over after {pose.time_s[over[0]]:.0f} s, "
+            f"up to {np.degrees(roll.max()):.0f} deg",
+        )
+    clamped = np.array([verdict == "clamp" for verdict in cycle.verdict], dtype=bool)
+    clamped = clamped[cycle.time_s >= record.end_s - WINDOW_S]
+    if len(clamped) and clamped.mean() > CLAMP_SHARE:
+        return Failure("joint", f"joints do not follow: {clamped.mean():.0%} of goals clamped")
+    rows = np.flatnonzero(pose.time_s >= record.end_s - WINDOW_S)
+    rows = rows[pose.pulse_m_s[rows] > 0.0]
+    if len(rows) < 2:
+        return Failure("joint", "the shape did not travel along the body")
+    return _of_advance(record, rows)
+
+
+def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
+    """Judge the rows (n,) of the pose in which the shape travels."""
+    pose, header = record.pose, record.header
+    advanced, predicted = pose.speed_m_s[rows].mean(), pose.predicted_speed_m_s[rows].mean()
+    share = advanced / predicted
+    if share < header.run.safety.advance_fraction:
+        up_rad, holds_rad = float(np.mean(_up_rad(pose.links_m[rows]))), _holds_rad(record)
+        cause: Cause = "climb" if up_rad > holds_rad else "slip"
+        words = f"{np.degrees(up_rad):.0f} deg uphill" if cause == "climb" else "no steep climb"
+        return Failure(cause, f"advanced {share:.0%} of the prediction, {words}")
+    times = pose.time_s[rows]
+    remaining = _remaining_m(record, rows)
+    progress = float(remaining[0] - remaining[-1])
+    travelled = float(advanced * (times[-1] - times[0]))
+    if progress < PROGRESS_SHARE * travelled:
+        error = path_error_m(record)[rows]
+        return Failure(
+            "steering",
+            f"advanced {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path; "
+            f"up to {np.nanmax(error):.2f} m off it",
+        )
+    return Failure("time", f"out of time with {remaining[-1]:.1f} m of path left")
+
+
+def _up_rad(links_m: Floats) -> Floats:
+    """Inclination (n,) of the line from tail to head of links (n, L, 3); positive uphill."""
+    x, y, z = np.moveaxis(links_m[:, 0] - links_m[:, -1], -1, 0)
+    return np.asarray(np.arctan2(z, np.hypot(x, y)))
+
+
+def _holds_rad(record: RunRecord) -> float:
+    """Slope on which a straight body just does not slide back along itself."""
+    return float(np.arctan(record.header.world.friction.along))
+
+
+def _remaining_m(record: RunRecord, rows: np.ndarray) -> Floats:
+    """Arc length (n,) from the place reached to the end of the path then in force."""
+    starts = [start for start, _ in record.paths]
+    lengths = np.array([length_m(path) for _, path in record.paths])
+    which = np.searchsorted(starts, record.pose.time_s[rows], side="right") - 1
+    return np.asarray(lengths[which] - record.pose.path_s_m[rows])

@@ -1,0 +1,138 @@
+"""The cause of a failure, on logs made so that one thing is wrong."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from snakewalk.controller.metrics.failure import failure
+from snakewalk.controller.metrics.ground_contact import roll_rad
+from snakewalk.controller.runlog.record import Event, PlanSummary, PoseTable, RunRecord
+
+SECONDS, HZ, PULSE_M_S, PREDICTED_M_S = 60.0, 10.0, 0.3, 0.25
+PATH_M = np.array([[0.0, 0.0], [30.0, 0.0]])
+LINKS = 17
+
+
+def made(
+    record: RunRecord,
+    *,
+    share: float = 0.9,
+    up_deg: float = 0.0,
+    roll_deg: float = 0.0,
+    progress: float = 1.0,
+    clamped: float = 0.0,
+    seconds: float = SECONDS,
+    pulse_m_s: float = PULSE_M_S,
+) -> RunRecord:
+    """Log of a straight body on a 30 m path: ``share`` of the prediction, ``progress`` of that."""
+    t = np.arange(0.0, seconds, 1.0 / HZ)
+    n, speed = len(t), share * PREDICTED_M_S
+    along = progress * speed * t
+    back = np.linspace(0.0, 1.2, LINKS)
+    up = np.radians(up_deg)
+    links = np.zeros((n, LINKS, 3))
+    links[..., 0] = along[:, None] - np.cos(up) * back
+    links[..., 2] = -np.sin(up) * back
+    a = np.radians(roll_deg) * (t > seconds / 2)
+    one, zero = np.ones(n), np.zeros(n)
+    rotation = np.moveaxis(
+        np.array([[one, zero, zero], [zero, np.cos(a), -np.sin(a)], [zero, np.sin(a), np.cos(a)]]),
+        -1,
+        0,
+    )
+    pose = PoseTable(
+        time_s=t,
+        head_m=links[:, 0],
+        rotation=rotation,
+        links_m=links,
+        centre_m=links.mean(axis=1),
+        speed_m_s=speed * one,
+        predicted_speed_m_s=PREDICTED_M_S * one,
+        pulse_m_s=pulse_m_s * one,
+        path_s_m=along,
+        target=np.zeros(n, dtype=np.int64),
+    )
+    rows = np.arange(n) % len(record.cycle.time_s)
+    columns = {
+        f.name: getattr(record.cycle, f.name)[rows]
+        for f in dataclasses.fields(record.cycle)
+        if f.name not in {"time_s", "verdict", "reason", "joints"}
+    }
+    cycle = dataclasses.replace(
+        record.cycle,
+        **columns,
+        time_s=t,
+        verdict=tuple("clamp" if k % 10 < 10 * clamped else "pass" for k in range(n)),
+        reason=("",) * n,
+        joints=((),) * n,
+    )
+    plan = PlanSummary(PATH_M, np.array([[25.0, 0.0]]), 0.3)
+    return dataclasses.replace(
+        record,
+        header=dataclasses.replace(record.header, plan=plan),
+        pose=pose,
+        cycle=cycle,
+        paths=((0.0, PATH_M),),
+        events=(),
+    )
+
+
+@pytest.mark.parametrize(
+    ("wrong", "cause"),
+    [
+        ({}, "time"),
+        ({"up_deg": 10.0}, "time"),  # slow on a climb, but within what was predicted
+        ({"share": 0.3}, "slip"),
+        ({"share": 0.3, "up_deg": 4.0}, "slip"),  # arctan 0.1 is 5.7 deg
+        ({"share": 0.3, "up_deg": 7.0}, "climb"),
+        ({"share": 0.3, "up_deg": -7.0}, "slip"),
+        ({"share": -0.2, "up_deg": 12.0}, "climb"),  # slides back
+        ({"progress": 0.2}, "steering"),
+        ({"progress": -0.5}, "steering"),
+        ({"roll_deg": 70.0, "share": 0.1}, "roll"),
+        ({"roll_deg": 55.0}, "time"),
+        ({"roll_deg": 179.0}, "roll"),
+        ({"clamped": 0.5, "share": 0.3}, "joint"),
+        ({"clamped": 0.1}, "time"),
+        ({"pulse_m_s": 0.0}, "joint"),
+    ],
+)
+def test_one_thing_wrong(record: RunRecord, wrong: dict[str, float], cause: str) -> None:
+    found = failure(made(record, **wrong))
+    assert found is not None
+    assert found.cause == cause
+
+
+def test_a_run_that_reached_everything_has_no_failure(record: RunRecord) -> None:
+    assert failure(made(record, seconds=130.0)) is None
+
+
+def test_a_trip_comes_first_and_is_told(record: RunRecord) -> None:
+    trip = Event(3.0, "error", "trip", "joint 4: 2.3 A")
+    rolled = made(record, roll_deg=90.0, seconds=130.0)
+    found = failure(dataclasses.replace(rolled, events=(trip,)))
+    assert found is not None
+    assert (found.cause, found.text) == ("safety", "stopped by safety: joint 4: 2.3 A")
+
+
+def test_progress_goes_on_over_a_path_that_was_laid_again(record: RunRecord) -> None:
+    """Arc lengths begin at 0 again; what counts is the path that remains."""
+    run = made(record)
+    laid_s, rest_m = 45.0, 30.0 - 45.0 * 0.9 * PREDICTED_M_S
+    after = run.pose.time_s >= laid_s
+    along = np.where(after, run.pose.path_s_m - (30.0 - rest_m), run.pose.path_s_m)
+    again = dataclasses.replace(
+        run,
+        pose=dataclasses.replace(run.pose, path_s_m=along),
+        paths=((0.0, PATH_M), (laid_s, np.array([[30.0 - rest_m, 0.0], [30.0, 0.0]]))),
+    )
+    found = failure(again)
+    assert found is not None
+    assert found.cause == "time"
+
+
+@pytest.mark.parametrize("roll_deg", [-170.0, -90.0, 0.0, 60.0, 100.0])
+def test_roll_beyond_a_right_angle(record: RunRecord, roll_deg: float) -> None:
+    rotation = made(record, roll_deg=roll_deg).pose.rotation[-1:]
+    assert np.degrees(roll_rad(rotation)) == pytest.approx([roll_deg])
