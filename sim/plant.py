@@ -12,6 +12,8 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 
+_ENERGIES = ("drawn_j", "returned_j", "heat_j", "work_j")
+
 
 @dataclass(frozen=True, slots=True)
 class ServoDrive:
@@ -42,10 +44,19 @@ class ServoDrive:
     current_a: Floats = field(init=False)
     torque_n_m: Floats = field(init=False)
     pwm: Floats = field(init=False)
+    # added up by the plant over all its steps
+    drawn_j: Floats = field(init=False)
+    """Electrical energy ``volts i`` that the motor took in; what it gave back is not deducted."""
+    returned_j: Floats = field(init=False)
+    """Electrical energy that the motor gave back."""
+    heat_j: Floats = field(init=False)
+    """``i^2 R`` of the winding."""
+    work_j: Floats = field(init=False)
+    """Net work of the torque at the shaft; negative where the load turned the motor."""
 
     def __post_init__(self) -> None:
         joints = len(self.torque_on)
-        for output in ("current_a", "torque_n_m", "pwm"):
+        for output in ("current_a", "torque_n_m", "pwm", *_ENERGIES):
             object.__setattr__(self, output, np.zeros(joints))
         for each in self.columns():
             if each.dtype != np.float64 or each.shape != (joints,) or not each.flags.c_contiguous:
@@ -57,6 +68,7 @@ class ServoDrive:
             *(self.torque_on, self.goal_rad, self.p_gain_per_rad, self.pwm_limit, self.supply_v),
             *(self.resistance_ohm, self.torque_constant_n_m_a, self.back_emf_v_s),
             *(self.current_limit_a, self.current_a, self.torque_n_m, self.pwm),
+            *(self.drawn_j, self.returned_j, self.heat_j, self.work_j),
         )
 
 

@@ -1,6 +1,13 @@
-"""Effort of a gait from its log: electrical power, cost of transport, slip."""
+"""Effort of a run from its log: energy, cost of transport; of a gait also climb and slip.
+
+Energy is integrated where something adds it up in every step: in the simulation. A real servo has
+no such counter. Its Present Current is a sample at the moment of the reading, just before the next
+goal arrives, when the error of position that the last goal made has mostly decayed: power from such
+samples is too low (``docs/gaits.md`` has the factor, measured on the same runs).
+"""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +21,66 @@ from snakewalk.controller.motion.stop_profile import STOP_S
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.drivers.types import BodyPose
 
+EnergySource = Literal["integrated", "sampled", "unknown"]
+
 
 @dataclass(frozen=True, slots=True)
-class Winding:
-    """Constants of a motor that give electrical power from current and speed."""
+class EnergyTrack:
+    """Energy of all motors at the cycles of a run, since its first one or earlier; T cycles."""
 
-    resistance_ohm: float
-    back_emf_v_s: float
-    """Volts at one radian a second of the output shaft."""
+    time_s: Floats
+    """(T,)"""
+    electrical_j: Floats
+    """(T,) taken in; what a motor gives back is lost. Without the servos' electronics."""
+    mechanical_j: Floats
+    """(T,) net work at the shafts."""
+    source: EnergySource
+    """``integrated`` in every physics step, or ``sampled``: too low, from one current a cycle."""
+
+    def between(self, from_s: float, to_s: float) -> tuple[float, float]:
+        """Electrical and mechanical energy from one time to another, J; NaN where not known."""
+        if len(self.time_s) == 0:
+            return float("nan"), float("nan")
+        ends = [from_s, to_s]
+        return (
+            float(np.diff(np.interp(ends, self.time_s, self.electrical_j))[0]),
+            float(np.diff(np.interp(ends, self.time_s, self.mechanical_j))[0]),
+        )
+
+
+def energy_track(record: RunRecord) -> EnergyTrack:
+    """Return the energy as the log has it, else from samples of current and speed."""
+    cycle = record.cycle
+    if np.isfinite(cycle.electrical_j).any():
+        return EnergyTrack(cycle.time_s, cycle.electrical_j, cycle.mechanical_j, "integrated")
+    return sampled_energy(record)
+
+
+def sampled_energy(record: RunRecord) -> EnergyTrack:
+    """Return the energy from the current and speed that each cycle read, held until the next."""
+    header, cycle = record.header, record.cycle
+    winding = header.winding
+    if winding is None or not np.isfinite(cycle.current_a).any():
+        unknown = np.full(len(cycle.time_s), np.nan)
+        return EnergyTrack(cycle.time_s, unknown, unknown, "unknown")
+    current_a, speed_rad_s = np.nan_to_num(cycle.current_a), np.nan_to_num(cycle.velocity_rad_s)
+    # i^2 R is heat, k_e w i is work at the shaft with the losses of the gears
+    input_w = winding.resistance_ohm * current_a**2 + winding.back_emf_v_s * speed_rad_s * current_a
+    shaft_w = header.torque_constant_n_m_a * speed_rad_s * current_a
+    held_s = np.diff(cycle.time_s, append=cycle.time_s[-1:])
+    electrical_j, mechanical_j = (
+        np.concatenate([[0.0], np.cumsum(watts.sum(axis=1) * held_s)[:-1]])
+        for watts in (np.clip(input_w, 0.0, None), shaft_w)
+    )
+    return EnergyTrack(cycle.time_s, electrical_j, mechanical_j, "sampled")
+
+
+def weight_n(robot: RobotConfig) -> float:
+    """Weight of a robot."""
+    return robot.link_mass_kg * (robot.joint_count + 1) * GRAVITY_M_S2
+
+
+_LEAST_CARRIED_J = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,33 +91,38 @@ class Effort:
     """Electrical, all motors, mean; what they give back is lost."""
     cost_of_transport: float
     """Power over weight times net speed; without the servos' own electronics."""
+    mechanical_cost: float
+    """The same of the net work at the shafts."""
     climb_m_s: float
     slip: float
     """Distance that touching links slide sideways, over that of the centre; flat floors only."""
 
 
-def effort(record: RunRecord, from_s: float, motor: Winding | None) -> Effort:
-    """Return the effort of a gait run from ``from_s`` after the start until it stops.
-
-    ``motor`` is that of the robot's servos; with None, all numbers are NaN.
-    """
-    header, cycle, pose = record.header, record.cycle, record.pose
-    unknown = Effort(*(float("nan"),) * 4)
+def effort(record: RunRecord, from_s: float) -> Effort:
+    """Return the effort of a gait run from ``from_s`` after the start until it stops."""
+    pose = record.pose
+    unknown = Effort(*(float("nan"),) * 5)
     end_s = record.end_s - STOP_S
     steady = (pose.time_s >= from_s) & (pose.time_s <= end_s)
-    if motor is None or steady.sum() < 2 or not np.isfinite(pose.links_m[steady]).all():
+    if steady.sum() < 2 or not np.isfinite(pose.links_m[steady]).all():
         return unknown
-    during = (cycle.time_s >= from_s) & (cycle.time_s <= end_s)
-    current, speed = cycle.current_a[during], cycle.velocity_rad_s[during]
-    # i^2 R is heat, k_e w i is work at the shaft with the losses of the gears
-    watts = motor.resistance_ohm * current**2 + motor.back_emf_v_s * speed * current
-    power = float(np.nanmean(np.clip(watts, 0.0, None).sum(axis=1)))
-    span_s = float(pose.time_s[steady][-1] - pose.time_s[steady][0])
+    start_s, stop_s = float(pose.time_s[steady][0]), float(pose.time_s[steady][-1])
+    electrical_j, mechanical_j = energy_track(record).between(start_s, stop_s)
+    span_s = stop_s - start_s
     moved_m = pose.centre_m[steady][-1] - pose.centre_m[steady][0]
-    net_m_s = float(np.linalg.norm(moved_m)) / span_s
-    weight_n = header.robot.link_mass_kg * (header.robot.joint_count + 1) * GRAVITY_M_S2
-    cost = power / (weight_n * net_m_s) if net_m_s > 1e-6 else float("inf")
-    return Effort(power, cost, float(moved_m[2]) / span_s, _slip(record, steady))
+    carried_j = weight_n(record.header.robot) * float(np.linalg.norm(moved_m))
+    return Effort(
+        electrical_j / span_s,
+        cost_of_transport(electrical_j, carried_j),
+        cost_of_transport(mechanical_j, carried_j),
+        float(moved_m[2]) / span_s,
+        _slip(record, steady),
+    )
+
+
+def cost_of_transport(energy_j: float, carried_j: float) -> float:
+    """Energy over weight times distance; infinite for what goes nowhere."""
+    return energy_j / carried_j if carried_j > _LEAST_CARRIED_J else float("inf")
 
 
 def _slip(record: RunRecord, steady: NDArray[np.bool_]) -> float:

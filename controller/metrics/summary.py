@@ -4,8 +4,15 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.metrics.effort import (
+    EnergyTrack,
+    cost_of_transport,
+    energy_track,
+    weight_n,
+)
 from snakewalk.controller.metrics.path_error import (
     length_m,
     path_error_m,
@@ -66,6 +73,19 @@ class RunSummary:
     peak_current_a: float | None
     peak_torque_n_m: float | None
     """Peak current times the torque constant."""
+    electrical_energy_j: float | None
+    """Taken in by the motors in the whole run; what they give back is lost, electronics not in."""
+    mechanical_energy_j: float | None
+    """Net work at the shafts."""
+    energy_source: str
+    """``integrated`` in every physics step; ``sampled`` from one current a cycle: too low."""
+    electrical_cost_of_transport: float | None
+    """Energy over weight times distance, while the pulse moves (without a pulse, in the whole log).
+
+    The distance is the track of the centre of mass; without waypoints, the straight line between
+    its ends.
+    """
+    mechanical_cost_of_transport: float | None
     peak_joint_speed_rad_s: float | None
     peak_temperature_c: float | None
     lowest_voltage_v: float | None
@@ -111,6 +131,9 @@ def summary(record: RunRecord) -> RunSummary:
     tracking = tracking_error_rad(cycle)
     current = _peak(np.abs(cycle.current_a))
     use = wire_use(record)
+    energy = energy_track(record)
+    whole = energy.between(-np.inf, np.inf)
+    costs = _costs(record, energy, chosen)
     return RunSummary(
         run=header.run.name,
         motion=header.run.motion if header.run.gait is None else f"gait {header.run.gait.name}",
@@ -141,6 +164,11 @@ def summary(record: RunRecord) -> RunSummary:
         eta_predicted=_digits(predicted / pulse),
         peak_current_a=_digits(current),
         peak_torque_n_m=_digits(current * header.torque_constant_n_m_a),
+        electrical_energy_j=_digits(whole[0]),
+        mechanical_energy_j=_digits(whole[1]),
+        energy_source=energy.source,
+        electrical_cost_of_transport=_digits(costs[0]),
+        mechanical_cost_of_transport=_digits(costs[1]),
         peak_joint_speed_rad_s=_digits(_peak(np.abs(cycle.velocity_rad_s))),
         peak_temperature_c=_digits(_peak(record.slow.temperature_c)),
         lowest_voltage_v=_digits(-_peak(-record.slow.voltage_v)),
@@ -172,6 +200,24 @@ def _outcome(waypoints: int, reached: int, tripped: str | None) -> str:
     if reached == waypoints:
         return "every waypoint reached"
     return f"{reached} of {waypoints} waypoints reached"
+
+
+def _costs(
+    record: RunRecord, energy: EnergyTrack, chosen: NDArray[np.bool_]
+) -> tuple[float, float]:
+    """Electrical and mechanical cost of transport between the first and last of ``chosen`` rows."""
+    rows = np.flatnonzero(chosen)
+    if len(rows) < 2:
+        return float("nan"), float("nan")
+    span = slice(rows[0], rows[-1] + 1)
+    time_s, centre_m = record.pose.time_s[span], record.pose.centre_m[span]
+    if len(record.header.plan.waypoints_m):
+        distance_m = length_m(centre_m)
+    else:
+        distance_m = float(np.linalg.norm(centre_m[-1] - centre_m[0]))
+    carried_j = weight_n(record.header.robot) * distance_m
+    electrical_j, mechanical_j = energy.between(time_s[0], time_s[-1])
+    return cost_of_transport(electrical_j, carried_j), cost_of_transport(mechanical_j, carried_j)
 
 
 def _mean(values: Floats) -> float:

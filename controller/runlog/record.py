@@ -5,6 +5,7 @@ T, S, P, W count the rows of a topic; J joints, L links.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,24 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+
+
+class MotorEnergy(NamedTuple):
+    """Energy of all motors since they were switched on; NaN where nothing adds it up."""
+
+    electrical_j: float = float("nan")
+    """Taken in; what a motor gives back is lost, not deducted. Without the servos' electronics."""
+    mechanical_j: float = float("nan")
+    """Net work at the shafts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Winding:
+    """Constants of a motor that give electrical power from current and speed."""
+
+    resistance_ohm: float
+    back_emf_v_s: float
+    """Volts at one radian a second of the output shaft."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +74,8 @@ class Header:
     ground: HeightField | None
     """Thinned; None on a flat floor."""
     torque_constant_n_m_a: float
+    winding: Winding | None
+    """Of the robot's servos; None where the log does not say it."""
     initial_pose: InitialPose | None
     """None on metal."""
 
@@ -86,6 +107,10 @@ class CycleTable:
     lateness_s: Floats
     """(T,)"""
     wire_busy_s: Floats
+    """(T,)"""
+    electrical_j: Floats
+    """(T,) ``MotorEnergy`` since the start; NaN on metal, where no servo adds it up."""
+    mechanical_j: Floats
     """(T,)"""
     verdict: tuple[str, ...]
     """T of pass, clamp, veto."""

@@ -21,6 +21,7 @@ from snakewalk.controller.runlog.record import (
     RunRecord,
     SlowTable,
     WalkTable,
+    Winding,
 )
 
 Row = Mapping[str, Any]
@@ -79,6 +80,7 @@ def _header(row: Row) -> Header:
             _array(ground["z_m"]), ground["spacing_m"], ground["x0_m"], ground["y0_m"]
         ),
         torque_constant_n_m_a=float(_array(row["torque_constant_n_m_a"])),
+        winding=None if row.get("winding") is None else Winding(**row["winding"]),
         initial_pose=None
         if row.get("laid") is None
         else InitialPose(row["laid"]["heading_rad"], _array(row["laid"]["joint_rad"])),
@@ -102,6 +104,8 @@ def _cycle(rows: Sequence[Row], joints: int) -> CycleTable:
         deadline_s=_floats(rows, "deadline_s"),
         lateness_s=_floats(rows, "lateness_s"),
         wire_busy_s=_floats(rows, "wire_busy_s"),
+        electrical_j=_array([r.get("electrical_j") for r in rows]),
+        mechanical_j=_array([r.get("mechanical_j") for r in rows]),
         verdict=tuple(r["verdict"] for r in rows),
         reason=tuple(r["reason"] for r in rows),
         joints=tuple(tuple(r["joints"]) for r in rows),

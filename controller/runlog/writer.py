@@ -1,6 +1,7 @@
 """Writes the log row by row: a kill costs half a second at most, a disk fault stops the run."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
@@ -27,7 +28,12 @@ from snakewalk.controller.runlog.encode import (
     text,
     thinned,
 )
-from snakewalk.controller.runlog.record import InitialPose, PlanSummary
+from snakewalk.controller.runlog.record import (
+    InitialPose,
+    MotorEnergy,
+    PlanSummary,
+    Winding,
+)
 from snakewalk.controller.runlog.schema import FORMAT, TOPICS, schema_json, schema_name
 from snakewalk.drivers.types import JointState
 
@@ -35,6 +41,7 @@ Level = Literal["info", "warning", "error"]
 VerdictKind = Literal["pass", "clamp", "veto"]
 _FLUSH_S: Final = 0.5
 _CHUNK_BYTES: Final = 1 << 20
+UNKNOWN_ENERGY: Final = MotorEnergy()
 
 
 class RunLog:
@@ -86,6 +93,7 @@ class RunLog:
         plan: PlanSummary,
         ground: HeightField | None = None,
         torque_constant_n_m_a: float = float("nan"),
+        winding: Winding | None = None,
         initial_pose: InitialPose | None = None,
     ) -> None:
         """Log once, first, what runs; the ground is thinned: enough for a report to draw it."""
@@ -99,6 +107,7 @@ class RunLog:
             "robot": robot.model_dump(mode="json"),
             "world": world.model_dump(mode="json"),
             "torque_constant_n_m_a": number(torque_constant_n_m_a),
+            "winding": None if winding is None else asdict(winding),
             "laid": None
             if initial_pose is None
             else {
@@ -127,6 +136,7 @@ class RunLog:
         deadline_s: float,
         lateness_s: float,
         wire_busy_s: float = float("nan"),
+        energy: MotorEnergy = UNKNOWN_ENERGY,
         verdict: VerdictKind = "pass",
         reason: str = "",
         joints: Sequence[int] = (),
@@ -146,6 +156,8 @@ class RunLog:
             f'"error":{flags_text(state.error.tobytes(), state.error.dtype.char)},'
             f'"deadline_s":{text(deadline_s)},'
             f'"lateness_s":{rounded_text(lateness_s)},"wire_busy_s":{rounded_text(wire_busy_s)},'
+            f'"electrical_j":{rounded_text(energy.electrical_j)},'
+            f'"mechanical_j":{rounded_text(energy.mechanical_j)},'
             f'"verdict":"{verdict}","reason":{encode(reason)},'
             f'"joints":{encode([int(j) for j in joints])}}}'
         )

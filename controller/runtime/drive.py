@@ -14,6 +14,7 @@ from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.kinematics.smoothstep import QUINTIC_BEND_MAX, QUINTIC_SLOPE_MAX, quintic
 from snakewalk.controller.motion.path_progress import path_progress
 from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.runlog.record import MotorEnergy
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.derating import Derating
 from snakewalk.controller.runtime.loop import Tick, ticks
@@ -99,6 +100,7 @@ class Drive:
         run: RunConfig,
         gain: float,
         wire_busy_s: Callable[[], float] = lambda: float("nan"),
+        energy: Callable[[], MotorEnergy] = MotorEnergy,
         on_progress: OnProgress = lambda progress: None,
         on_event: OnEvent = lambda kind, text: None,
     ) -> None:
@@ -111,6 +113,7 @@ class Drive:
         self._on_progress, self._on_event = on_progress, on_event
         self._wire_busy_s = wire_busy_s
         self._wire_s = wire_busy_s()
+        self._energy = energy
         self._alarms = 0
         self._speed_m_s = 0.0
         self._last: BodyView | None = None
@@ -213,6 +216,7 @@ class Drive:
             deadline_s=tick.deadline_s,
             lateness_s=tick.lateness_s,
             wire_busy_s=self._wire_s - before_s,
+            energy=self._energy(),
             verdict="veto" if self._link.tripped else "clamp" if clamped else "pass",
             reason=self._link.tripped or "",
             joints=clamped,

@@ -36,8 +36,9 @@ class Mechanics:
     """(L, 3) centres of the links at the start of the last step."""
     water: Floats
     """(6,) ``sim.physics.water.water_constants``."""
-    totals: Floats = field(default_factory=lambda: np.zeros(2))
-    """Energy lost to ground friction and water, J; mean distance slipped across the links, m."""
+    totals: Floats = field(default_factory=lambda: np.zeros(3))
+    """Energy lost to ground friction and water, J; mean distance slipped across the links, m;
+    energy lost to the drag of the gears, J."""
 
     @classmethod
     def of(

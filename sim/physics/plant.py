@@ -195,6 +195,11 @@ class MujocoPlant:
         return float(self.mechanics.totals[0])
 
     @property
+    def gear_loss_j(self) -> float:
+        """Energy that the drag of the gears has taken since the reset."""
+        return float(self.mechanics.totals[2])
+
+    @property
     def slip_m(self) -> float:
         """Distance slipped across the links since the reset, mean over all links."""
         return float(self.mechanics.totals[1])

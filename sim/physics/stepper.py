@@ -197,8 +197,11 @@ def _steps(
 ) -> None:
     """Advance: ``mj_step1``, drive, friction, ``mj_step2``, so often."""
     qpos, qvel, qfrc = state
-    on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit, current, torque, pwm = drive
+    on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit = drive[:9]
+    current, torque, pwm, drawn_j, returned_j, heat_j, work_j = drive[9:]
     joints = len(goal)
+    speed = np.empty(joints)
+    step_s = law[4]
     step1, step2, model, data = where[0], where[1], where[2], where[3]
     at = (
         where[7] // 8,
@@ -215,6 +218,7 @@ def _steps(
         call(step1, model, data)
         qfrc[:] = 0.0
         for j in range(joints):
+            speed[j] = qvel[6 + j]
             pwm[j], current[j], torque[j] = shaft_torque(
                 qpos[7 + j],
                 qvel[6 + j],
@@ -239,6 +243,16 @@ def _steps(
         )
         _add_friction(contacts, qfrc, qvel, chain, work, geom_body, law, load, totals, water)
         call(step2, model, data)
+        for j in range(joints):
+            # a force does its work at the mean of the speeds before and after Euler's step
+            middle = 0.5 * (speed[j] + qvel[6 + j])
+            heat_w = ohm[j] * current[j] * current[j]
+            input_w = heat_w + k_e[j] * speed[j] * current[j]
+            drawn_j[j] += max(input_w, 0.0) * step_s
+            returned_j[j] -= min(input_w, 0.0) * step_s
+            heat_j[j] += heat_w * step_s
+            work_j[j] += torque[j] * middle * step_s
+            totals[2] += gear_drag * speed[j] * middle * step_s
         load[:] = 0.0
         force_n = carray(pointer(force_list[0]), (1 << 30,), np.float64)
         _weigh(load, contacts, force_n, geom_body)
@@ -271,7 +285,7 @@ def _run(
         carray(pointer(arrays[11]), (links, 3), np.float64),
     )
     load = carray(pointer(arrays[12]), (links,), np.float64)
-    totals = carray(pointer(arrays[13]), (2,), np.float64)
+    totals = carray(pointer(arrays[13]), (3,), np.float64)
     geom_body = carray(pointer(arrays[14]), (geoms,), np.int32)
     drive = (
         carray(pointer(arrays[15]), (joints,), np.float64),
@@ -286,6 +300,10 @@ def _run(
         carray(pointer(arrays[24]), (joints,), np.float64),
         carray(pointer(arrays[25]), (joints,), np.float64),
         carray(pointer(arrays[26]), (joints,), np.float64),
+        carray(pointer(arrays[27]), (joints,), np.float64),
+        carray(pointer(arrays[28]), (joints,), np.float64),
+        carray(pointer(arrays[29]), (joints,), np.float64),
+        carray(pointer(arrays[30]), (joints,), np.float64),
     )
     law = (constants[0], constants[1], constants[2], constants[3], constants[4])
     state = (at, rate, force)

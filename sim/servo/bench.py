@@ -89,6 +89,12 @@ class BenchPlant:
         amps = (drive.pwm * drive.supply_v - drive.back_emf_v_s * w) / drive.resistance_ohm * on
         drive.current_a[:] = _within(amps, limit)
         drive.torque_n_m[:] = drive.current_a * drive.torque_constant_n_m_a
+        heat_j = h * drive.resistance_ohm * drive.current_a**2
+        input_j = heat_j + h * drive.back_emf_v_s * w * drive.current_a
+        drive.drawn_j[:] += np.maximum(input_j, 0.0)
+        drive.returned_j[:] -= np.minimum(input_j, 0.0)
+        drive.heat_j[:] += heat_j
+        drive.work_j[:] += h * drive.torque_n_m * w
 
     def _friction(self, motor_n_m: Floats, load_n_m: ArrayLike) -> Floats | float:
         if self._is_bare:

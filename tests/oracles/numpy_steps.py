@@ -33,10 +33,23 @@ class NumpySteps:
             mujoco.mj_step1(m.model, m.data)
             force = friction_forces(m)
             rate = m.data.qvel[6:]
+            before = rate.copy()
             force[6:] += drive_shafts(drive, m.data.qpos[7:], rate) - m.gear_drag_n_m_s * rate
             m.data.qfrc_applied[:] = force
             mujoco.mj_step2(m.model, m.data)
+            add_energies(m, drive, before)
             m.measure_loads()
+
+
+def add_energies(m: Mechanics, drive: ServoDrive, before_rad_s: Floats) -> None:
+    """Energies of a step's motors into the drive, and of the gears' drag into ``m.totals``."""
+    middle, amps, step_s = 0.5 * (before_rad_s + m.data.qvel[6:]), drive.current_a, m.step_s
+    input_w = amps * (drive.resistance_ohm * amps + drive.back_emf_v_s * before_rad_s)
+    drive.drawn_j[:] += np.where(input_w > 0.0, input_w, 0.0) * step_s
+    drive.returned_j[:] += np.where(input_w < 0.0, -input_w, 0.0) * step_s
+    drive.heat_j[:] += drive.resistance_ohm * amps**2 * step_s
+    drive.work_j[:] += drive.torque_n_m * middle * step_s
+    m.totals[2] += m.gear_drag_n_m_s * float(before_rad_s @ middle) * step_s
 
 
 def friction_forces(m: Mechanics) -> Floats:

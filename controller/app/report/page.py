@@ -120,6 +120,9 @@ def _tiles(n: RunSummary) -> list[str]:
         _tile("Tracking", f"{_fmt(n.tracking_rms_rad, 3)} rad",
               f"RMS; lag {_fmt(n.lag_s, 3)} s"),
         _tile("Peak current", f"{_fmt(n.peak_current_a, 2)} A", torque),
+        _tile("Energy", f"{_fmt(n.electrical_energy_j, 0)} J",
+              f"cost of transport {_fmt(n.electrical_cost_of_transport, 2)}"
+              + (", sampled" if n.energy_source == "sampled" else "")),
         _tile("Hottest servo", f"{_fmt(n.peak_temperature_c, 0)} °C",
               f"supply down to {_fmt(n.lowest_voltage_v, 1)} V"),
         _tile("Missed deadlines", missed, wire),

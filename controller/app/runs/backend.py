@@ -12,7 +12,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.controller.runlog.record import InitialPose
+from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.clock import Clock
@@ -33,6 +33,8 @@ class Backend:
     """The simulator's coordinates, for the film."""
     wire_busy_s: Callable[[], float]
     """Time that bytes have spent on the wire so far; NaN where nobody counts."""
+    energy: Callable[[], MotorEnergy] = MotorEnergy
+    """What the motors have taken in and done so far."""
 
 
 def simulated(
@@ -73,8 +75,15 @@ def simulated(
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
     )
+    drive = line.firmware.drive
     return Backend(
-        "sim", chain, line.clock, plant.head_pose, lambda: plant.qpos, lambda: line.busy_s
+        "sim",
+        chain,
+        line.clock,
+        plant.head_pose,
+        lambda: plant.qpos,
+        lambda: line.busy_s,
+        lambda: MotorEnergy(float(drive.drawn_j.sum()), float(drive.work_j.sum())),
     )
 
 

@@ -11,7 +11,7 @@ from snakewalk.controller.app.runs.prepared_run import PreparedRun
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.reader import read_log
-from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.record import RunRecord, Winding
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outcome
 from snakewalk.drivers.safety.limits import SafetyLimits
@@ -63,6 +63,7 @@ def execute(
     else:
         backend = metal(prepared.run, prepared.robot, port or "")
     log_path = folder / "log.mcap"
+    torque_constant_n_m_a, winding = _motor(prepared.robot.servo.model)
     with RunLog(log_path) as log:
         log.config(
             prepared.run,
@@ -72,7 +73,8 @@ def execute(
             plan=plan,
             ground=prepared.ground,
             initial_pose=initial_pose,
-            torque_constant_n_m_a=_torque_constant_n_m_a(prepared.robot.servo.model),
+            torque_constant_n_m_a=torque_constant_n_m_a,
+            winding=winding,
         )
         safety, clock = prepared.run.safety, backend.clock
         recovery = Recovery(
@@ -102,6 +104,7 @@ def execute(
                 run=prepared.run,
                 gain=prepared.gain,
                 wire_busy_s=backend.wire_busy_s,
+                energy=backend.energy,
                 on_progress=on_progress,
                 on_event=on_event,
             )
@@ -111,8 +114,11 @@ def execute(
     return Finished(outcome, log_path, record, numbers, pose, source)
 
 
-def _torque_constant_n_m_a(model: str) -> float:
-    """Constant from the servo's specification; NaN where the simulator does not know the model."""
-    from snakewalk.sim.servo.motor import MOTORS  # noqa: PLC0415  only for this figure
+def _motor(model: str) -> tuple[float, Winding | None]:
+    """Torque constant (N m/A) and winding; NaN and None where the simulator has no such model."""
+    from snakewalk.sim.servo.motor import MOTORS  # noqa: PLC0415  only for these figures
 
-    return MOTORS[model].torque_constant_n_m_a if model in MOTORS else float("nan")
+    motor = MOTORS.get(model)
+    if motor is None:
+        return float("nan"), None
+    return motor.torque_constant_n_m_a, Winding(motor.resistance_ohm, motor.back_emf_v_s)

@@ -59,6 +59,7 @@ def replay(
             plan=header.plan,
             ground=header.ground,
             torque_constant_n_m_a=header.torque_constant_n_m_a,
+            winding=header.winding,
             initial_pose=header.initial_pose,
         )
         chain.enable()
@@ -80,6 +81,7 @@ def replay(
                 deadline_s=cycle.deadline_s[k],
                 lateness_s=late_s,
                 wire_busy_s=wire_s - before_s,
+                energy=backend.energy(),
                 verdict=cast(VerdictKind, cycle.verdict[k]),
                 reason=cycle.reason[k],
                 joints=cycle.joints[k],

@@ -13,8 +13,7 @@ from snakewalk.controller.app.runs.factory import prepare_gait
 from snakewalk.controller.app.runs.gait_run import GaitRun
 from snakewalk.controller.app.studies.sweep_points import Point
 from snakewalk.controller.metrics.displacement import SKIPPED_S, gait_displacement
-from snakewalk.controller.metrics.effort import Winding, effort
-from snakewalk.sim.servo.motor import MOTORS
+from snakewalk.controller.metrics.effort import effort
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +32,7 @@ class Measurement:
     climb_m_s: float | None = None
     power_w: float | None = None
     cost_of_transport: float | None = None
+    mechanical_cost: float | None = None
     slip: float | None = None
     peak_current_a: float | None = None
     peak_torque_n_m: float | None = None
@@ -68,9 +68,7 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
     record = finished.record
     start_s = next((e.time_s for e in record.events if e.kind == "start"), 0.0)
     ramp_s = max(0.0, record.end_s - start_s - point.seconds - 1.0)
-    motor = MOTORS.get(record.header.robot.servo.model)
-    winding = Winding(motor.resistance_ohm, motor.back_emf_v_s) if motor else None
-    moved, cost = gait_displacement(record), effort(record, start_s + ramp_s + SKIPPED_S, winding)
+    moved, cost = gait_displacement(record), effort(record, start_s + ramp_s + SKIPPED_S)
     numbers = finished.summary
     return Measurement(
         ended=finished.outcome.tripped or "ran to its end",
@@ -83,6 +81,7 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
         climb_m_s=_digits(cost.climb_m_s),
         power_w=_digits(cost.power_w),
         cost_of_transport=_digits(cost.cost_of_transport),
+        mechanical_cost=_digits(cost.mechanical_cost),
         slip=_digits(cost.slip),
         peak_current_a=_digits(numbers.peak_current_a),
         peak_torque_n_m=_digits(numbers.peak_torque_n_m),

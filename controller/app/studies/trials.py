@@ -53,6 +53,8 @@ class Trial:
     path_error_max_m: float = math.nan
     eta: float = math.nan
     """Forward speed over pulse speed."""
+    cost_of_transport: float = math.nan
+    """Electrical."""
     lead_max_rad: float = math.nan
     """Largest difference between an asked and a measured joint angle."""
     current_max_a: float = math.nan
@@ -144,6 +146,7 @@ def _measured(trial: Trial, prepared: WalkRun) -> Trial:
         path_error_m=_number(numbers.path_error_mean_m),
         path_error_max_m=_number(numbers.path_error_max_m),
         eta=_number(numbers.eta),
+        cost_of_transport=_number(numbers.electrical_cost_of_transport),
         lead_max_rad=_number(numbers.tracking_max_rad),
         current_max_a=_number(numbers.peak_current_a),
         roll_max_deg=float(np.degrees(stood.roll_max_rad)),
@@ -211,6 +214,7 @@ class CaseSummary:
     path_error_m: float | None
     path_error_max_m: float | None
     eta: float | None
+    cost_of_transport: float | None
     lead_max_rad: float | None
     current_max_a: float | None
     roll_max_deg: float | None
@@ -244,6 +248,7 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
                 path_error_m=_mean([t.path_error_m for t in some], 3),
                 path_error_max_m=_most([t.path_error_max_m for t in some], 2),
                 eta=_mean([t.eta for t in some], 2),
+                cost_of_transport=_mean([t.cost_of_transport for t in some], 2),
                 lead_max_rad=_most([t.lead_max_rad for t in some], 3),
                 current_max_a=_most([t.current_max_a for t in some], 2),
                 roll_max_deg=_most([t.roll_max_deg for t in some], 0),

@@ -8,7 +8,7 @@ import pytest
 
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_run, load_world
-from snakewalk.controller.runlog.record import PlanSummary
+from snakewalk.controller.runlog.record import MotorEnergy, PlanSummary, Winding
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.types import JointState
 
@@ -40,7 +40,15 @@ def write_log(path: Path, cycles: int) -> Path:
     )
     ground = HeightField(np.outer(np.arange(300), np.ones(200)) * 1e-3, 0.02, -2.0, -3.0)
     with RunLog(path) as log:
-        log.config(run, robot, world, backend="sim", plan=plan, ground=ground)
+        log.config(
+            run,
+            robot,
+            world,
+            backend="sim",
+            plan=plan,
+            ground=ground,
+            winding=Winding(5.2, 2.5),
+        )
         log.event(0.0, "start", "torque on")
         for k in range(cycles):
             t = 0.02 * k
@@ -53,6 +61,7 @@ def write_log(path: Path, cycles: int) -> Path:
                 deadline_s=t,
                 lateness_s=0.0,
                 wire_busy_s=0.0046,
+                energy=MotorEnergy(0.1 * k, 0.02 * k) if k % 2 else MotorEnergy(),
                 verdict="clamp" if k % 7 == 0 else "pass",
                 reason="rate" if k % 7 == 0 else "",
                 joints=(1, 5) if k % 7 == 0 else (),

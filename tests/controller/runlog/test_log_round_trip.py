@@ -10,8 +10,9 @@ from mcap.reader import make_reader
 
 from snakewalk.config.loader import digest, load_robot, load_run, load_world
 from snakewalk.controller.runlog.reader import LogError, read_log
-from snakewalk.controller.runlog.record import PlanSummary
+from snakewalk.controller.runlog.record import PlanSummary, Winding
 from snakewalk.controller.runlog.schema import TOPICS
+from snakewalk.controller.runlog.tables import record_of
 from snakewalk.controller.runlog.writer import RunLog, part_path
 from snakewalk.drivers.types import JointState
 
@@ -36,6 +37,9 @@ def test_every_table_comes_back(
         np.testing.assert_allclose(cycle.current_a[i], state.current_a, atol=6e-7)
         np.testing.assert_array_equal(cycle.valid[i], state.valid)
         np.testing.assert_allclose(cycle.age_s[i], state.age_s)
+    np.testing.assert_allclose(cycle.electrical_j[1::2], 0.1 * k[1::2], atol=6e-7)
+    np.testing.assert_allclose(cycle.mechanical_j[1::2], 0.02 * k[1::2], atol=6e-7)
+    assert np.isnan(cycle.electrical_j[::2]).all()
     assert cycle.verdict[7] == "clamp"
     assert cycle.joints[7] == (1, 5)
     assert cycle.reason[8] == ""
@@ -64,6 +68,7 @@ def test_the_header_says_what_ran(write: Write, tmp_path: Path) -> None:
     assert (header.run, header.robot, header.world) == (run, robot, world)
     assert header.config_hash == digest(run, robot, world)
     assert header.backend == "sim"
+    assert header.winding == Winding(5.2, 2.5)
     assert header.plan.states == {"recorded": 40, "random": 160}
     assert np.isnan(header.plan.predicted_speed_m_s)
     assert header.plan.waypoints_m.shape == (4, 2)
@@ -159,3 +164,17 @@ def test_reading_says_what_is_wrong(tmp_path: Path) -> None:
     (tmp_path / "text.mcap").write_text("a diary")
     with pytest.raises(LogError, match="not an MCAP"):
         read_log(tmp_path / "text.mcap")
+
+
+def test_a_log_of_before_opens_without_energies(write: Write, tmp_path: Path) -> None:
+    rows: dict[str, list[dict[str, object]]] = {topic: [] for topic in TOPICS}
+    with write(tmp_path / "run.mcap", 5).open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            row = json.loads(message.data)
+            for key in ("winding", "electrical_j", "mechanical_j"):
+                row.pop(key, None)
+            rows[channel.topic].append(row)
+    record = record_of(rows, complete=True, note="")
+    assert record.header.winding is None
+    assert np.isnan(record.cycle.electrical_j).all()
+    assert record.cycle.mechanical_j.shape == (5,)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from snakewalk.config.constants import GRAVITY_M_S2
-from snakewalk.sim.physics.plant import GEAR_DRAG_N_M_S
 from tests.helpers.physics import ROBOT, a_body, a_drive, serpenoid
 
 ICE = (1e-9, 1e-9)
@@ -84,22 +83,56 @@ def test_without_torque_motion_dies_and_never_grows() -> None:
     assert kinetic[-1] < 0.02 * kinetic[0]  # the rest is in the rotors, which only the gears brake
 
 
+@pytest.mark.parametrize("step_s", [0.001, 0.002])
+@pytest.mark.parametrize("hold_s", [0.002, 0.02])
 @pytest.mark.parametrize("mu", [(0.1, 0.7), (0.4, 0.4)])
-def test_motors_pay_for_friction_gears_and_motion(mu: tuple[float, float]) -> None:
-    step_s = 0.001
+def test_motors_pay_for_friction_gears_and_motion(
+    mu: tuple[float, float], hold_s: float, step_s: float
+) -> None:
+    """Shaft work is friction, gear drag and motion; electrical energy is heat, gears and shafts."""
     body, drive = a_body(mu, step_s), a_drive()
-    worked, gears = 0.0, 0.0
     before = sum(body.energy_j)
-    for k in range(1, 3001):
-        drive.goal_rad[:] = serpenoid(k * step_s)
-        rate = body.velocity_rad_s.copy()
-        body.advance(k * step_s, drive)
-        middle = 0.5 * (rate + body.velocity_rad_s)
-        worked += float(drive.torque_n_m @ middle) * step_s
-        gears += GEAR_DRAG_N_M_S * float(rate @ middle) * step_s
-    spent = body.friction_loss_j + gears + sum(body.energy_j) - before
+    for k in range(1, round(3.0 / hold_s) + 1):
+        drive.goal_rad[:] = serpenoid(k * hold_s)
+        body.advance(k * hold_s, drive)
+    worked = float(drive.work_j.sum())
+    spent = body.friction_loss_j + body.gear_loss_j + sum(body.energy_j) - before
+    # k_t is that of the output shaft: what it lacks to k_e, the gears take
+    passed_on = float((drive.back_emf_v_s / drive.torque_constant_n_m_a) @ drive.work_j)
+    taken = float((drive.drawn_j - drive.returned_j).sum())
+    used = float(drive.heat_j.sum()) + passed_on
     print(
-        f"mu {mu}: motors {worked:.3f} J, {spent:.3f} J accounted for ({spent / worked - 1:+.2%})"
+        f"mu {mu}: motors {worked:.3f} J, {spent:.3f} J accounted for ({spent / worked - 1:+.2%}); "
+        f"electrical {taken:.3f} J, {used:.3f} J accounted for ({used / taken - 1:+.2%})"
     )
     assert body.friction_loss_j > 0.5 * worked > 0.0
     assert spent == pytest.approx(worked, rel=0.02)
+    assert used == pytest.approx(taken, rel=0.005)
+    assert float(drive.drawn_j.sum()) > worked
+
+
+def test_an_undulation_pays_at_least_for_sliding_along_itself() -> None:
+    """The ellipse takes no less than ``mu_along`` times load and sliding distance, whatever slides.
+
+    A chain that only bends in the plane lies on all of its links. The load-weighted mean of their
+    speeds is no less than the speed of the centre of mass, so the work at the shafts, which pays
+    for all of it, is no less than ``mu_along`` times weight times the way of the centre.
+    """
+    mu_along = 0.1
+    body, drive = a_body((mu_along, 0.7)), a_drive()
+    hold_s, rest_s = 0.02, 1.0
+    way_m, centre_m = 0.0, body.link_positions_m.mean(axis=0)
+    for k in range(1, round(6.0 / hold_s) + 1):
+        drive.goal_rad[:] = serpenoid(k * hold_s)
+        body.advance(k * hold_s, drive)
+        last_m, centre_m = centre_m, body.link_positions_m.mean(axis=0)
+        way_m += float(np.hypot(*(centre_m - last_m)[:2]))
+    drive.torque_on[:] = 0.0
+    body.advance(6.0 + rest_s, drive)  # what is still in motion is not paid for twice
+    bound_j = mu_along * MASS_KG * GRAVITY_M_S2 * way_m
+    print(
+        f"way {way_m:.2f} m: bound {bound_j:.2f} J, friction {body.friction_loss_j:.2f} J, "
+        f"shafts {drive.work_j.sum():.2f} J, electrical {drive.drawn_j.sum():.2f} J"
+    )
+    assert way_m > 1.0
+    assert bound_j < body.friction_loss_j < drive.work_j.sum() < drive.drawn_j.sum()

@@ -6,6 +6,7 @@ import pytest
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.world import FrictionConfig
 from snakewalk.sim.physics.plant import MujocoPlant
+from snakewalk.sim.plant import ServoDrive
 from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
 from tests.oracles.numpy_steps import drive_shafts, numpy_plant
 
@@ -29,8 +30,8 @@ def wave(time_s: float) -> np.ndarray:
     return 0.4 * np.sin(2 * np.pi * (0.3 * time_s - np.arange(16) / 13.0))
 
 
-def crawl(body: MujocoPlant, seconds: float) -> np.ndarray:
-    servo = drive()
+def crawl(body: MujocoPlant, seconds: float, servo: ServoDrive | None = None) -> np.ndarray:
+    servo = drive() if servo is None else servo
     body.reset((0.0, 0.0), 0.0, wave(0.0))
     start = body.link_positions_m.mean(axis=0)
     for k in range(int(seconds * 50)):
@@ -58,8 +59,14 @@ def test_the_wave_drives_forward_with_grip_across_and_backwards_without() -> Non
 
 def test_compiled_and_numpy_steps_agree() -> None:
     one, two = plant(), numpy_plant(ROBOT, FLAT, None, 0.002)
-    np.testing.assert_allclose(crawl(one, 0.5), crawl(two, 0.5), atol=1e-9)
+    servos = drive(), drive()
+    np.testing.assert_allclose(crawl(one, 0.5, servos[0]), crawl(two, 0.5, servos[1]), atol=1e-9)
     np.testing.assert_allclose(one.position_rad, two.position_rad, atol=1e-9)
+    np.testing.assert_allclose(one.mechanics.totals, two.mechanics.totals, atol=1e-9)
+    for name in ("drawn_j", "returned_j", "heat_j", "work_j"):
+        energies = getattr(servos[0], name), getattr(servos[1], name)
+        assert np.abs(energies[0]).max() > 0.0
+        np.testing.assert_allclose(*energies, atol=1e-9)
 
 
 def test_the_same_run_twice_is_the_same_bit_for_bit() -> None:

@@ -105,6 +105,9 @@ def run_gait(
             "speed_m_s": _digits(displacement.speed_m_s),
         }
     result |= {
+        "electrical_energy_j": finished.summary.electrical_energy_j,
+        "electrical_cost_of_transport": finished.summary.electrical_cost_of_transport,
+        "mechanical_cost_of_transport": finished.summary.mechanical_cost_of_transport,
         "peak_current_a": finished.summary.peak_current_a,
         "peak_temperature_c": finished.summary.peak_temperature_c,
         "log": str(finished.log),

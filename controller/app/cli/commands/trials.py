@@ -23,6 +23,7 @@ _HEADS = {
     "path_error_m": "error\nm",
     "path_error_max_m": "worst\nm",
     "eta": "eta",
+    "cost_of_transport": "cost",
     "in_air": "in\nair",
     "roll_max_deg": "roll\ndeg",
     "why": "why",
