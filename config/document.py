@@ -1,5 +1,6 @@
 """The configuration's reference, from the schema: ``python -m snakewalk.config.document``."""
 
+from itertools import takewhile
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -7,6 +8,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from snakewalk.config.loader import Kind, locate, shipped
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
@@ -44,7 +46,25 @@ def reference() -> str:
     parts = [_HEAD]
     for title, model in (("Run", RunConfig), ("Robot", RobotConfig), ("World", WorldConfig)):
         parts += _tables(title, model)
+    kinds: tuple[Kind, ...] = ("runs", "robots", "worlds")
+    for kind in kinds:
+        parts += _shipped(kind)
     return "\n".join(parts)
+
+
+def _shipped(kind: Kind) -> list[str]:
+    lines = [f"## Shipped {kind}", "", "| name | |", "|---|---|"]
+    return [*lines, *(f"| `{name}` | {_comment(kind, name)} |" for name in shipped(kind)), ""]
+
+
+def _comment(kind: Kind, name: str) -> str:
+    """The words that a shipped file begins with."""
+    lines = locate(kind, name).read_text(encoding="utf-8").splitlines()
+    return " ".join(line.removeprefix("# ") for line in takewhile(_is_comment, lines))
+
+
+def _is_comment(line: str) -> bool:
+    return line.startswith("#")
 
 
 def _tables(title: str, model: type[BaseModel]) -> list[str]:

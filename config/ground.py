@@ -1,34 +1,113 @@
-"""From a world's description to its height field: crop, scale and refine a real elevation model."""
+"""From a world's description to its height field: a real elevation model, or a made shape."""
 
+import math
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
+from scipy.ndimage import gaussian_filter
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.heightfield import HeightField
-from snakewalk.config.world import ElevationGround, WorldConfig
+from snakewalk.config.world import (
+    ElevationGround,
+    FlatGround,
+    GapsGround,
+    RampGround,
+    RandomGround,
+    StepsGround,
+    WaterGround,
+    WorldConfig,
+)
 
 
 def build_ground(world: WorldConfig) -> HeightField | None:
     """Height field of ``world``, centred on (0, 0), its lowest point at 0; None on a flat floor.
 
-    The crop counts rows from the north, as elevation models are stored; here y grows to the north.
-    Cubic refinement keeps the samples of the crop.
-
     Raises:
         ConfigError: the source is missing or unreadable, or the crop leaves it.
 
     """
-    ground = world.ground
-    if not isinstance(ground, ElevationGround):
-        return None
-    elevation = _elevation_m(world.name, ground.source)
+    match world.ground:
+        case FlatGround() | WaterGround():
+            return None
+        case ElevationGround() as ground:
+            z, spacing_m = _cropped(world.name, ground), ground.spacing_m / ground.refine
+        case RampGround() as ground:
+            z, spacing_m = _ramp(ground), ground.spacing_m
+        case RandomGround() as ground:
+            z, spacing_m = _random(ground), ground.spacing_m
+        case StepsGround() as ground:
+            z, spacing_m = _steps(ground), ground.spacing_m
+        case GapsGround() as ground:
+            z, spacing_m = _gaps(ground), ground.spacing_m
+    half_w, half_h = (z.shape[1] - 1) * spacing_m / 2, (z.shape[0] - 1) * spacing_m / 2
+    return HeightField(z - z.min(), spacing_m, -half_w, -half_h)
+
+
+def _ramp(ground: RampGround) -> Floats:
+    """Exact where the kinks lie on samples; elsewhere a kink is blunt by less than one spacing."""
+    cells = _cells(2.0 * ground.level_m + ground.length_m, ground.spacing_m)
+    x = (np.arange(cells + 1) - cells / 2) * ground.spacing_m
+    rise = np.clip(x + ground.length_m / 2, 0.0, ground.length_m)
+    return _drawn_out(math.tan(ground.slope_rad) * rise, ground.width_m, ground.spacing_m)
+
+
+def _random(ground: RandomGround) -> Floats:
+    """White noise, smoothed: a kernel's autocorrelation is twice its variance wide."""
+    samples = _cells(ground.size_m, ground.spacing_m) + 1
+    noise = np.random.default_rng(ground.seed).normal(size=(samples, samples))
+    width = ground.correlation_m / 2.0 / ground.spacing_m
+    z = gaussian_filter(noise, width, mode="wrap", truncate=5.0)
+    along_x, along_y = np.diff(z, axis=1), np.diff(z, axis=0)
+    # Of a cell's two triangles one has the gradient of its lower and right edge, the other that of
+    # its left and upper edge.
+    square = (along_x[:-1] ** 2 + along_x[1:] ** 2).mean()
+    square += (along_y[:, :-1] ** 2 + along_y[:, 1:] ** 2).mean()
+    rms = np.sqrt(square / 2.0) / ground.spacing_m
+    return np.asarray(z * (np.tan(ground.rms_slope_rad) / rms))
+
+
+def _steps(ground: StepsGround) -> Floats:
+    """Riser k lies between the samples ``ends + k * tread - 1`` and the next one."""
+    ends, tread = (_cells(m, ground.spacing_m) for m in (ground.level_m, ground.tread_m))
+    column = np.arange(2 * ends + (ground.count - 1) * tread)
+    risers = np.clip((column - ends) // tread + 1, 0, ground.count)
+    level = risers if ground.pattern == "up" else risers % 2
+    return _drawn_out(ground.height_m * level.astype(float), ground.width_m, ground.spacing_m)
+
+
+def _gaps(ground: GapsGround) -> Floats:
+    ends, width, distance = (
+        _cells(m, ground.spacing_m) for m in (ground.level_m, ground.width_m, ground.distance_m)
+    )
+    column = np.arange(2 * ends + width + (ground.count - 1) * distance + 1) - ends
+    within = column % distance  # from a trench's first edge
+    cut = (column >= 0) & (column < ground.count * distance) & (within > 0) & (within < width)
+    return _drawn_out(np.where(cut, 0.0, ground.depth_m), ground.across_m, ground.spacing_m)
+
+
+def _cells(length_m: float, spacing_m: float) -> int:
+    return max(1, round(length_m / spacing_m))
+
+
+def _drawn_out(profile_m: Floats, width_m: float, spacing_m: float) -> Floats:
+    """(rows, columns) of a profile along x, the same for every y."""
+    return np.tile(profile_m, (_cells(width_m, spacing_m) + 1, 1))
+
+
+def _cropped(world: str, ground: ElevationGround) -> Floats:
+    """Crop, scale and refine a real elevation model.
+
+    The crop counts rows from the north, as elevation models are stored; here y grows to the north.
+    Cubic refinement keeps the samples of the crop.
+    """
+    elevation = _elevation_m(world, ground.source)
     rows, columns = elevation.shape
     faults = [
-        f"world {world.name}: ground: {name} {first} to {first + count - 1} leave "
+        f"world {world}: ground: {name} {first} to {first + count - 1} leave "
         f"{ground.source}, which has {have}"
         for name, first, count, have in (
             ("rows", ground.row, ground.rows, rows),
@@ -42,11 +121,8 @@ def build_ground(world: WorldConfig) -> HeightField | None:
         ground.row : ground.row + ground.rows, ground.column : ground.column + ground.columns
     ]
     if not np.isfinite(crop).all():
-        raise ConfigError(f"world {world.name}: ground: the crop of {ground.source} has gaps")
-    z = _refined(crop[::-1] * ground.vertical_scale, ground.refine)
-    spacing = ground.spacing_m / ground.refine
-    half_w, half_h = (z.shape[1] - 1) * spacing / 2, (z.shape[0] - 1) * spacing / 2
-    return HeightField(z - z.min(), spacing, -half_w, -half_h)
+        raise ConfigError(f"world {world}: ground: the crop of {ground.source} has gaps")
+    return _refined(crop[::-1] * ground.vertical_scale, ground.refine)
 
 
 def _elevation_m(world: str, source: str) -> Floats:

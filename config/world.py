@@ -3,7 +3,7 @@
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from snakewalk.config.base import Strict
 
@@ -34,6 +34,112 @@ class ElevationGround(Strict):
     spacing_m: float = Field(gt=0.0, description="distance between samples in the robot's world")
     vertical_scale: float = Field(gt=0.0, description="metres in the robot's world per metre")
     refine: int = Field(1, ge=1, le=8, description="cubic subdivision of each cell")
+
+    def with_relief(self, factor: float) -> Self:
+        """Return the same ground with its heights times ``factor``."""
+        return self.model_copy(update={"vertical_scale": self.vertical_scale * factor})
+
+
+class RampGround(Strict):
+    """A plane that rises along x, between a level run-in and a level top; its middle at x = 0."""
+
+    kind: Literal["ramp"] = "ramp"
+    slope_rad: float = Field(gt=0.0, le=1.0)
+    length_m: float = Field(4.0, gt=0.0, le=50.0, description="of the slope, measured level")
+    level_m: float = Field(2.0, ge=0.1, le=50.0, description="of the run-in, and of the top")
+    width_m: float = Field(8.0, gt=0.5, le=50.0, description="across, along y")
+    spacing_m: float = Field(0.1, ge=0.005, le=0.5, description="distance between samples")
+
+    def with_relief(self, factor: float) -> Self:
+        """Return the same ground with its heights times ``factor``."""
+        slope_rad = math.atan(factor * math.tan(self.slope_rad))
+        return self.model_copy(update={"slope_rad": slope_rad})
+
+
+class RandomGround(Strict):
+    """Isotropic Gaussian hills and hollows, drawn from a seed of their own.
+
+    The heights' autocorrelation falls as ``exp(-(r / correlation_m)**2)``. The made field is scaled
+    so that the root mean square of its gradient, over its own triangles, is ``tan(rms_slope_rad)``.
+    """
+
+    kind: Literal["random"] = "random"
+    rms_slope_rad: float = Field(gt=0.0, le=1.0, description="arctan of the RMS gradient")
+    correlation_m: float = Field(
+        gt=0.0, le=10.0, description="where the heights' autocorrelation is 1/e"
+    )
+    seed: int = Field(0, ge=0, description="of the ground, not of the run")
+    size_m: float = Field(8.0, gt=0.5, le=50.0, description="edge of the square")
+    spacing_m: float = Field(0.03, ge=0.005, le=0.5, description="distance between samples")
+
+    @model_validator(mode="after")
+    def _correlation_is_resolved(self) -> Self:
+        if self.correlation_m < 3.0 * self.spacing_m:
+            raise ValueError("correlation_m must be at least 3 spacing_m, or the hills are spikes")
+        return self
+
+    def with_relief(self, factor: float) -> Self:
+        """Return the same ground with its heights times ``factor``."""
+        slope_rad = math.atan(factor * math.tan(self.rms_slope_rad))
+        return self.model_copy(update={"rms_slope_rad": slope_rad})
+
+
+class StepsGround(Strict):
+    """Steps across x, the middle of them at x = 0, between two level ends.
+
+    A height field has no vertical face: a riser is a flank one sample wide, inclined by
+    ``atan(height_m / spacing_m)``. Treads and ends are rounded to whole samples.
+    """
+
+    kind: Literal["steps"] = "steps"
+    height_m: float = Field(gt=0.0, le=1.0, description="of each riser")
+    tread_m: float = Field(gt=0.0, le=10.0, description="riser to riser")
+    count: int = Field(ge=1, le=100, description="number of risers")
+    pattern: Literal["up", "up-down"] = Field(
+        "up-down", description="a staircase, or one step up and one down in turn"
+    )
+    level_m: float = Field(2.0, ge=0.1, le=50.0, description="of each level end")
+    width_m: float = Field(3.0, gt=0.5, le=50.0, description="across, along y")
+    spacing_m: float = Field(0.01, ge=0.005, le=0.1, description="distance between samples")
+
+    @model_validator(mode="after")
+    def _treads_are_resolved(self) -> Self:
+        if self.tread_m < 2.0 * self.spacing_m:
+            raise ValueError("tread_m must be at least 2 spacing_m, or the steps are a ramp")
+        return self
+
+    def with_relief(self, factor: float) -> Self:
+        """Return the same ground with its heights times ``factor``."""
+        return self.model_copy(update={"height_m": self.height_m * factor})
+
+
+class GapsGround(Strict):
+    """Trenches across x, the middle of them at x = 0, in a level floor.
+
+    A trench is ``width_m`` wide between its upper edges; its walls are flanks one sample wide, as
+    those of steps, so that its bottom is two samples narrower. Lengths are whole samples.
+    """
+
+    kind: Literal["gaps"] = "gaps"
+    width_m: float = Field(gt=0.0, le=2.0, description="of each trench, edge to edge")
+    depth_m: float = Field(gt=0.0, le=2.0)
+    distance_m: float = Field(gt=0.0, le=10.0, description="from a trench's middle to the next")
+    count: int = Field(ge=1, le=100, description="number of trenches")
+    level_m: float = Field(2.0, ge=0.1, le=50.0, description="of each level end")
+    across_m: float = Field(3.0, gt=0.5, le=50.0, description="extent along y")
+    spacing_m: float = Field(0.01, ge=0.005, le=0.1, description="distance between samples")
+
+    @model_validator(mode="after")
+    def _trenches_are_resolved_and_apart(self) -> Self:
+        if self.width_m < 3.0 * self.spacing_m:
+            raise ValueError("width_m must be at least 3 spacing_m, or a trench has no bottom")
+        if self.distance_m < self.width_m + self.spacing_m:
+            raise ValueError("distance_m must be over width_m plus spacing_m, or trenches merge")
+        return self
+
+    def with_relief(self, factor: float) -> Self:
+        """Return the same ground with its heights times ``factor``."""
+        return self.model_copy(update={"depth_m": self.depth_m * factor})
 
 
 class WaterGround(Strict):
@@ -89,11 +195,15 @@ class PlannerConfig(Strict):
     edge_margin_m: float = Field(0.3, ge=0.0, description="kept free along the border")
 
 
+ReliefGround = ElevationGround | RampGround | RandomGround | StepsGround | GapsGround
+"""What makes a height field; the others are level."""
+
+
 class WorldConfig(Strict):
     """One world."""
 
     name: str
-    ground: Annotated[FlatGround | ElevationGround | WaterGround, Field(discriminator="kind")] = (
+    ground: Annotated[FlatGround | ReliefGround | WaterGround, Field(discriminator="kind")] = (
         FlatGround()
     )
     friction: FrictionConfig = FrictionConfig()
@@ -105,7 +215,7 @@ class WorldConfig(Strict):
 
         A planner then lays the same paths, so that steepness alone is compared.
         """
-        if not isinstance(self.ground, ElevationGround):
+        if isinstance(self.ground, FlatGround | WaterGround):
             return self
         limits = self.planner
         planner = limits.model_copy(
@@ -115,6 +225,5 @@ class WorldConfig(Strict):
                 "slope_limit_rad": math.atan(factor * math.tan(limits.slope_limit_rad)),
             }
         )
-        scale = self.ground.vertical_scale * factor
-        ground = self.ground.model_copy(update={"vertical_scale": scale})
+        ground = self.ground.with_relief(factor)
         return self.model_copy(update={"ground": ground, "planner": planner})

@@ -12,7 +12,7 @@ import numpy as np
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import ElevationGround, WorldConfig
+from snakewalk.config.world import FlatGround, WaterGround, WorldConfig
 from snakewalk.sim.physics.obstacles import obstacle_mjcf
 
 GEAR_RATIO = 353.5
@@ -87,7 +87,8 @@ def mjcf(
 def _ground(world: WorldConfig, ground: HeightField | None) -> tuple[str, str]:
     masks = 'name="ground" contype="1" conaffinity="2"'
     if ground is None:
-        size = 10.0 if isinstance(world.ground, ElevationGround) else world.ground.size_m
+        on = world.ground
+        size = on.size_m if isinstance(on, FlatGround | WaterGround) else 10.0
         return "", f'<geom {masks} type="plane" size="{size / 2} {size / 2} 0.1"/>'
     low, span = _levels(ground)
     (w, h), (rows, columns) = ground.size_m, ground.z_m.shape

@@ -198,3 +198,17 @@ def test_shipped_runs_on_the_real_model(
     heading = path.heading_rad(0.05)
     behind = points[0] - np.linspace(0, 1.25, 30)[:, None] * [np.cos(heading), np.sin(heading)]
     assert planner.relief.safe(*behind.T).all()
+
+
+@pytest.mark.parametrize(
+    "run",
+    ["ramp-10-up", "ramp-10-along", "ramp-15-up", "random-10", "steps-4cm", "gaps-8cm"],
+)
+def test_shipped_runs_on_made_ground_have_a_safe_path(run: str) -> None:
+    given = load_run(run)
+    world = load_world(given.world)
+    planner = TerrainPlanner(build_ground(world), world.planner)
+    path = planner.plan(np.vstack([given.start_m, given.waypoints_m]))
+    assert 5.0 < path.length_m < 6.5
+    assert planner.relief is not None
+    assert planner.relief.safe(*looked_at(path).T).all()
