@@ -1,5 +1,7 @@
 """A smooth path: a cubic spline through points in order, by arc length ([PT] 2.6.1)."""
 
+from typing import Self
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
@@ -29,10 +31,19 @@ class SplinePath:
             raise InputError("a path needs two different points: the start and a waypoint")
         chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
         spline = CubicSpline(chord, points, bc_type="natural")
-        fine = spline(np.linspace(0.0, chord[-1], max(2, round(chord[-1] / _STEP_M) + 1)))
-        self._s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
-        self._points = fine
-        self._xy = np.ascontiguousarray(fine.T)
+        self._tabulate(spline(np.linspace(0.0, chord[-1], max(2, round(chord[-1] / _STEP_M) + 1))))
+
+    @classmethod
+    def tabulated(cls, fine_m: Floats) -> Self:
+        """Return the path of points (n, 2) a centimetre apart, with no spline between them."""
+        path = cls.__new__(cls)
+        path._tabulate(fine_m)
+        return path
+
+    def _tabulate(self, fine_m: Floats) -> None:
+        self._s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine_m, axis=0).T))])
+        self._points = fine_m
+        self._xy = np.ascontiguousarray(fine_m.T)
 
     @property
     def length_m(self) -> float:

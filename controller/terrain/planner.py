@@ -10,11 +10,13 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.terrain.bends import widen
+from snakewalk.controller.terrain.dubins import turn_onto
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.relief import Relief
 from snakewalk.controller.terrain.safe_graph import SafeGraph
 
 _CHECK_STEP_M = 0.02  # how densely a spline is checked again
+_UNSAFE = 30.0  # metres of level path that a turn takes to stay off a metre of unsafe ground
 _ROUNDS = 7  # halvings: a corner's pieces end at a hundredth of their length
 
 
@@ -29,10 +31,19 @@ class TerrainPlanner:
         self.relief = None if ground is None else Relief(ground, config)
         self.graph = None if self.relief is None else SafeGraph(self.relief)
 
-    def __call__(self, points_m: ArrayLike) -> SplinePath:
+    def __call__(
+        self, points_m: ArrayLike, heading_rad: float | None = None, turn_radius_m: float = 0.5
+    ) -> SplinePath:
         """Plan a path from where the body is, on good ground or bad, through (n, 2) waypoints.
 
-        From an unsafe first point the path leads straight to the nearest safe node.
+        From an unsafe first point the path leads straight to the nearest safe node. With a heading
+        the path begins in that direction and turns onto the planned one by a Dubins curve, over
+        safe ground where one leads over it, before it comes to the first waypoint.
+
+        Args:
+            points_m: the first is where the head is.
+            heading_rad: direction of the body there; None for any.
+            turn_radius_m: least radius with which the body turns.
 
         Raises:
             InputError: a waypoint is off the world or on unsafe ground, or no safe way leads to it.
@@ -40,11 +51,17 @@ class TerrainPlanner:
         """
         points = np.asarray(points_m, float)
         if self.relief is None or self.graph is None:
-            return SplinePath(points)
-        faults = [f for k in range(1, len(points)) for f in _fault(self, k, points[k])]
-        if faults:
-            raise InputError(faults)
-        return self._spline(self._polygon(points, self.graph), points, self.relief)
+            path = SplinePath(points)
+        else:
+            faults = [f for k in range(1, len(points)) for f in _fault(self, k, points[k])]
+            if faults:
+                raise InputError(faults)
+            path = self._spline(self._polygon(points, self.graph), points, self.relief)
+        if heading_rad is None:
+            return path
+        until_m = path.first_pass(points[1])
+        least = 1.0 if self.graph is None else self.graph.length_weight
+        return turn_onto(path, heading_rad, turn_radius_m, until_m, self._turn_cost_per_m, least)
 
     def plan(self, points_m: ArrayLike) -> SplinePath:
         """Plan a path as a call does, but refuse a start that is off the world or on unsafe ground.
@@ -58,6 +75,13 @@ class TerrainPlanner:
         if faults:
             raise InputError(faults)
         return self(points)
+
+    def _turn_cost_per_m(self, points_m: Floats) -> Floats:
+        """Weight (..., k) of a metre of path at (..., k, 2); unsafe ground costs a detour."""
+        if self.relief is None or self.graph is None:
+            return np.ones(points_m.shape[:-1])
+        unsafe = ~self.relief.safe(*np.moveaxis(points_m, -1, 0))
+        return self.graph.cost_per_m(points_m) + _UNSAFE * self.graph.length_weight * unsafe
 
     def _polygon(self, points: Floats, graph: SafeGraph) -> Floats:
         """(k, 2) corners through all points, leg by leg."""

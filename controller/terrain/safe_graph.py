@@ -68,15 +68,18 @@ class SafeGraph:
 
     def edge_cost(self, from_m: Floats, to_m: Floats) -> tuple[Floats, Bools]:
         """Weights of straight pieces (k, 2) to (k, 2), and whether each is safe all along."""
-        config = self._relief.config
         length = np.hypot(*(to_m - from_m).T)
         count = max(2, int(np.ceil(length.max(initial=0.0) / _SAMPLE_M)) + 1)
-        part = np.linspace(0.0, 1.0, count)[:, None, None]
-        x, y = np.moveaxis(from_m + part * (to_m - from_m), -1, 0)
-        variance = self._relief.variance_m2(x, y).mean(axis=0)
-        safe = np.asarray((self._relief.risk(x, y) <= RISK_LIMIT).all(axis=0))
-        per_m = np.asarray(variance, float) / config.node_spacing_m + config.length_weight
-        return length * per_m, safe
+        part = np.linspace(0.0, 1.0, count)[:, None]
+        at = from_m[:, None] + part * (to_m - from_m)[:, None]
+        safe = np.asarray((self._relief.risk(*np.moveaxis(at, -1, 0)) <= RISK_LIMIT).all(axis=-1))
+        return length * self.cost_per_m(at).mean(axis=-1), safe
+
+    def cost_per_m(self, points_m: Floats) -> Floats:
+        """Weight (..., k) of a metre of path at points (..., k, 2) along curves, safe or not."""
+        config = self._relief.config
+        variance = self._relief.variance_m2(*np.moveaxis(points_m, -1, 0))
+        return variance / config.node_spacing_m + config.length_weight
 
     def _tree(self, target: int) -> tuple[Floats, Indices]:
         """Score to ``target`` and the next node towards it, from every node.
