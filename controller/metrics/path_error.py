@@ -10,6 +10,7 @@ from snakewalk.controller.runlog.record import PlanSummary, PoseTable, RunRecord
 _WINDOW_M: Final = 0.5  # around the place reached, so that a crossing branch is not the nearest
 _ROUNDING_M: Final = 2e-6  # of the log
 _ROWS: Final = 2000
+_TRACK_S: Final = 0.2
 
 
 def waypoint_times_s(pose: PoseTable, plan: PlanSummary) -> Floats:
@@ -67,9 +68,18 @@ def distance_m(points_m: Floats, path_m: Floats, along_m: Floats) -> Floats:
     return np.asarray(np.where(far, np.inf, gap).min(axis=1))
 
 
-def travelled_m(pose: PoseTable) -> float:
-    """Length of the track of the centre of mass in the horizontal plane."""
-    return float(np.hypot(*np.diff(pose.centre_m[:, :2], axis=0).T).sum())
+def travelled_m(pose: PoseTable, first: int = 0, last: int = -1) -> float:
+    """Length of the track of the centre of mass in the horizontal plane, from row to row.
+
+    The track is sampled every 0.2 s: the encoders' steps move the computed centre by a millimetre
+    from cycle to cycle, so a track of every cycle is 3 % too long at 50 Hz and 11 % at 100 Hz.
+    """
+    time_s = pose.time_s
+    if len(time_s) == 0:
+        return 0.0
+    due_s = np.arange(time_s[first], time_s[last] - 0.5 * _TRACK_S, _TRACK_S)
+    rows = np.append(np.searchsorted(time_s, due_s), last)
+    return length_m(pose.centre_m[rows])
 
 
 def length_m(path_m: Floats) -> float:

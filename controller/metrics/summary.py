@@ -209,14 +209,14 @@ def _costs(
     rows = np.flatnonzero(chosen)
     if len(rows) < 2:
         return float("nan"), float("nan")
-    span = slice(rows[0], rows[-1] + 1)
-    time_s, centre_m = record.pose.time_s[span], record.pose.centre_m[span]
+    pose = record.pose
+    first, last = int(rows[0]), int(rows[-1])
     if len(record.header.plan.waypoints_m):
-        distance_m = length_m(centre_m)
+        distance_m = travelled_m(pose, first, last)
     else:
-        distance_m = float(np.linalg.norm(centre_m[-1] - centre_m[0]))
+        distance_m = float(np.linalg.norm(pose.centre_m[last] - pose.centre_m[first]))
     carried_j = weight_n(record.header.robot) * distance_m
-    electrical_j, mechanical_j = energy.between(time_s[0], time_s[-1])
+    electrical_j, mechanical_j = energy.between(pose.time_s[first], pose.time_s[last])
     return cost_of_transport(electrical_j, carried_j), cost_of_transport(mechanical_j, carried_j)
 
 

@@ -22,7 +22,8 @@ class BlockedShaft:
     def __init__(self, drive: ServoDrive) -> None:
         self._drive = drive
         servos = len(drive.torque_on)
-        self._rows = np.zeros(servos, bool)
+        self.rows = np.zeros(servos, bool)
+        """(S,) blocked."""
         self._at_rad = np.zeros(servos)
         self._output = np.zeros(servos)
         self._gain = np.zeros(servos)
@@ -33,12 +34,12 @@ class BlockedShaft:
 
     def block(self, row: int, at_rad: float) -> None:
         """Hold a shaft where it is; the firmware then applies its registers again."""
-        self._rows[row], self._at_rad[row], self.any = True, at_rad, True
+        self.rows[row], self._at_rad[row], self.any = True, at_rad, True
 
     def free(self, row: int) -> None:
         """Release a shaft."""
-        self._rows[row] = False
-        self.any = bool(self._rows.any())
+        self.rows[row] = False
+        self.any = bool(self.rows.any())
 
     def hold(self, fresh: Bools | None = None) -> None:
         """Turn the blocked servos' drive, just set by registers or control loops, into a brake.
@@ -47,7 +48,7 @@ class BlockedShaft:
         """
         if not self.any:
             return
-        drive, rows = self._drive, self._rows
+        drive, rows = self._drive, self.rows
         updated = rows & (drive.pwm_limit <= 1.0)  # else that is still the brake's
         self._on = np.where(updated, drive.torque_on, self._on)
         self._limit = np.where(updated, drive.pwm_limit, self._limit)
@@ -66,7 +67,7 @@ class BlockedShaft:
 
     def pwm(self) -> Floats:
         """(S,) output as the servos see it, fraction of the supply."""
-        return np.where(self._rows, self._output, self._drive.pwm) if self.any else self._drive.pwm
+        return np.where(self.rows, self._output, self._drive.pwm) if self.any else self._drive.pwm
 
     def current_a(self) -> Floats:
         """(S,) current as the servos measure it."""
@@ -74,9 +75,9 @@ class BlockedShaft:
             return self._drive.current_a
         stall = self._output * self._drive.supply_v / self._drive.resistance_ohm
         stall = np.clip(stall, -self._limit_a, self._limit_a)
-        return np.where(self._rows, stall, self._drive.current_a)
+        return np.where(self.rows, stall, self._drive.current_a)
 
     def limit_a(self) -> Floats:
         """(S,) limit of the current that the registers hold."""
         limit_a = self._drive.current_limit_a
-        return np.where(self._rows, self._limit_a, limit_a) if self.any else limit_a
+        return np.where(self.rows, self._limit_a, limit_a) if self.any else limit_a

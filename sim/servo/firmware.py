@@ -103,7 +103,6 @@ class Firmware:
             if self.control_loops.active:
                 stop_s = min(stop_s, self._control_s)
             plant.advance(stop_s, drive)
-            protection.pass_time(stop_s - self._time_s)
             self._time_s = stop_s
             if self.control_loops.active and stop_s >= self._control_s:
                 self._control_s = stop_s + CONTROL_S

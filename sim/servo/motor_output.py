@@ -28,6 +28,17 @@ class MotorOutput:
         """Whether the mode of any servo limits its current."""
         self.current_a: Callable[[], Floats] = blocked_shaft.current_a
         """(S,) as measured."""
+        self._heat_j = drive.heat_j.copy()
+
+    def take_heat_j(self, seconds: float) -> Floats:
+        """(S,) heat of the windings since the last call, ``seconds`` ago."""
+        drive, before_j = self._drive, self._heat_j
+        self._heat_j = drive.heat_j.copy()
+        since_j = self._heat_j - before_j
+        if not self._blocked_shaft.any:
+            return since_j
+        stall_j = drive.resistance_ohm * self.current_a() ** 2 * seconds
+        return np.where(self._blocked_shaft.rows, stall_j, since_j)
 
     def pwm(self, velocity_rad_s: Floats) -> Floats:
         """(S,) fraction of the supply that the bridges put out, at these shaft speeds."""

@@ -19,7 +19,6 @@ from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.motor import MotorColumns
 from snakewalk.sim.servo.motor_output import MotorOutput
 from snakewalk.sim.servo.servo_loops import (
-    add_loss,
     count_blocked,
     out_of_range,
     supply_current_a,
@@ -83,7 +82,6 @@ class Protection:
         """(S,) at the sensor: first order in the winding's loss."""
         self.full = np.ones(len(bank))
         """(S,) output beyond which a motor cannot go, fraction of the supply."""
-        self._heat_j = np.zeros(len(bank))
         self._blocked_s = np.zeros(len(bank))
         names = "Min Voltage Limit", "Max Voltage Limit", "Temperature Limit"
         self._limits = bank[names[0]], bank[names[1]], bank[names[2]]
@@ -118,13 +116,10 @@ class Protection:
         """Restart the count of an overload; heat stays."""
         self._blocked_s[rows] = 0.0
 
-    def pass_time(self, seconds: float) -> None:
-        """Add up the windings' loss at the present currents."""
-        add_loss(self._heat_j, self._motor_output.current_a(), self._drive.resistance_ohm, seconds)
-
     def check(self, plant: Plant) -> bool:
         """Check all servos at the end of a slice of ``SLICE_S``; True if registers have changed."""
-        warm_up(self.temperature_c, self._heat_j, SLICE_S, self._around.ambient_c, self._thermal)
+        heat_j = self._motor_output.take_heat_j(SLICE_S)
+        warm_up(self.temperature_c, heat_j, SLICE_S, self._around.ambient_c, self._thermal)
         drive = self._drive
         pwm = self._motor_output.pwm(plant.velocity_rad_s)
         self._sag(pwm)

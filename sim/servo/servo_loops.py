@@ -141,23 +141,16 @@ def accept_goals(
             taken[row] = True
 
 
-@compiled(f"void(float64[::1], {_SEEN}, {_SEEN}, float64)")
-def add_loss(heat_j: Floats, current_a: Floats, ohm: Floats, seconds: float) -> None:
-    """Add what the windings (S,) turned into heat."""
-    for row in range(len(heat_j)):
-        heat_j[row] += current_a[row] * current_a[row] * (seconds * ohm[row])
-
-
 @compiled(f"void(float64[::1], float64[::1], float64, float64, {_FRAME})")
 def warm_up(
     temperature_c: Floats, heat_j: Floats, slice_s: float, ambient_c: float, thermal: Floats
 ) -> None:
-    """Move each sensor towards where its heat would take it in the long run; heat is used up.
+    """Move each sensor towards where its heat would take it in the long run.
 
     Args:
         temperature_c: (S,)
-        heat_j: (S,) since the last call.
-        slice_s: time since then.
+        heat_j: (S,) of a slice.
+        slice_s: its length.
         ambient_c: of the air.
         thermal: (2, S) kelvin per watt; share of the difference that a slice makes up for.
 
@@ -165,7 +158,6 @@ def warm_up(
     for row in range(len(heat_j)):
         target_c = ambient_c + thermal[0, row] * (heat_j[row] / slice_s)
         temperature_c[row] += (target_c - temperature_c[row]) * thermal[1, row]
-        heat_j[row] = 0.0
 
 
 @compiled(

@@ -7,7 +7,7 @@ import pytest
 
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.controller.metrics.effort import energy_track
-from snakewalk.controller.metrics.path_error import length_m
+from snakewalk.controller.metrics.path_error import travelled_m
 from snakewalk.controller.metrics.summary import summary
 from snakewalk.controller.runlog.record import RunRecord, Winding
 
@@ -28,7 +28,7 @@ def test_a_cost_is_energy_over_weight_and_way_while_the_pulse_moves(record: RunR
     rows = np.flatnonzero(pose.pulse_m_s > 0.0)
     span_s = pose.time_s[rows[-1]] - pose.time_s[rows[0]]
     weight_n = robot.link_mass_kg * (robot.joint_count + 1) * GRAVITY_M_S2
-    carried_j = weight_n * length_m(pose.centre_m[rows[0] :])
+    carried_j = weight_n * travelled_m(pose, rows[0], rows[-1])
     whole_s = record.cycle.time_s[-1] - record.cycle.time_s[0]
     assert n.energy_source == "integrated"
     assert n.electrical_energy_j == pytest.approx(WATTS * whole_s, rel=1e-5)

@@ -241,6 +241,23 @@ def test_masked_out_errors_are_shown_but_keep_the_torque() -> None:
     assert read(line, 1, 64, 1) == 1
 
 
+def test_heat_is_that_of_the_whole_time_however_often_somebody_looks() -> None:
+    """A goal that jumps back and forth: most of the heat is in the first milliseconds after it."""
+    heats_j = []
+    for looks in (1, 20):
+        plant = BenchPlant(1, step_s=1e-3)
+        line = SimLine(ServoBank([1]), plant, supply_and_ambient=SupplyAndAmbient(supply_v=12.0))
+        write(line, 1, 64, 1, 1)
+        for k in range(50):
+            write(line, 1, 116, 2048 + 200 * (k % 2), 4)
+            for _ in range(looks):
+                pause(line, 0.1 / looks)
+        heats_j.append(line.firmware.protection.temperature_c[0] - 25.0)
+        expected = XM430.winding_k_per_w * line.firmware.drive.heat_j[0] / XM430.thermal_time_s
+    assert heats_j[0] == pytest.approx(heats_j[1], rel=0.01)
+    assert heats_j[0] == pytest.approx(expected, rel=0.05)
+
+
 def test_heat_follows_i_squared_r_and_shuts_down_over_the_limit() -> None:
     line = held_line(-2.0, supply_ohm=0.0)
     amps = 2.0 / XM430.torque_constant_n_m_a

@@ -78,18 +78,10 @@ def test_goals_within_limits_are_taken_and_others_leave_no_trace(how: Any) -> No
 
 
 @pytest.mark.parametrize("how", BOTH)
-def test_loss_grows_with_the_square_of_the_current(how: Any) -> None:
-    heat_j = np.array([1.0, 1.0])
-    how(servo_loops.add_loss)(heat_j, np.array([2.0, -3.0]), np.array([1.0, 1.0]), 0.5)
-    assert heat_j.tolist() == [3.0, 5.5]
-
-
-@pytest.mark.parametrize("how", BOTH)
-def test_a_sensor_goes_its_share_of_the_way_and_the_heat_is_used_up(how: Any) -> None:
+def test_a_sensor_goes_its_share_of_the_way(how: Any) -> None:
     celsius, heat_j = np.array([25.0, 40.0]), np.array([0.5, 0.0])
     how(servo_loops.warm_up)(celsius, heat_j, 0.05, 25.0, np.array([[6.0, 6.0], [0.1, 0.1]]))
     assert celsius.tolist() == pytest.approx([25.0 + 0.1 * 60.0, 40.0 - 0.1 * 15.0])
-    assert not heat_j.any()
 
 
 @pytest.mark.parametrize("how", BOTH)
