@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.gait import GaitConfig
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.virtual_chassis import virtual_chassis
@@ -33,6 +34,12 @@ class GaitDisplacement:
     """Body lengths a cycle: what a climber is for."""
 
 
+def full_rate_span_s(start_s: float, end_s: float, gait: GaitConfig) -> tuple[float, float]:
+    """Times between which a gait runs at full rate; its log is from ``start_s`` to ``end_s``."""
+    last_s = end_s - STOP_S
+    return max(last_s - gait.duration_s + SKIPPED_S, start_s), last_s
+
+
 def gait_displacement(record: RunRecord) -> GaitDisplacement:
     """Return the displacement of a gait run whose parameters did not change.
 
@@ -50,8 +57,7 @@ def gait_displacement(record: RunRecord) -> GaitDisplacement:
         return unknown
     time_s, links = pose.time_s[known], pose.links_m[known]
     up = pose.rotation[known][:, :, 2]
-    last_s = time_s[-1] - STOP_S
-    first_s = max(last_s - config.duration_s + SKIPPED_S, float(time_s[0]))
+    first_s, last_s = full_rate_span_s(float(time_s[0]), float(time_s[-1]), config)
     count = int((last_s - first_s) * hz + 1e-9)
     if count < 1:
         return unknown

@@ -16,8 +16,8 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.metrics.displacement import full_rate_span_s
 from snakewalk.controller.metrics.ground_contact import CLEAR_M
-from snakewalk.controller.motion.stop_profile import STOP_S
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.drivers.types import BodyPose
 
@@ -98,11 +98,13 @@ class Effort:
     """Distance that touching links slide sideways, over that of the centre; flat floors only."""
 
 
-def effort(record: RunRecord, from_s: float) -> Effort:
-    """Return the effort of a gait run from ``from_s`` after the start until it stops."""
-    pose = record.pose
+def effort(record: RunRecord) -> Effort:
+    """Return the effort of a gait run while it runs at full rate; NaN for other runs."""
+    pose, gait = record.pose, record.header.run.gait
     unknown = Effort(*(float("nan"),) * 5)
-    end_s = record.end_s - STOP_S
+    if gait is None or len(pose.time_s) == 0:
+        return unknown
+    from_s, end_s = full_rate_span_s(float(pose.time_s[0]), float(pose.time_s[-1]), gait)
     steady = (pose.time_s >= from_s) & (pose.time_s <= end_s)
     if steady.sum() < 2 or not np.isfinite(pose.links_m[steady]).all():
         return unknown

@@ -10,6 +10,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.effort import (
     EnergyTrack,
     cost_of_transport,
+    effort,
     energy_track,
     weight_n,
 )
@@ -80,10 +81,10 @@ class RunSummary:
     energy_source: str
     """``integrated`` in every physics step; ``sampled`` from one current a cycle: too low."""
     electrical_cost_of_transport: float | None
-    """Energy over weight times distance, while the pulse moves (without a pulse, in the whole log).
+    """Energy over weight times distance.
 
-    The distance is the track of the centre of mass; without waypoints, the straight line between
-    its ends.
+    On a way to waypoints while the pulse moves, over the track of the centre of mass. Else over the
+    straight line between its ends: of a gait at full rate, of other motions in the whole log.
     """
     mechanical_cost_of_transport: float | None
     peak_joint_speed_rad_s: float | None
@@ -206,6 +207,9 @@ def _costs(
     record: RunRecord, energy: EnergyTrack, chosen: NDArray[np.bool_]
 ) -> tuple[float, float]:
     """Electrical and mechanical cost of transport between the first and last of ``chosen`` rows."""
+    if record.header.run.gait is not None:
+        gait = effort(record)
+        return gait.cost_of_transport, gait.mechanical_cost
     rows = np.flatnonzero(chosen)
     if len(rows) < 2:
         return float("nan"), float("nan")

@@ -12,7 +12,7 @@ from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait
 from snakewalk.controller.app.runs.gait_run import GaitRun
 from snakewalk.controller.app.studies.sweep_points import Point
-from snakewalk.controller.metrics.displacement import SKIPPED_S, gait_displacement
+from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.metrics.effort import effort
 
 
@@ -66,9 +66,7 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
     except InputError as error:
         return Measurement(f"refused: {error.faults[0]}")
     record = finished.record
-    start_s = next((e.time_s for e in record.events if e.kind == "start"), 0.0)
-    ramp_s = max(0.0, record.end_s - start_s - point.seconds - 1.0)
-    moved, cost = gait_displacement(record), effort(record, start_s + ramp_s + SKIPPED_S)
+    moved, cost = gait_displacement(record), effort(record)
     numbers = finished.summary
     return Measurement(
         ended=finished.outcome.tripped or "ran to its end",

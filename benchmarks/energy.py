@@ -1,0 +1,102 @@
+"""Energy of the motors, integrated and sampled, and what smoother goals would save.
+
+    python benchmarks/energy.py
+
+Each motion runs three times: with a goal held from cycle to cycle at 50 Hz and at 100 Hz, and with
+the servos' own time-based profile, which runs to each goal in the 20 ms until the next one. Printed
+are the electrical cost of transport, integrated in every physics step; the same from the current
+and speed that each cycle reads, over the integrated one; and the lag of the joints.
+"""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from unittest.mock import patch
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.app.runs.execute import Finished, execute
+from snakewalk.controller.app.runs.factory import prepare_gait, prepare_walk
+from snakewalk.controller.app.runs.prepared_run import PreparedRun
+from snakewalk.controller.gaits.registry import GAITS
+from snakewalk.controller.metrics.effort import energy_track, sampled_energy
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.start_up import configure
+from snakewalk.drivers.protocol.registers import ServoUnits
+
+RUN_S = 12.0
+PROFILE_MS = 20
+TIME_BASED = 0x04
+"""Drive Mode(10), bit 2."""
+
+
+def main() -> None:
+    """Run all gaits, and walk and serpenoid on the square."""
+    print("motion | cost | sampled | lag ms | 100 Hz: cost | lag ms | profile: cost | lag ms")
+    for name, prepared in jobs():
+        held, often = finish(prepared), finish(at_rate(prepared, 100.0))
+        with profiles():
+            smooth = finish(prepared)
+        share = (
+            sampled_energy(held.record).electrical_j[-1]
+            / energy_track(held.record).between(0.0, held.record.end_s)[0]
+        )
+        cells = [name, cost(held), f"{share:.2f}", lag_ms(held)]
+        print(" | ".join([*cells, cost(often), lag_ms(often), cost(smooth), lag_ms(smooth)]))
+
+
+def jobs() -> Iterator[tuple[str, PreparedRun]]:
+    """Names and runs."""
+    for name in GAITS:
+        yield name, prepare_gait(name, seconds=RUN_S)
+    for motion in ("walk", "serpenoid"):
+        yield f"flat-square, {motion}", prepare_walk("flat-square", motion=motion)
+
+
+def at_rate(prepared: PreparedRun, hz: float) -> PreparedRun:
+    """The same run with another rate of its control loop."""
+    run = prepared.run.model_copy(update={"cycle_hz": hz})
+    return replace(prepared, run=run)  # type: ignore[type-var]
+
+
+def finish(prepared: PreparedRun) -> Finished:
+    """Run it; its log is not kept."""
+    with TemporaryDirectory() as folder:
+        return execute(prepared, Path(folder))
+
+
+@contextmanager
+def profiles() -> Iterator[None]:
+    """Servos that run to each goal along a rectangular profile of 20 ms."""
+
+    def with_profile(
+        bus: DynamixelBus,
+        robot: RobotConfig,
+        units: ServoUnits,
+        joints: Iterable[int] | None = None,
+    ) -> None:
+        some = list(range(robot.joint_count) if joints is None else joints)
+        configure(bus, robot, units, some)
+        for joint in some:
+            bus.write_verified(robot.servo_ids[joint], "Drive Mode", TIME_BASED)
+            bus.write_verified(robot.servo_ids[joint], "Profile Velocity", PROFILE_MS)
+
+    with patch("snakewalk.drivers.chain.servo_chain.configure", with_profile):
+        yield
+
+
+def cost(finished: Finished) -> str:
+    """Electrical cost of transport."""
+    value = finished.summary.electrical_cost_of_transport
+    return "" if value is None else f"{value:.3g}"
+
+
+def lag_ms(finished: Finished) -> str:
+    """Lag of the measured behind the sent angles."""
+    value = finished.summary.lag_s
+    return "" if value is None else f"{1e3 * value:.0f}"
+
+
+if __name__ == "__main__":
+    main()
