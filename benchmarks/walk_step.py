@@ -1,9 +1,10 @@
-"""A step of the snake walk at 1e3, 1e5 and 1e6 states.
+"""A step of the snake walk at 1e3, 1e5 and 1e6 states, and of the frontier walk at 1e3 to 1e5.
 
 On a graph a step looks at the neighbours only: its time must not grow with the states but for what
 the processor's caches cost, which a random walk without memory on the same neighbour lists pays,
-too. Both walk as many steps as there are states, their lists included. On the star of [PT] 2.6.2
-every state is a candidate, so a step is O(V); beside it the sum of two arrays of V integers.
+too. Both walk as many steps as there are states, their lists included. The frontier walk is taken
+to its end, as its searches come late; it has no target. On the star of [PT] 2.6.2 every state is a
+candidate, so a step is O(V); beside it the sum of two arrays of V integers.
 """
 
 from itertools import pairwise
@@ -54,6 +55,17 @@ def on_graph(states: int) -> Row:
     )
 
 
+def to_the_end(states: int) -> Row:
+    """The frontier walk until a random graph of mean degree 9 is covered."""
+    rng = np.random.default_rng(0)
+    graph = graph_source(f"er:{states}:9")(rng)
+    steps = walk(graph, "frontier", 0, rng).steps
+    ours_s = cpu_s(lambda: walk(graph, "frontier", 0, rng), 1, max(1, 10_000 // states))
+    return Row(
+        f"frontier walk of {states} states, mean degree 9, to its end", ours_s / steps * 1e6, "us"
+    )
+
+
 def on_star(states: int, *, fresh: bool) -> Row:
     """All states candidates; a tenth unvisited, or all visited and failed, which takes longest."""
     rng = np.random.default_rng(0)
@@ -78,6 +90,8 @@ def on_star(states: int, *, fresh: bool) -> Row:
 
 def run() -> list[Row]:
     """Measure."""
-    return [on_graph(states) for states in SIZES] + [
-        on_star(states, fresh=fresh) for states in SIZES for fresh in (True, False)
+    return [
+        *(on_graph(states) for states in SIZES),
+        *(to_the_end(states) for states in (1_000, 10_000, 100_000)),
+        *(on_star(states, fresh=fresh) for states in SIZES for fresh in (True, False)),
     ]

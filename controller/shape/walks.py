@@ -1,4 +1,4 @@
-"""Walks that cover a graph of states: the snake walk and its rivals ([PT] 2.6.2, [KP] 4.2.1).
+"""Walks that cover a graph: the snake walk, its rivals ([PT] 2.6.2, [KP] 4.2.1), and one of ours.
 
 ``W(q) = deg / (1 - sign M + deg (sign M + sign F) + M 2^F)``, the neighbour with the largest W is
 next. Correction: F(q) counts the times that q was left for an already *visited* state; with the
@@ -6,10 +6,16 @@ printed "unvisited" Eq. 3 and the properties of W fail (``snake-printed`` keeps 
 2^F overflows floats, so W is compared by integers. Ties go to the least recently visited neighbour,
 then to the first in the list. Algorithm 2's ``until n < N`` is read as "until the target is met":
 here, until all states are seen.
+
+``frontier`` (ours) knows what the snake walk knows of its neighbours, and remembers it. Like a
+knight's tour by Warnsdorff's rule it takes the unvisited neighbour that has fewest unvisited
+neighbours itself; where there is none, it goes through the states visited so far to an unvisited
+one, by the way of fewest short returns, then of fewest steps.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from heapq import heappop, heappush
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +24,9 @@ from snakewalk.config.arrays import Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.shape.graphs import Graph
 
-RULES = ("snake", "snake-printed", "stack", "random", "degree")
+RULES = ("snake", "snake-printed", "frontier", "stack", "random", "degree")
+SHORT_RETURN = 0.05
+"""Of |V|: [PT] 2.6.2 wants at least so many steps between two visits of a state."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +55,9 @@ def walk(
     rng: np.random.Generator,
     max_steps: int | None = None,
 ) -> Walk:
-    """Walk from ``start`` until all states are seen; O(neighbours) a step.
+    """Walk from ``start`` until all states are seen.
+
+    O(neighbours) a step; ``frontier``'s search, where no neighbour is unvisited, up to O(E log V).
 
     Args:
         graph: connected.
@@ -67,6 +77,7 @@ def walk(
     choose: Callable[[list[int]], int] = {
         "snake": state.snake,
         "snake-printed": state.snake,
+        "frontier": state.frontier,
         "stack": state.stack_top,
         "random": lambda near: state.free(near, rng),
         "degree": state.degree_over_visits,
@@ -115,9 +126,12 @@ class _WalkState:
         self.last = [-1] * graph.states
         self.path = [start]
         self.branches = [start]
+        self.ahead: list[int] = []
+        self.unvisited_near = self.degree.copy()
         self.selected[start] = 1
         self.last[start] = 0
         self.visited = 1
+        self._count_visit(start)
 
     @property
     def step(self) -> int:
@@ -129,6 +143,8 @@ class _WalkState:
         if counts_fresh is not None and fresh is counts_fresh:
             self.failures[self.path[-1]] += 1
         self.visited += fresh
+        if fresh:
+            self._count_visit(to)
         self.selected[to] += 1
         self.path.append(to)
         self.last[to] = self.step
@@ -145,6 +161,43 @@ class _WalkState:
             if sign > 0 or (sign == 0 and self.last[q] < self.last[best]):
                 best, score = q, other
         return best
+
+    def frontier(self, near: list[int]) -> int:
+        """Warnsdorff's choice among the unvisited; without any, a step towards one elsewhere."""
+        fresh = self._fresh(near)
+        if fresh:
+            return min(fresh, key=lambda q: (self.unvisited_near[q], self.degree[q]))
+        if not self.ahead:
+            self.ahead = self._way_towards_unvisited()
+        return self.ahead.pop()
+
+    def _way_towards_unvisited(self) -> list[int]:
+        """Visited states to walk, the last one first, which has an unvisited neighbour; Dijkstra.
+
+        The cost of a way is the number of its short returns, then that of its steps; ties go by
+        Warnsdorff's choice of its end. Only neighbours of visited states are looked at.
+        """
+        soon = SHORT_RETURN * len(self.near)
+        here, now = self.path[-1], self.step
+        came_from = {here: here}
+        cost = {here: (0, 0)}
+        queue = [(0, 0, 0, 0, here)]
+        while True:  # a connected graph with unvisited states: there is a way to one
+            returns, steps, _, _, q = heappop(queue)
+            if not self.selected[q]:
+                break
+            if (returns, steps) > cost[q]:
+                continue  # a better way to q has been gone on from
+            for n in self.near[q]:
+                early = self.selected[n] > 0 and now + steps + 1 - self.last[n] < soon
+                after = (returns + early, steps + 1)
+                if n not in cost or after < cost[n]:
+                    cost[n], came_from[n] = after, q
+                    heappush(queue, (*after, self.unvisited_near[n], self.degree[n], n))
+        way = [came_from[q]]
+        while came_from[way[-1]] != here:
+            way.append(came_from[way[-1]])
+        return way
 
     def stack_top(self, near: list[int]) -> int:
         """Depth first: the unvisited neighbour of highest degree, else back the way it came."""
@@ -170,6 +223,10 @@ class _WalkState:
             if left > right or (left == right and self.last[q] < self.last[best]):
                 best = q
         return best
+
+    def _count_visit(self, q: int) -> None:
+        for n in self.near[q]:
+            self.unvisited_near[n] -= 1
 
     def _fresh(self, near: list[int]) -> list[int]:
         selected = self.selected

@@ -21,10 +21,8 @@ from snakewalk.controller.shape.graphs import (
     threshold_graph,
 )
 from snakewalk.controller.shape.states import to_states
-from snakewalk.controller.shape.walks import Walk, check_rule, walk
+from snakewalk.controller.shape.walks import SHORT_RETURN, Walk, check_rule, walk
 
-SHORT_RETURN = 0.05
-"""Of |V|: [PT] 2.6.2 wants at least so many steps between two visits of a state."""
 _GRID = np.linspace(0.0, 8.0, 161)
 
 
@@ -46,6 +44,10 @@ class StudyResult:
     """(R,) share of returns to a state after less than 0.05 |V| steps, until cover."""
     short_steps: Floats
     """(R,) such returns as a share of all steps."""
+    short_per_state: Floats
+    """(R,) such returns over |V|: comparable between walks of different length."""
+    leaves: Floats
+    """(R,) share of states with one neighbour: each but the walk's ends forces a short return."""
     grid: Floats
     """(G,) steps over |V|."""
     visited: Floats
@@ -64,11 +66,14 @@ class StudyResult:
             "covered": len(covered),
             "cover_mean": round(float(covered.mean()), 4) if len(covered) else None,
             "cover_std": round(float(covered.std()), 4) if len(covered) else None,
+            "cover_ci95": round(_ci95(covered), 4) if len(covered) > 1 else None,
             "cover_worst": round(float(covered.max()), 4) if len(covered) else None,
             "seen_at_v": round(float(np.interp(1.0, self.grid, self.visited)), 4),
             "cover_each": [round(float(x), 4) if np.isfinite(x) else None for x in self.cover],
             "short_returns": round(float(self.short_returns.mean()), 4),
             "short_steps": round(float(self.short_steps.mean()), 4),
+            "short_per_state": round(float(self.short_per_state.mean()), 4),
+            "leaves": round(float(self.leaves.mean()), 4),
             "curve_steps": [round(float(x), 3) for x in self.grid],
             "curve_visited": [round(float(x), 4) for x in self.visited],
         }
@@ -85,17 +90,19 @@ def run_study(graph: str, rule: str, repeats: int, seed: int = 0) -> StudyResult
     check_rule(rule)
     if repeats < 1:
         raise InputError(f"repeats: expected 1 or more, not {repeats}")
-    states, degrees, cover, short, short_steps = np.empty((5, repeats))
+    states, degrees, leaves, cover, short, short_steps, per_state = np.empty((7, repeats))
     visited = np.zeros(len(_GRID))
     for repeat in range(repeats):
         rng = np.random.default_rng([seed, repeat])
         drawn = draw(rng)
         done = walk(drawn, rule, int(rng.integers(drawn.states)), rng)
         states[repeat], degrees[repeat] = drawn.states, drawn.mean_degree
+        leaves[repeat] = np.mean(drawn.degree == 1)
         cover[repeat] = done.steps / drawn.states if done.covered else np.nan
         gaps = return_gaps(done)
         sooner = np.count_nonzero(gaps < SHORT_RETURN * drawn.states)
         short[repeat], short_steps[repeat] = sooner / max(1, len(gaps)), sooner / done.steps
+        per_state[repeat] = sooner / drawn.states
         seen = np.cumsum(_first_visits(done))
         visited += np.interp(_GRID * drawn.states, np.arange(len(seen)), seen / drawn.states)
     return StudyResult(
@@ -108,6 +115,8 @@ def run_study(graph: str, rule: str, repeats: int, seed: int = 0) -> StudyResult
         cover=cover,
         short_returns=short,
         short_steps=short_steps,
+        short_per_state=per_state,
+        leaves=leaves,
         grid=_GRID,
         visited=visited / repeats,
     )
@@ -118,6 +127,11 @@ def return_gaps(done: Walk) -> NDArray[np.int64]:
     order = np.argsort(done.path, kind="stable")
     same = done.path[order][1:] == done.path[order][:-1]
     return np.asarray(np.diff(order)[same])
+
+
+def _ci95(values: Floats) -> float:
+    """Half width of the 95 % interval of the mean, by the normal distribution."""
+    return float(1.96 * values.std(ddof=1) / np.sqrt(len(values)))
 
 
 def _first_visits(done: Walk) -> NDArray[np.bool_]:

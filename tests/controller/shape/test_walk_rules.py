@@ -3,13 +3,14 @@
 import itertools
 from fractions import Fraction
 
+import networkx as nx
 import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.studies.graph_study import graph_source
+from snakewalk.controller.app.studies.graph_study import graph_source, return_gaps
 from snakewalk.controller.shape.graphs import Graph, graph_from_edges
-from snakewalk.controller.shape.walks import RULES, Walk, walk
+from snakewalk.controller.shape.walks import RULES, SHORT_RETURN, Walk, walk
 
 SPECS = ("er:150:3", "er:150:9", "ws:150:3:0.1", "ws:150:6:0.2")
 
@@ -90,6 +91,78 @@ def test_the_stack_walk_is_depth_first_with_the_way_back(spec: str) -> None:
     path = done(graph, "stack").path.tolist()
     assert path == expected[: len(path)]
     assert len(path) - 1 <= 2 * (graph.states - 1)
+
+
+@pytest.mark.parametrize("spec", [*SPECS, "kp:worm-like"])
+def test_the_frontier_walk_takes_the_unvisited_neighbour_of_fewest_unvisited(spec: str) -> None:
+    graph = draw(spec, 3)
+    path = done(graph, "frontier").path.tolist()
+    seen = {path[0]}
+    for here, there in itertools.pairwise(path):
+        fresh = [n for n in near(graph, here) if n not in seen]
+
+        def left(q: int, seen: set[int] = seen) -> tuple[int, int, int]:
+            around = near(graph, q)
+            return sum(n not in seen for n in around), len(around), q
+
+        if fresh:
+            assert there == min(fresh, key=left)
+        seen.add(there)
+
+
+@pytest.mark.parametrize("spec", ["er:150:3", "er:300:6", "ws:150:3:0.1", "ws:300:6:0.1"])
+def test_the_frontier_walk_goes_on_by_known_states_and_around_those_it_left_lately(
+    spec: str,
+) -> None:
+    graph = draw(spec, 3)
+    net = nx.Graph((a, b) for a in range(graph.states) for b in near(graph, a))
+    path = done(graph, "frontier").path.tolist()
+    soon = SHORT_RETURN * graph.states
+    fresh = sorted(path.index(q) for q in range(graph.states))  # steps at which a state was new
+    free = 0
+    for begin, end in itertools.pairwise(fresh):
+        if end == begin + 1:
+            continue
+        here, seen = path[begin], set(path[: begin + 1])
+        assert seen.issuperset(near(graph, here))
+        last = {q: k for k, q in enumerate(path[: begin + 1])}
+        border = {n for q in seen for n in near(graph, q)} - seen
+        away = nx.single_source_shortest_path_length(net.subgraph(seen | border), here)
+        assert end - begin >= min(away[n] for n in border)
+        lately = {q for q in seen - {here} if begin + 1 - last[q] < soon}
+        away = nx.single_source_shortest_path_length(net.subgraph(seen - lately | border), here)
+        if around := [away[n] for n in border if n in away]:
+            assert end - begin <= min(around)
+            assert all(k - last[path[k]] >= soon for k in range(begin + 1, end))
+            free += 1
+    assert free > 0
+
+
+@pytest.mark.parametrize("spec", ["er:300:3", "er:300:6", "er:300:9", "ws:300:3:0.1"])
+def test_the_frontier_walk_is_nearer_to_one_step_a_state_and_returns_soon_less_often(
+    spec: str,
+) -> None:
+    steps, soon = (dict.fromkeys(("frontier", "snake", "stack"), 0) for _ in range(2))
+    states = 0
+    for seed in range(8):
+        graph = draw(spec, seed)
+        states += graph.states
+        for rule in steps:
+            found = done(graph, rule)
+            steps[rule] += found.steps
+            soon[rule] += np.count_nonzero(return_gaps(found) < SHORT_RETURN * graph.states)
+    over = {rule: count - states for rule, count in steps.items()}
+    assert over["frontier"] < 0.5 * min(over["snake"], over["stack"])
+    assert soon["frontier"] <= soon["snake"]
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_each_leaf_but_the_ends_of_a_walk_forces_a_short_return(rule: str) -> None:
+    graph = draw("er:300:3")
+    found = done(graph, rule)
+    leaves = set(np.flatnonzero(graph.degree == 1).tolist()) - {found.path[0], found.path[-1]}
+    assert len(leaves) > 30
+    assert np.count_nonzero(return_gaps(found) == 2) >= len(leaves)
 
 
 def test_the_random_walk_takes_a_fresh_neighbour_whenever_there_is_one() -> None:

@@ -25,7 +25,8 @@ def walk(
     rule: Annotated[
         list[str] | None,
         typer.Option(
-            help="snake, snake-printed, stack, random or degree; may be given again; default: all"
+            help="snake, snake-printed, frontier, stack, random or degree; may be given again; "
+            "default: all"
         ),
     ] = None,
     repeats: Annotated[int, typer.Option(min=1, max=100_000, help="graphs of each kind")] = 30,
@@ -70,7 +71,15 @@ def _table(results: "list[StudyResult]") -> Table:
         table.add_column(
             name, justify="right" if name in {"|V|", "degree"} else "left", no_wrap=True
         )
-    for name in ("mean", "worst", "seen\nat |V|", "back in\n< |V|/20", "of all\nsteps"):
+    for name in (
+        "mean",
+        "95 %",
+        "worst",
+        "seen\nat |V|",
+        "back in\n< |V|/20",
+        "of all\nsteps",
+        "over\n|V|",
+    ):
         table.add_column(name, justify="right")
     last = ""
     for result in results:
@@ -86,10 +95,12 @@ def _table(results: "list[StudyResult]") -> Table:
                 else ["", "", ""]
             ),
             result.rule,
-            "never" if row["cover_mean"] is None else f"{row['cover_mean']:.2f}",
+            "never" if row["cover_mean"] is None else f"{row['cover_mean']:.3f}",
+            "" if row["cover_ci95"] is None else f"±{row['cover_ci95']:.3f}",
             "" if row["cover_worst"] is None else f"{row['cover_worst']:.2f}",
             f"{row['seen_at_v']:.0%}",
             f"{row['short_returns']:.1%}",
             f"{row['short_steps']:.1%}",
+            f"{row['short_per_state']:.3f}",
         )
     return table

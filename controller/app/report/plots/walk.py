@@ -10,6 +10,7 @@ from snakewalk.controller.app.report.figures.style import (
     AMBER,
     BLUE,
     GREEN,
+    INK,
     PURPLE,
     RED,
     save_picture,
@@ -21,6 +22,7 @@ from snakewalk.controller.app.studies.graph_study import StudyResult
 _COLORS = {
     "snake": BLUE,
     "snake-printed": AMBER,
+    "frontier": INK,
     "stack": RED,
     "random": GREEN,
     "degree": PURPLE,

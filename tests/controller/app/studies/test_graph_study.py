@@ -45,6 +45,16 @@ def test_the_curve_climbs_from_one_state_to_all_and_no_faster_than_a_state_a_ste
     assert (found.cover >= 199 / 200).all()
 
 
+def test_short_returns_are_counted_over_the_states_too_and_leaves_beside_them() -> None:
+    found = run_study("er:100:4", "snake", 30)
+    np.testing.assert_allclose(found.short_per_state, found.short_steps * found.cover)
+    assert (found.short_per_state >= found.leaves - 2.0 / found.states - 1e-12).all()
+    row = found.to_dict()
+    half = 1.96 * np.std(found.cover, ddof=1) / np.sqrt(30)
+    assert row["cover_ci95"] == pytest.approx(half, abs=5e-5)
+    assert run_study("er:100:4", "snake", 1).to_dict()["cover_ci95"] is None
+
+
 def studied(spec: str) -> dict[str, StudyResult]:
     return {rule: run_study(spec, rule, 8) for rule in ("snake", "stack", "random")}
 
