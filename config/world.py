@@ -190,6 +190,22 @@ class PlannerConfig(Strict):
     slope_window_m: float = Field(0.1, gt=0.0, description="radius of the plane fitted for slope")
     slope_limit_rad: float = Field(0.35, gt=0.0, lt=1.5)
     length_weight: float = Field(3e-3, gt=0.0, description="metres of path against variance")
+    footprint_m: float = Field(
+        0.6, gt=0.0, description="width of the strip that the body stands on: half its length"
+    )
+    climb_limit_rad: float = Field(
+        0.2, gt=0.0, lt=1.5, description="steepest slope under the footprint that the body climbs"
+    )
+    climb_weight: float = Field(
+        3.0, ge=0.0, description="metres of level path that a metre up at the limit costs more"
+    )
+    side_weight: float = Field(2.0, ge=0.0, description="the same for a side slope at that limit")
+    clearance_m: float = Field(
+        0.6, ge=0.0, description="wanted to ground that cannot be climbed: half a body"
+    )
+    clearance_weight: float = Field(
+        5.0, ge=0.0, description="metres of level path that a metre at such ground costs more"
+    )
     node_spacing_m: float = Field(0.15, gt=0.0)
     bend_radius_m: float = Field(0.4, ge=0.0, description="wanted of every bend, where possible")
     edge_margin_m: float = Field(0.3, ge=0.0, description="kept free along the border")
@@ -223,6 +239,7 @@ class WorldConfig(Strict):
                 "variance_limit_m2": limits.variance_limit_m2 * factor**2,
                 "length_weight": limits.length_weight * factor**2,
                 "slope_limit_rad": math.atan(factor * math.tan(limits.slope_limit_rad)),
+                "climb_limit_rad": math.atan(factor * math.tan(limits.climb_limit_rad)),
             }
         )
         ground = self.ground.with_relief(factor)

@@ -20,8 +20,8 @@ _TURNS = np.array(
 """(8, 3) turns of the pieces, 1 to the left; three arcs twice, as two middle circles fit."""
 _FULL_TURN_TOLERANCE_RAD = 1e-9  # an arc of nothing is not a full circle by rounding
 _STEP_M = 0.01
-_JOINS = 24
-_SAMPLES = 32
+_JOINS = 16
+_SAMPLES = 24
 _BATCH = 48
 
 

@@ -185,7 +185,7 @@ def _name(k: int, point: Floats) -> str:
 
 
 _REACH = 14  # nodes a straight piece may skip; also the whole leg at once is tried
-_CORNER_M = 0.3  # what a corner costs, as metres of path: few corners make wide bends
+_CORNER_M = 0.6  # what a corner costs, as metres of path: few corners make wide bends
 
 
 def straighten(nodes_m: Floats, graph: SafeGraph) -> Floats:
@@ -198,7 +198,7 @@ def straighten(nodes_m: Floats, graph: SafeGraph) -> Floats:
     if last > _REACH:
         pairs.append((0, last))
     a, b = np.array(pairs).T
-    cost, safe = graph.edge_cost(nodes_m[a], nodes_m[b])
+    cost, _, safe = graph.edge_cost(nodes_m[a], nodes_m[b])
     cost = np.where(safe | (b - a == 1), cost, np.inf) + _CORNER_M * graph.length_weight
     best, back = np.full(last + 1, np.inf), np.zeros(last + 1, dtype=int)
     best[0] = 0.0

@@ -7,7 +7,6 @@ is smaller than itself.
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.ndimage import map_coordinates
 from scipy.signal import fftconvolve
 
 from snakewalk.config.arrays import Bools, Floats
@@ -58,12 +57,26 @@ class Relief:
         return np.asarray(inside)
 
     def _at(self, field: Floats, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
-        ground = self.ground
-        column = (np.asarray(x_m, float) - ground.x0_m) / ground.spacing_m
-        row = (np.asarray(y_m, float) - ground.y0_m) / ground.spacing_m
-        at = np.stack([row, column])
-        flat = map_coordinates(field, at.reshape(2, -1), order=1, mode="nearest")
-        return np.asarray(flat).reshape(at.shape[1:])
+        return interpolated(self.ground, field, x_m, y_m)
+
+
+def interpolated(ground: HeightField, field: Floats, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
+    """Bilinear values of a field (rows, columns, ...) on the samples of a ground.
+
+    Beyond the border the nearest value holds. The result has the points' shape, then the field's
+    further axes.
+    """
+    rows, columns = field.shape[:2]
+    u = np.clip((np.asarray(x_m, float) - ground.x0_m) / ground.spacing_m, 0.0, columns - 1.0)
+    v = np.clip((np.asarray(y_m, float) - ground.y0_m) / ground.spacing_m, 0.0, rows - 1.0)
+    i, j = np.minimum(u.astype(np.intp), columns - 2), np.minimum(v.astype(np.intp), rows - 2)
+    more = (1,) * (field.ndim - 2)
+    fu, fv = (u - i).reshape(u.shape + more), (v - j).reshape(v.shape + more)
+    flat, corner = field.reshape(rows * columns, *field.shape[2:]), j * columns + i
+    low = flat.take(corner, axis=0) * (1.0 - fu) + flat.take(corner + 1, axis=0) * fu
+    corner = corner + columns
+    high = flat.take(corner, axis=0) * (1.0 - fu) + flat.take(corner + 1, axis=0) * fu
+    return np.asarray(low * (1.0 - fv) + high * fv)
 
 
 def elevation_variance_m2(ground: HeightField, radius_m: float) -> Floats:
@@ -71,15 +84,24 @@ def elevation_variance_m2(ground: HeightField, radius_m: float) -> Floats:
 
     The disc is cut at the border. It reaches at least the next sample.
     """
-    _, _, disc = _disc(ground, radius_m)
     z = ground.z_m - ground.z_m.mean()  # small numbers first: the variance is a difference
-    count = _summed(np.ones_like(z), disc)
-    mean = _summed(z, disc) / count
-    return np.maximum(_summed(z * z, disc) / count - mean**2, 0.0)
+    mean = windowed_mean(ground, z, radius_m)
+    return np.maximum(windowed_mean(ground, z * z, radius_m) - mean**2, 0.0)
+
+
+def windowed_mean(ground: HeightField, values: Floats, radius_m: float) -> Floats:
+    """(rows, columns) mean of values at the samples in a disc around each, cut at the border."""
+    _, _, disc = _disc(ground, radius_m)
+    return np.asarray(_summed(values, disc) / _summed(np.ones_like(values), disc))
 
 
 def fitted_slope_rad(ground: HeightField, radius_m: float) -> Floats:
     """(rows, columns) inclination of the least-squares plane in a disc around each sample."""
+    return np.asarray(np.arctan(np.hypot(*fitted_gradient(ground, radius_m))))
+
+
+def fitted_gradient(ground: HeightField, radius_m: float) -> tuple[Floats, Floats]:
+    """(rows, columns) ``dz/dx`` and ``dz/dy`` of the least-squares plane around each sample."""
     dx, dy, disc = _disc(ground, radius_m)
     z = ground.z_m - ground.z_m.mean()
     ones = np.ones_like(z)
@@ -92,8 +114,7 @@ def fitted_slope_rad(ground: HeightField, radius_m: float) -> Floats:
     zx = _summed(z, disc * dx) / count - mean * x
     zy = _summed(z, disc * dy) / count - mean * y
     determinant = xx * yy - xy * xy
-    gx, gy = (zx * yy - zy * xy) / determinant, (zy * xx - zx * xy) / determinant
-    return np.asarray(np.arctan(np.hypot(gx, gy)))
+    return (zx * yy - zy * xy) / determinant, (zy * xx - zx * xy) / determinant
 
 
 def _disc(ground: HeightField, radius_m: float) -> tuple[Floats, Floats, Floats]:

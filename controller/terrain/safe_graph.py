@@ -5,12 +5,13 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from snakewalk.config.arrays import Bools, Floats, Indices
+from snakewalk.controller.terrain.footprint import Footprint
 from snakewalk.controller.terrain.relief import Relief
 
 # A tenth is kept back for the nodes and edges: the spline may leave the polygon by a little.
 RISK_LIMIT = 0.9
 
-# Half of the sixteen neighbours; the other half are the same edges seen from the other end.
+# Half of the sixteen neighbours; the other half are the same edges in the other direction.
 _STEPS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (2, -1), (1, -2))
 _SAMPLE_M = 0.05
 
@@ -19,14 +20,22 @@ class SafeGraph:
     """Safe nodes on a grid, joined to up to sixteen neighbours; built once, searched often.
 
     The printed weight of an edge, the variance of the elevation along it, is zero along every
-    contour, also across the steepest slope, and grows with the square of an edge's length. Here it
-    is the mean *windowed* variance on the edge per node spacing, so that a side slope counts and
-    cutting an edge in two changes nothing, plus ``length_weight`` times length, so that flat ground
-    does not tie.
+    contour, also across the steepest slope, and grows with the square of an edge's length. Here a
+    metre of an edge weighs the *windowed* variance per node spacing, and ``length_weight`` times
+
+        1 + climb_weight (up / limit)^2 + side_weight (side / limit)^2
+          + clearance_weight (1 - distance to ground that cannot be climbed / clearance),
+
+    where up along the edge and side across it are the footprint's slopes, as tangents, and so is
+    the climb limit. Flat ground does not tie, and cutting an edge in two changes nothing. Slopes
+    over the limit cost much in every direction: a limit of the climb alone would be kept by
+    hairpins shorter than the body.
     """
 
     def __init__(self, relief: Relief) -> None:
         self._relief = relief
+        self.footprint = Footprint(relief.ground, relief.config)
+        """Slopes under the body, by which edges are weighed."""
         self.length_weight = relief.config.length_weight
         """Weight of a metre of path on level ground."""
         ground, config = relief.ground, relief.config
@@ -66,20 +75,36 @@ class SafeGraph:
             at.append(int(towards[at[-1]]))
         return self.nodes_m[at]
 
-    def edge_cost(self, from_m: Floats, to_m: Floats) -> tuple[Floats, Bools]:
-        """Weights of straight pieces (k, 2) to (k, 2), and whether each is safe all along."""
+    def edge_cost(self, from_m: Floats, to_m: Floats) -> tuple[Floats, Floats, Bools]:
+        """Weights of straight pieces (k, 2) to (k, 2), of them back, and whether they are safe."""
         length = np.hypot(*(to_m - from_m).T)
         count = max(2, int(np.ceil(length.max(initial=0.0) / _SAMPLE_M)) + 1)
         part = np.linspace(0.0, 1.0, count)[:, None]
         at = from_m[:, None] + part * (to_m - from_m)[:, None]
-        safe = np.asarray((self._relief.risk(*np.moveaxis(at, -1, 0)) <= RISK_LIMIT).all(axis=-1))
-        return length * self.cost_per_m(at).mean(axis=-1), safe
+        direction = (to_m - from_m) / np.maximum(length, 1e-12)[:, None]
+        there, back = self._cost_per_m(at, direction[:, None])
+        safe = (self._relief.risk(*np.moveaxis(at, -1, 0)) <= RISK_LIMIT).all(axis=-1)
+        return length * there.mean(axis=-1), length * back.mean(axis=-1), np.asarray(safe)
 
     def cost_per_m(self, points_m: Floats) -> Floats:
         """Weight (..., k) of a metre of path at points (..., k, 2) along curves, safe or not."""
+        step = np.gradient(points_m, axis=-2)
+        length = np.hypot(step[..., 0], step[..., 1])
+        return self._cost_per_m(points_m, step / np.maximum(length, 1e-12)[..., None])[0]
+
+    def _cost_per_m(self, points_m: Floats, direction: Floats) -> tuple[Floats, Floats]:
+        """Weight (...) of a metre along unit vectors (..., 2), and of one against them."""
         config = self._relief.config
-        variance = self._relief.variance_m2(*np.moveaxis(points_m, -1, 0))
-        return variance / config.node_spacing_m + config.length_weight
+        up, side = self.footprint.slopes(points_m, direction) / np.tan(config.climb_limit_rad)
+        level = 1.0 + config.clearance_weight * self.footprint.nearness(points_m)
+        level = level + config.side_weight * side**2
+        variance = self._relief.variance_m2(*np.moveaxis(points_m, -1, 0)) / config.node_spacing_m
+        there, back = (
+            variance
+            + config.length_weight * (level + config.climb_weight * np.maximum(climb, 0.0) ** 2)
+            for climb in (up, -up)
+        )
+        return there, back
 
     def _tree(self, target: int) -> tuple[Floats, Indices]:
         """Score to ``target`` and the next node towards it, from every node.
@@ -88,23 +113,26 @@ class SafeGraph:
         """
         if target not in self._trees:
             score, towards = dijkstra(
-                self._edges, directed=False, indices=[target], return_predecessors=True
+                self._edges, directed=True, indices=[target], return_predecessors=True
             )
             self._trees[target] = score[0], towards[0].astype(np.intp)
         return self._trees[target]
 
     def _joined(self, index: Indices) -> csr_array:
-        rows, columns = index.shape
+        """Weights of edges; row and column are target and source, as trees grow from the target."""
+        height, width = index.shape
         pairs = []
         for up, right in _STEPS:
-            here = index[: rows - up, max(0, -right) : columns - max(0, right)]
-            there = index[up:, max(0, right) : columns + min(0, right)]
-            both = (here >= 0) & (there >= 0)
-            pairs.append(np.stack([here[both], there[both]]))
+            here = index[: height - up, max(0, -right) : width - max(0, right)]
+            beside = index[up:, max(0, right) : width + min(0, right)]
+            both = (here >= 0) & (beside >= 0)
+            pairs.append(np.stack([here[both], beside[both]]))
         a, b = np.concatenate(pairs, axis=1)
-        weight, safe = self.edge_cost(self.nodes_m[a], self.nodes_m[b])
+        there, back, safe = self.edge_cost(self.nodes_m[a], self.nodes_m[b])
         n = len(self.nodes_m)
-        return csr_array(coo_array((weight[safe], (a[safe], b[safe])), shape=(n, n)))
+        weight = np.concatenate([there[safe], back[safe]])
+        ends = np.concatenate([b[safe], a[safe]]), np.concatenate([a[safe], b[safe]])
+        return csr_array(coo_array((weight, ends), shape=(n, n)))
 
 
 def _centred(middle: float, extent: float, spacing: float) -> Floats:

@@ -1,5 +1,6 @@
 """Summary of a path: its slopes, roughness and bends."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,9 @@ from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
 
 _STEP_M = 0.02
+_DISC_POINTS = 60
+WAYPOINT_SLOPE_RAD = float(np.radians(8.0))
+"""Steeper ground under a waypoint is warned of (ours): a straight body slides from 5.7 deg on."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,14 @@ class PathRelief:
     """Median slope of the plane fitted in the planner's slope window."""
     max_slope_rad: float
     """Largest such slope; the planner bounds it."""
+    median_footprint_slope_rad: float
+    """Median inclination of the surface in the strip that the body stands on, with no window."""
+    max_footprint_slope_rad: float
+    """Largest such slope."""
+    max_up_slope_rad: float
+    """Steepest climb: slope of the footprint's plane along the path."""
+    max_side_slope_rad: float
+    """Largest root mean square of the slope across the path over a footprint."""
     median_surface_slope_rad: float
     """Median inclination of the surface itself, with no window."""
     world_median_slope_rad: float
@@ -47,12 +59,17 @@ def slopes_rad(planner: TerrainPlanner, path: SplinePath) -> Floats:
 def path_relief(planner: TerrainPlanner, path: SplinePath) -> PathRelief:
     """Summarise a path on the planner's ground."""
     slope = slopes_rad(planner, path)
-    surface = variance = z = world = np.zeros(1)
+    surface = variance = z = world = strip = np.zeros(1)
+    steepest = np.zeros(2)
     share = 1.0
     if planner.relief is not None and planner.graph is not None:
         ground, at = planner.relief.ground, path.position(_samples(path))
         surface, z = ground.slope_rad(*at.T), ground.elevation_m(*at.T)
         variance = planner.relief.variance_m2(*at.T)
+        strip = ground.slope_rad(*(at[:, None] + _disc_m(planner.relief.config.footprint_m)).T)
+        ahead = np.gradient(at, axis=0)
+        ahead = ahead / np.hypot(*ahead.T)[:, None]
+        steepest = np.arctan(planner.graph.footprint.slopes(at, ahead).max(axis=-1))
         rows, columns = ground.z_m.shape
         x = ground.x0_m + np.arange(columns) * ground.spacing_m
         y = ground.y0_m + np.arange(rows) * ground.spacing_m
@@ -62,6 +79,10 @@ def path_relief(planner: TerrainPlanner, path: SplinePath) -> PathRelief:
         length_m=path.length_m,
         median_slope_rad=float(np.median(slope)),
         max_slope_rad=float(slope.max()),
+        median_footprint_slope_rad=float(np.median(strip)),
+        max_footprint_slope_rad=float(strip.max()),
+        max_up_slope_rad=max(float(steepest[0]), 0.0),
+        max_side_slope_rad=float(steepest[1]),
         median_surface_slope_rad=float(np.median(surface)),
         world_median_slope_rad=float(np.median(world)),
         mean_variance_m2=float(variance.mean()),
@@ -69,6 +90,36 @@ def path_relief(planner: TerrainPlanner, path: SplinePath) -> PathRelief:
         climb_m=float(np.ptp(z)),
         min_radius_m=sharpest_bend(path)[0],
     )
+
+
+def path_warnings(
+    planner: TerrainPlanner, relief: PathRelief, waypoints_m: Sequence[tuple[float, float]]
+) -> tuple[str, ...]:
+    """Say which waypoints are hard to stay at, and whether the path climbs too steeply."""
+    if planner.relief is None or planner.graph is None:
+        return ()
+    slopes = planner.graph.footprint.slope_rad(np.asarray(waypoints_m, float))
+    found = [
+        f"waypoint {k} ({x:.2f}, {y:.2f}) is on a slope of {np.degrees(slope):.1f} deg; "
+        f"over {np.degrees(WAYPOINT_SLOPE_RAD):.0f} deg a body may slide past it"
+        for k, ((x, y), slope) in enumerate(zip(waypoints_m, slopes, strict=True), start=1)
+        if slope > WAYPOINT_SLOPE_RAD
+    ]
+    limit_rad = planner.relief.config.climb_limit_rad
+    if relief.max_up_slope_rad > limit_rad:
+        found.append(
+            f"the path climbs {np.degrees(relief.max_up_slope_rad):.1f} deg; the world's climb "
+            f"limit is {np.degrees(limit_rad):.1f} deg"
+        )
+    return tuple(found)
+
+
+def _disc_m(width_m: float) -> Floats:
+    """Offsets (k, 2) that fill a disc evenly: a sunflower's, at the golden angle."""
+    k = np.arange(_DISC_POINTS) + 0.5
+    turn = k * np.pi * (3.0 - np.sqrt(5.0))
+    radius = width_m / 2.0 * np.sqrt(k / _DISC_POINTS)
+    return np.asarray(np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=-1))
 
 
 def _samples(path: SplinePath) -> Floats:

@@ -47,7 +47,7 @@ class Trial:
     """How often a waypoint was passed by."""
     duration_s: float = math.nan
     slope_median_deg: float = math.nan
-    """Of the path."""
+    """Of the surface in the strip along the path that the body stands on."""
     path_error_m: float = math.nan
     """Mean."""
     path_error_max_m: float = math.nan
@@ -116,7 +116,7 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
     trial = Trial(case, seed)
     try:
         prepared = prepare_case(case, seed, spread_m, changes)
-        slope_rad = path_relief(prepared.planner, prepared.path).median_slope_rad
+        slope_rad = path_relief(prepared.planner, prepared.path).median_footprint_slope_rad
         trial = replace(
             trial,
             start_m=prepared.run.start_m,

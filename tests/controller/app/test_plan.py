@@ -47,6 +47,18 @@ def test_a_plan_as_json() -> None:
     assert found["waypoints_reached"] == found["waypoints"] == 5
 
 
+def test_a_plan_tells_the_slopes_under_the_body_and_warns() -> None:
+    done = snakewalk("plan", "ramp-15-up", "--motion", "serpenoid", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["under_body_slope_median_deg"] == 15.0
+    assert found["up_slope_max_deg"] == 15.0
+    assert found["side_slope_max_deg"] == 0.0
+    steep, climb = found["warnings"]
+    assert steep.startswith("waypoint 1 (0.00, 0.00) is on a slope of 15.0 deg")
+    assert climb == "the path climbs 15.0 deg; the world's climb limit is 11.5 deg"
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -18,6 +18,7 @@ from snakewalk.controller.app.cli.options import (
     Seed,
     TrackFile,
     World,
+    console,
     show,
 )
 from snakewalk.controller.app.result_files import refuse_to_overwrite
@@ -61,7 +62,7 @@ def plan(
     if repertoire is not None or out is not None or carry or physics:
         raise InputError("--repertoire, --out, --run and --physics belong to --with repertoire")
     from snakewalk.controller.app.runs.factory import prepare_walk  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.terrain.summary import path_relief  # noqa: PLC0415
+    from snakewalk.controller.terrain.summary import path_relief, path_warnings  # noqa: PLC0415
 
     prepared = prepare_walk(run, seed=seed, motion=motion, robot=robot, world=world, track=track)
     ahead = prepared.forecast()
@@ -89,14 +90,28 @@ def plan(
         )
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts
+    warnings: tuple[str, ...] = ()
     if prepared.ground is not None:
         relief = path_relief(prepared.planner, prepared.path)
-        found["slope_median_deg"] = round(math.degrees(relief.median_slope_rad), 1)
-        found["slope_max_deg"] = round(math.degrees(relief.max_slope_rad), 1)
-        found["world_slope_median_deg"] = round(math.degrees(relief.world_median_slope_rad), 1)
+        found["slope_median_deg"] = _deg(relief.median_slope_rad)
+        found["slope_max_deg"] = _deg(relief.max_slope_rad)
+        found["world_slope_median_deg"] = _deg(relief.world_median_slope_rad)
+        found["under_body_slope_median_deg"] = _deg(relief.median_footprint_slope_rad)
+        found["under_body_slope_max_deg"] = _deg(relief.max_footprint_slope_rad)
+        found["up_slope_max_deg"] = _deg(relief.max_up_slope_rad)
+        found["side_slope_max_deg"] = _deg(relief.max_side_slope_rad)
         found["climb_m"] = round(relief.climb_m, 3)
         found["safe_nodes"] = f"{relief.safe_node_share:.0%}"
+        warnings = path_warnings(prepared.planner, relief, prepared.run.waypoints_m)
+    if as_json:
+        found["warnings"] = warnings
     show(found, as_json)
+    for line in () if as_json else warnings:
+        console.print(f"warning: {line}")
+
+
+def _deg(angle_rad: float) -> float:
+    return round(math.degrees(angle_rad), 1)
 
 
 def _plan_with_repertoire(

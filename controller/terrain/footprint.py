@@ -1,0 +1,65 @@
+"""Footprint: the ground under a body that follows a path, and how far steep ground is from it.
+
+A body that bends to and fro stands on a strip about half its length wide. What makes it roll or
+slide is the slope across the path there, what stops it is the slope along the path, and neither is
+seen on the path alone: a valley is level along its bottom.
+"""
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.world import PlannerConfig
+from snakewalk.controller.terrain.relief import fitted_gradient, interpolated, windowed_mean
+
+
+class Footprint:
+    """Slopes in a disc of ``footprint_m`` across, anywhere on a height field.
+
+    Exact on the field's samples, bilinear between them.
+    """
+
+    def __init__(self, ground: HeightField, config: PlannerConfig) -> None:
+        self._ground, radius_m = ground, config.footprint_m / 2.0
+        x, y = fitted_gradient(ground, config.slope_window_m)
+        squares = [windowed_mean(ground, a * b, radius_m) for a, b in ((x, x), (x, y), (y, y))]
+        mean_x, mean_y = fitted_gradient(ground, radius_m)
+        self._layers = np.stack([mean_x, mean_y, *squares], axis=-1)
+        steep = np.hypot(mean_x, mean_y) > np.tan(config.climb_limit_rad)
+        self._nearness = np.zeros(ground.z_m.shape)
+        if steep.any():
+            far_m = np.asarray(distance_transform_edt(~steep, sampling=ground.spacing_m), float)
+            self._nearness = np.maximum(
+                1.0 - far_m / max(config.clearance_m, ground.spacing_m), 0.0
+            )
+
+    def slope_rad(self, points_m: Floats) -> Floats:
+        """Inclination (...) of the plane fitted to the footprint at points (..., 2)."""
+        x, y = np.moveaxis(points_m, -1, 0)
+        layers = interpolated(self._ground, self._layers, x, y)
+        return np.asarray(np.arctan(np.hypot(layers[..., 0], layers[..., 1])))
+
+    def slopes(self, points_m: Floats, direction: Floats) -> Floats:
+        """Tangents (2, ...) of the slope up along a direction, and of the RMS slope across it.
+
+        The slope up is that of the plane fitted to the footprint. The slope across is the root of
+        the mean square over it, so that the two sides of a valley do not cancel.
+
+        Args:
+            points_m: (..., 2) in the world.
+            direction: (..., 2) unit vectors of travel.
+
+        """
+        layers = interpolated(self._ground, self._layers, *np.moveaxis(points_m, -1, 0))
+        gx, gy, xx, xy, yy = np.moveaxis(layers, -1, 0)
+        dx, dy = np.moveaxis(direction, -1, 0)
+        across = xx * dy**2 - 2.0 * xy * dx * dy + yy * dx**2
+        return np.stack([gx * dx + gy * dy, np.sqrt(np.maximum(across, 0.0))])
+
+    def nearness(self, points_m: Floats) -> Floats:
+        """Return 1 (...) on ground that cannot be climbed, falling to 0 over the clearance.
+
+        It is ground whose slope under the whole footprint exceeds the climb limit.
+        """
+        return interpolated(self._ground, self._nearness, *np.moveaxis(points_m, -1, 0))
