@@ -185,7 +185,7 @@ def _name(k: int, point: Floats) -> str:
 
 
 _REACH = 14  # nodes a straight piece may skip; also the whole leg at once is tried
-_CORNER_M = 0.6  # what a corner costs, as metres of path: few corners make wide bends
+_CORNER_M = 1.0  # what a corner costs, as metres of path: few corners make wide bends
 
 
 def straighten(nodes_m: Floats, graph: SafeGraph) -> Floats:

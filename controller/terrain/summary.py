@@ -95,10 +95,10 @@ def path_relief(planner: TerrainPlanner, path: SplinePath) -> PathRelief:
 def path_warnings(
     planner: TerrainPlanner, relief: PathRelief, waypoints_m: Sequence[tuple[float, float]]
 ) -> tuple[str, ...]:
-    """Say which waypoints are hard to stay at, and whether the path climbs too steeply."""
+    """Say which waypoints are hard to stay at, and what slopes under the body exceed the limit."""
     if planner.relief is None or planner.graph is None:
         return ()
-    slopes = planner.graph.footprint.slope_rad(np.asarray(waypoints_m, float))
+    slopes = planner.graph.footprint.slope_rad(np.asarray(waypoints_m, float).reshape(-1, 2))
     found = [
         f"waypoint {k} ({x:.2f}, {y:.2f}) is on a slope of {np.degrees(slope):.1f} deg; "
         f"over {np.degrees(WAYPOINT_SLOPE_RAD):.0f} deg a body may slide past it"
@@ -106,10 +106,12 @@ def path_warnings(
         if slope > WAYPOINT_SLOPE_RAD
     ]
     limit_rad = planner.relief.config.climb_limit_rad
+    limit = f"the world's climb limit is {np.degrees(limit_rad):.1f} deg"
     if relief.max_up_slope_rad > limit_rad:
+        found.append(f"the path climbs {np.degrees(relief.max_up_slope_rad):.1f} deg; {limit}")
+    if relief.max_side_slope_rad > limit_rad:
         found.append(
-            f"the path climbs {np.degrees(relief.max_up_slope_rad):.1f} deg; the world's climb "
-            f"limit is {np.degrees(limit_rad):.1f} deg"
+            f"the path leads across {np.degrees(relief.max_side_slope_rad):.1f} deg; {limit}"
         )
     return tuple(found)
 

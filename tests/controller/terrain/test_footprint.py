@@ -123,3 +123,6 @@ def test_a_path_along_a_valley_is_level_and_what_the_body_stands_on_is_not() -> 
     assert path_warnings(planner, relief, [points[1]]) == ()
     off = path_warnings(planner, relief, [(0.0, 1.0), (1.0, 0.0)])
     assert [line[:45] for line in off] == ["waypoint 1 (0.00, 1.00) is on a slope of 11.3"]
+    steep = TerrainPlanner(field(lambda x, y: 0.3 * y), PlannerConfig(variance_limit_m2=1e-2))
+    across = path_relief(steep, steep.plan([(-1.5, 0.0), (1.5, 0.0)]))
+    assert path_warnings(steep, across, [])[-1].startswith("the path leads across 16.7 deg; the")
