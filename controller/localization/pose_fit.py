@@ -12,12 +12,14 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
+from snakewalk.drivers.least_squares import least_squares
 
 _ROUNDS = 5
 _BLUR_M = 0.003
 """Usual error of a link's place on the line."""
 _TIPS_M = 0.02
 """How far the line's middle may be off the body's."""
+_REGULAR = 3e-5  # a straight body's slide and shift are one thing: neither runs away
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,15 +59,16 @@ def _fit(robot: RobotConfig, line_m: Floats, links: Floats) -> PoseFit:
     for _ in range(_ROUNDS):
         line, ahead = _along(line_m, arc, middle_m + shift_along_m)
         turn, shift = _rigid(links, line, weight)
-        away = line - links @ turn.T - shift
+        turned = _turned(links, turn)
+        away = line - turned - shift
         size = np.hypot(*away.T)
         usual = 1.4826 * float(np.median(size)) + 1e-4
         weight = 1.0 / np.maximum(1.0, size / (1.5 * usual))  # Huber
-        shift_along_m += _shift_along(links @ turn.T, ahead, away, weight, shift_along_m)
+        shift_along_m += _shift_along(turned, ahead, away, weight, shift_along_m)
     return PoseFit(
         shift,
         float(np.arctan2(turn[1, 0], turn[0, 0])),
-        links @ turn.T + shift,
+        turned + shift,
         float(np.sqrt((size * size).mean())),
     )
 
@@ -96,21 +99,24 @@ def _shift_along(
         -ahead,
     ]
     matrix = np.stack([column.ravel() for column in columns], axis=1) * row[:, None]
-    normal = matrix.T @ matrix + 1e-9 * np.eye(4)
-    right = matrix.T @ (away.ravel() * row)
-    stiff = (_BLUR_M / _TIPS_M) ** 2
-    normal[3, 3] += stiff
-    right[3] -= stiff * shifted_m
-    return float(np.linalg.solve(normal, right)[3])
+    stiff = _BLUR_M / _TIPS_M  # holds the slide itself near 0, not this step of it
+    matrix = np.vstack([matrix, [0.0, 0.0, 0.0, stiff]])
+    target = np.append(away.ravel() * row, -stiff * shifted_m)
+    return float(least_squares(matrix, target, np.full(4, _REGULAR))[3])
 
 
 def _rigid(links: Floats, line: Floats, weight: Floats) -> tuple[Floats, Floats]:
     """Turn (2, 2) and shift (2,) of ``links`` to ``line`` with the least squares."""
     share = weight / weight.sum()
-    a, b = share @ links, share @ line
+    a, b = (share[:, None] * links).sum(axis=0), (share[:, None] * line).sum(axis=0)
     p, q = links - a, line - b
-    sin = float(share @ (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]))
-    cos = float(share @ (p * q).sum(axis=1))
+    sin = float((share * (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])).sum())
+    cos = float((share * (p * q).sum(axis=1)).sum())
     size = float(np.hypot(sin, cos)) or 1.0
     turn = np.array([[cos, -sin], [sin, cos]]) / size
-    return turn, b - turn @ a
+    return turn, b - _turned(a, turn)
+
+
+def _turned(points: Floats, turn: Floats) -> Floats:
+    """Points (..., 2) after ``turn`` (2, 2): as ``points @ turn.T``, in one order of sums."""
+    return np.asarray(points[..., :1] * turn[:, 0] + points[..., 1:] * turn[:, 1])

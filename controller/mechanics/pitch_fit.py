@@ -14,6 +14,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.mechanics.ground_step import GroundStep, half_heights_m
+from snakewalk.drivers.least_squares import least_squares
 
 _REGULAR = 0.05  # of a link length: a straight body's roll changes no height; goals stay small
 
@@ -69,16 +70,15 @@ class PitchFitter:
         ends[1:] = -self._link_m * np.cumsum(forward, axis=0)
         centres = 0.5 * (ends[1:] + ends[:-1])
         at, along = ends[self._pitch + 1], forward[self._pitch]
-        lever = self._behind * ((at * along).sum(axis=1) - centres @ along.T)
+        ahead = (at - centres[:, None]) * along
+        lever = self._behind * (ahead[..., 0] + ahead[..., 1])
         rise = np.column_stack([centres - centres.mean(axis=0), lever])
 
         mean = rise.mean(axis=0)
         centred, target = rise - mean, height - height.mean()
-        normal = centred.T @ centred
-        normal.flat[:: len(normal) + 1] += (_REGULAR * self._link_m) ** 2
-        tilt = np.linalg.solve(normal, centred.T @ target)
+        tilt = least_squares(centred, target, np.full(len(mean), _REGULAR * self._link_m))
 
         goal = np.zeros(self._joints)
         goal[self._pitch] = np.clip(tilt[2:], -self._limit_rad, self._limit_rad)
         tilt[2:] = goal[self._pitch]
-        return PitchFit(goal, centred @ tilt - target, skeleton.pitch_rad)
+        return PitchFit(goal, (centred * tilt).sum(axis=1) - target, skeleton.pitch_rad)

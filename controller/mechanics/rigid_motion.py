@@ -12,6 +12,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.world import FrictionConfig
 from snakewalk.drivers.compiling import compiled
+from snakewalk.drivers.least_squares import solve_positive_definite
 
 _STILL_M_S = 1e-4  # smooths the kink of |v| at rest
 _STEPS = 50
@@ -154,25 +155,6 @@ def _power(
     return power
 
 
-@compiled("void(float64[:, ::1], float64[::1], float64[::1])")
-def _solve(a: Floats, b: Floats, x: Floats) -> None:
-    """Positive definite ``a`` (3, 3) x = b, by Cholesky; ``a`` is used up."""
-    for i in range(3):
-        for j in range(i + 1):
-            for k in range(j):
-                a[i, j] -= a[i, k] * a[j, k]
-            a[i, j] = np.sqrt(a[i, i]) if i == j else a[i, j] / a[j, j]
-    for i in range(3):
-        x[i] = b[i]
-        for k in range(i):
-            x[i] -= a[i, k] * x[k]
-        x[i] /= a[i, i]
-    for i in range(2, -1, -1):
-        for k in range(i + 1, 3):
-            x[i] -= a[k, i] * x[k]
-        x[i] /= a[i, i]
-
-
 @compiled("boolean(float64[:, ::1], float64[::1], float64[::1])")
 def _is_unbounded(rows: Floats, linear: Floats, w: Floats) -> bool:
     """Whether gravity outdoes friction ever faster in the direction ``w``: no minimum."""
@@ -252,7 +234,7 @@ def _balance(
             break
         for i in range(3):
             hessian[i, i] += 1e-9
-        _solve(hessian, -gradient, step)
+        solve_positive_definite(hessian, -gradient, step)
         slope = gradient[0] * step[0] + gradient[1] * step[1] + gradient[2] * step[2]
         scale = 1.0
         trial[:] = w + step

@@ -8,6 +8,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WaterGround, WorldConfig
+from snakewalk.drivers.least_squares import least_squares
 from snakewalk.sim.physics.mechanics import Mechanics
 from snakewalk.sim.physics.water import floating_height_m
 
@@ -114,9 +115,8 @@ def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField) -> None:
             mujoco.mj_integratePos(model, data.qpos, step, 1.0)
             slopes[:, column] = (above_m() - here) / 1e-4
             data.qpos[:] = qpos
-        rows = np.vstack([slopes, np.diag(stiff)])
         change = np.zeros(model.nv)
-        change[free] = np.linalg.lstsq(rows, np.append(-here, 0.0 * stiff), rcond=None)[0]
+        change[free] = least_squares(slopes, -here, stiff)
         change[3:] = np.clip(change[3:], -0.3, 0.3)
         mujoco.mj_integratePos(model, data.qpos, change, 1.0)
         data.qpos[pitch] = np.clip(data.qpos[pitch], -limit, limit)
