@@ -19,6 +19,8 @@ MODULES = tuple(
     name
     for name in (
         "hil_loop",
+        "bellies",
+        "step_length",
         "cycle_codec",
         "frames",
         "walk_step",

@@ -42,8 +42,8 @@ Floats = NDArray[np.float64]
 def run() -> list[Row]:
     """Measure."""
     prepared = prepare_walk("flat-square", time_limit_s=SECONDS)
-    steps = round(1.0 / (prepared.run.cycle_hz * prepared.run.physics_step_s))
     robot = SimulatedRobot(prepared)
+    steps = round(1.0 / (prepared.run.cycle_hz * robot.plant.step_s))
     recorder = Recorder(robot.plant.mechanics.data)
     robot.walk(NoLog(), recorder.on_progress)
     model = robot.plant.mechanics.model

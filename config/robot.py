@@ -23,6 +23,31 @@ class ServoConfig(Strict):
     pitch_current_limit_a: float = Field(
         0.2, gt=0.0, description="goal current of the pitch joints: current-based position mode"
     )
+    armature_kg_m2: float = Field(
+        0.045, ge=0.0, le=1.0, description="inertia of rotor and gears at the shaft, in simulation"
+    )
+    gear_drag_n_m_s: float = Field(
+        0.03, ge=0.0, le=10.0, description="viscous loss of the gears at the shaft, in simulation"
+    )
+
+
+class BellyConfig(Strict):
+    """What of a link meets the ground: a ball, a capsule along it, or two capsules as rails."""
+
+    shape: Literal["ball", "capsule", "rails"] = "capsule"
+    width_m: float | None = Field(
+        None, gt=0.002, le=1.0, description="of rails, from outside to outside"
+    )
+
+    @model_validator(mode="after")
+    def _rails_are_wide(self) -> Self:
+        if self.shape == "rails" and self.width_m is None:
+            raise ValueError("width_m: rails need their width")
+        if self.shape != "rails" and self.width_m is not None:
+            raise ValueError(
+                f"width_m is of rails; a {self.shape} is as wide as body_radius_m says"
+            )
+        return self
 
 
 class RobotConfig(Strict):
@@ -41,6 +66,7 @@ class RobotConfig(Strict):
         description="radii over body_radius_m at equal stations, head to tail, each over "
         "0.05 and at most 1; for the look and the ground step (snakewalk body measures it)",
     )
+    belly: BellyConfig = BellyConfig()
     link_mass_kg: float = Field(0.11, gt=0.001, le=20.0)
     yaw_limit_rad: float = Field(1.5, gt=0.05, le=3.1)
     pitch_limit_rad: float = Field(1.2, gt=0.05, le=3.1)
@@ -54,6 +80,13 @@ class RobotConfig(Strict):
         last = self.servo.first_id + self.joint_count - 1
         if last > 252:
             raise ValueError(f"servo IDs would run to {last}; the bus has 0 to 252")
+        return self
+
+    @model_validator(mode="after")
+    def _rails_hold_the_body(self) -> Self:
+        width_m = self.belly.width_m
+        if width_m is not None and width_m <= 2.0 * self.body_radius_m:
+            raise ValueError("belly.width_m must be over twice body_radius_m")
         return self
 
     @model_validator(mode="after")

@@ -9,10 +9,18 @@ from snakewalk.config.base import Strict
 
 
 class FrictionConfig(Strict):
-    """Coulomb ellipse of the belly: along the body, and across it."""
+    """Coulomb ellipse of the belly: along the body, forward and back, and across it."""
 
-    along: float = Field(0.1, gt=0.0, le=5.0)
+    along: float = Field(0.1, gt=0.0, le=5.0, description="sliding forward")
     across: float = Field(0.7, gt=0.0, le=5.0)
+    back: float | None = Field(
+        None, gt=0.0, le=5.0, description="sliding backward, as scales resist; default: as forward"
+    )
+
+    @property
+    def backward(self) -> float:
+        """Coefficient of sliding backward."""
+        return self.along if self.back is None else self.back
 
 
 class FlatGround(Strict):

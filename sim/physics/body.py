@@ -1,28 +1,32 @@
 """The robot and its ground as a MuJoCo model.
 
 The head link floats, the others hang behind it, so MuJoCo's order of bodies and joints is ours.
-Each link meets the ground with one sphere at its centre: on a plane exactly one contact a link.
+A link meets the ground with its belly: a capsule along it, or a ball, or two capsules as rails.
+On a height field each capsule is two balls, and every ball has tangent planes of its own
+(``sim.physics.tangent_planes``).
 Contacts are frictionless (``condim`` 1); friction is added by ``sim.physics.friction``, since
-MuJoCo's own cone knows no direction along a body. Links do not touch each other.
+MuJoCo's own cone knows no direction along a body. Links that are not neighbours touch each other,
+without friction.
 """
+
+import math
 
 import mujoco
 import numpy as np
 
+from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FlatGround, WaterGround, WorldConfig
 from snakewalk.sim.physics.obstacles import obstacle_mjcf
+from snakewalk.sim.physics.tangent_planes import AWAY_M, PLANES
 
-GEAR_RATIO = 353.5
-"""XM430-W350, e-manual."""
-ROTOR_INERTIA_KG_M2 = 3.6e-7
-"""Not published by the maker. Chosen so that the reflected inertia is 0.045 kg m^2, the armature
-that MuJoCo Menagerie's robotis_op3 carries for its XM430-W350 joints."""
-ARMATURE_KG_M2 = ROTOR_INERTIA_KG_M2 * GEAR_RATIO**2
 STOP_MARGIN_RAD = 0.1
 """The mechanical stop is this far beyond the limit that a plan may use."""
+NOTCH = 0.6
+"""Most of a radius that two capsules at a straight joint may end short of it, each: then the notch
+between them is a fifth of the radius deep."""
 CONTACT_TIME_S = 0.015
 """Of the contact spring; MuJoCo wants at least two steps. Sinks 0.03 mm under the body's weight."""
 
@@ -38,7 +42,70 @@ def build_model(
     Body ``1 + i`` is link i, joint ``1 + j`` is joint j (joint 0 is free), body ``1`` the head.
     """
     spec = mujoco.MjSpec.from_string(mjcf(robot, world, ground, step_s))
+    if ground is not None:
+        _add_planes(spec)
     return finish(spec.compile(), ground)
+
+
+def _add_planes(spec: mujoco.MjSpec) -> None:
+    """Let tangent planes bear the balls in place of the height field."""
+    field = spec.geom("ground")
+    field.contype = field.conaffinity = 0
+    for belly in [geom for geom in spec.geoms if geom.name.startswith("belly")]:
+        for k in range(PLANES):
+            plane = spec.worldbody.add_geom(
+                name=f"plane{k}_{belly.name}",
+                type=mujoco.mjtGeom.mjGEOM_PLANE,
+                size=[1.0, 1.0, 1.0],
+                pos=[0.0, 0.0, AWAY_M],
+                contype=0,
+                conaffinity=0,
+            )
+            spec.add_pair(
+                geomname1=plane.name,
+                geomname2=belly.name,
+                condim=1,
+                solref=belly.solref,
+                solimp=belly.solimp,
+            )
+
+
+def straight_part_m(robot: RobotConfig) -> float:
+    """Length of the straight part of a capsule belly.
+
+    On a plane a capsule has two contacts, at the ends of this part. At ``length / sqrt(3)`` they
+    are the Gauss points of a load that is even along the link: forces and yaw torques of sliding
+    are those of the whole line. A slender link's is longer, so that the notches stay shallow.
+    """
+    return max(
+        robot.link_length_m / math.sqrt(3.0),
+        robot.link_length_m - 2.0 * NOTCH * robot.body_radius_m,
+    )
+
+
+def belly_points_m(robot: RobotConfig) -> Floats:
+    """(C, P, 3) centres, about a link's, of P balls in a row in each of its C capsules.
+
+    The first and the last are the ends of the straight part; between them there are more only if
+    the notches would be deeper than three tenths of the radius.
+    """
+    if robot.belly.shape == "ball":
+        return np.zeros((1, 1, 3))
+    straight_m = straight_part_m(robot)
+    count = 1 + max(1, math.ceil(straight_m / (1.4 * robot.body_radius_m)))
+    row = np.zeros((count, 3))
+    row[:, 0] = np.linspace(-0.5, 0.5, count) * straight_m
+    if robot.belly.width_m is None:
+        return row[None]
+    side = np.array([0.0, 0.5 * robot.belly.width_m - robot.body_radius_m, 0.0])
+    return np.stack([row - side, row + side])
+
+
+def links_apart(robot: RobotConfig) -> int:
+    """Least number of joints between two links that may touch: nearer ones overlap as they lie."""
+    straight_m = 0.0 if robot.belly.shape == "ball" else straight_part_m(robot)
+    long_m = straight_m + 2.0 * robot.body_radius_m
+    return max(2, math.floor(long_m / robot.link_length_m) + 1)
 
 
 def finish(model: mujoco.MjModel, ground: HeightField | None) -> mujoco.MjModel:
@@ -49,6 +116,7 @@ def finish(model: mujoco.MjModel, ground: HeightField | None) -> mujoco.MjModel:
     under isotropic friction by 14 %.
     """
     model.body_invweight0[1:] = model.body_invweight0[1:].mean(axis=0)
+    model.geom_sameframe[model.geom_bodyid == 0] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     if ground is not None:
         low, span = _levels(ground)
         model.hfield_data[:] = ((ground.z_m - low) / span).astype(np.float32).ravel()
@@ -65,22 +133,29 @@ def mjcf(
     soft = f'solref="{max(CONTACT_TIME_S, 2.0 * step_s)} 1" solimp="0.9 0.95 0.001"'
     asset, floor = _ground(world, ground)
     options, obstacle = obstacle_mjcf(world)
+    links, apart = robot.joint_count + 1, links_apart(robot)
+    overlapping = "".join(
+        f'<exclude body1="link{i}" body2="link{j}"/>'
+        for i in range(links)
+        for j in range(i + 2, min(i + apart, links))
+    )
     return f"""<mujoco model="{robot.name}">
   <compiler angle="radian" autolimits="true"/>
   <option timestep="{step_s!r}" gravity="0 0 {-GRAVITY_M_S2!r}" integrator="Euler" solver="Newton"
     {options}/>
   <asset>{asset}</asset>
   <default>
-    <joint type="hinge" armature="{ARMATURE_KG_M2!r}"/>
+    <joint type="hinge" armature="{robot.servo.armature_kg_m2!r}"/>
     <geom condim="1" {soft}/>
   </default>
   <worldbody>
     {floor}{obstacle}
     <body name="link0"><freejoint name="head"/>
-      {_link(robot, 0)}
-      {_links_behind(robot)}
+      {_link(robot, 0, balls=ground is not None)}
+      {_links_behind(robot, balls=ground is not None)}
     </body>
   </worldbody>
+  <contact>{overlapping}</contact>
 </mujoco>"""
 
 
@@ -105,19 +180,34 @@ def _levels(ground: HeightField) -> tuple[float, float]:
     return low, max(float(ground.z_m.max()) - low, 1e-3)
 
 
-def _link(robot: RobotConfig, index: int) -> str:
+def _link(robot: RobotConfig, index: int, *, balls: bool) -> str:
     """Inertia of a cylinder; the frame of the head is its centre, of others their front joint."""
     m, r, length = robot.link_mass_kg, robot.body_radius_m, robot.link_length_m
     centre = f"{0.0 if index == 0 else -length / 2!r} 0 0"
     across = m * (3 * r**2 + length**2) / 12
     return (
         f'<inertial pos="{centre}" mass="{m!r}" diaginertia="{m * r**2 / 2!r} {across!r} '
-        f'{across!r}"/><geom name="belly{index}" type="sphere" size="{r!r}" pos="{centre}" '
-        'contype="2" conaffinity="1"/>'
+        f'{across!r}"/>{_belly(robot, index, balls)}'
     )
 
 
-def _links_behind(robot: RobotConfig) -> str:
+def _belly(robot: RobotConfig, index: int, balls: bool) -> str:
+    """Write a link's capsules, or the balls in them."""
+    common = f'size="{robot.body_radius_m!r}" contype="2" conaffinity="3"'
+    text = ""
+    for c, row in enumerate(belly_points_m(robot)):
+        row[:, 0] -= 0.0 if index == 0 else robot.link_length_m / 2
+        at = [" ".join(repr(float(v)) for v in point) for point in row]
+        if balls or len(at) == 1:
+            for k, place in enumerate(at):
+                text += f'<geom name="belly{index}_{c}_{k}" type="sphere" pos="{place}" {common}/>'
+        else:
+            ends = f'fromto="{at[0]} {at[-1]}"'
+            text += f'<geom name="belly{index}_{c}" type="capsule" {ends} {common}/>'
+    return text
+
+
+def _links_behind(robot: RobotConfig, *, balls: bool) -> str:
     text = ""
     for j in reversed(range(robot.joint_count)):
         axis = "0 0 -1" if robot.joint_axes[j] == "y" else "0 1 0"
@@ -126,6 +216,6 @@ def _links_behind(robot: RobotConfig) -> str:
         text = (
             f'<body name="link{j + 1}" pos="{-back!r} 0 0">'
             f'<joint name="joint{j}" axis="{axis}" range="{-stop!r} {stop!r}"/>'
-            f"{_link(robot, j + 1)}{text}</body>"
+            f"{_link(robot, j + 1, balls=balls)}{text}</body>"
         )
     return text

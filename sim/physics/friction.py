@@ -2,8 +2,10 @@
 
 Maximum dissipation on the ellipse with half axes ``mu_along N`` and ``mu_across N``: for a sliding
 velocity (v_a, v_c) the force is ``-N (mu_a^2 v_a, mu_c^2 v_c) / s`` with the *gauge*
-``s = hypot(mu_a v_a, mu_c v_c)``. Near rest each component is held to a share of what would stop
-the link within the step, so a link comes to rest without chatter at any step.
+``s = hypot(mu_a v_a, mu_c v_c)``. Friction backward may differ: then the forces fill two half
+ellipses with one axis across. They meet with one tangent, so the set is convex, and the dissipation
+is greatest on the half that opposes the sliding. Near rest each component is held to a share of
+what would stop the link within the step, so a link comes to rest without chatter at any step.
 """
 
 import math
@@ -44,16 +46,18 @@ def ellipse_force(
     normal_n: float,
     along_m_s: float,
     across_m_s: float,
-    mu_along: float,
-    mu_across: float,
+    mu: tuple[float, float, float],
     still_n_s_m: float,
     link_normal_n: float,
 ) -> tuple[float, float]:
     """Force along and across a link at one contact, N.
 
+    ``mu`` are the coefficients of sliding forward, across and back;
     ``still_n_s_m`` is the drag that stops a link, see ``stop_drag``;
     ``link_normal_n`` the sum of the normal forces of the link's contacts, which share it.
     """
+    mu_forward, mu_across, mu_back = mu
+    mu_along = mu_forward if along_m_s >= 0.0 else mu_back
     gauge = math.hypot(mu_along * along_m_s, mu_across * across_m_s)
     floor = link_normal_n / still_n_s_m
     slow_along = max(gauge, mu_along * mu_along * floor)

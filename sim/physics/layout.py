@@ -42,6 +42,8 @@ class StepLayout:
     contact_geom: int
     contact_row: int
     """Of a contact's first row in ``efc_force``, -1 for none."""
+    kinematics_address: int
+    """Of ``mj_kinematics(model, data)``: where everything is."""
     step1_address: int
     """Of the C function ``mj_step1(model, data)``: all that follows from position and velocity."""
     step2_address: int
@@ -63,6 +65,7 @@ def step_layout() -> StepLayout | None:
             contact_normal=of_contact.frame.offset,
             contact_geom=of_contact.geom.offset,
             contact_row=of_contact.efc_address.offset,
+            kinematics_address=_address("mj_kinematics"),
             step1_address=_address("mj_step1"),
             step2_address=_address("mj_step2"),
         )

@@ -4,10 +4,13 @@ from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.sim.physics.tangent_planes import TangentPlanes
 from snakewalk.sim.physics.water import water_constants
 
 LEAST_DEPTH_M = 1e-9
@@ -24,12 +27,16 @@ class Mechanics:
 
     model: mujoco.MjModel
     data: mujoco.MjData
-    mu_along: float
-    mu_across: float
+    mu: tuple[float, float, float]
+    """Coefficients of friction: sliding forward, across and back."""
     link_mass_kg: float
     radius_m: float
     gear_drag_n_m_s: float
     """Viscous loss of a gearbox, powered or not."""
+    planes: TangentPlanes
+    """What bears the body on a height field."""
+    is_ground: NDArray[np.int32]
+    """(geoms,) 1 for the floor and the planes, 0 for bellies and obstacles."""
     load_n: Floats
     """(L,) what the ground bore of each link in the last step, N."""
     before_m: Floats
@@ -46,7 +53,7 @@ class Mechanics:
         model: mujoco.MjModel,
         robot: RobotConfig,
         world: WorldConfig,
-        gear_drag_n_m_s: float,
+        ground: HeightField | None,
     ) -> "Mechanics":
         """Gather what the steps need."""
         mu = world.friction
@@ -54,8 +61,13 @@ class Mechanics:
         data = mujoco.MjData(model)
         mass, radius = robot.link_mass_kg, robot.body_radius_m
         water = water_constants(world, robot)
-        grip = mu.along, mu.across, mass, radius, gear_drag_n_m_s
-        return cls(model, data, *grip, load, before, water)
+        grip = mu.along, mu.across, mu.backward
+        planes = TangentPlanes.of(model, ground, radius)
+        is_ground = np.zeros(model.ngeom, dtype=np.int32)
+        is_ground[model.geom("ground").id] = 1
+        is_ground[planes.planes] = 1
+        about = mass, radius, robot.servo.gear_drag_n_m_s
+        return cls(model, data, grip, *about, planes, is_ground, load, before, water)
 
     @property
     def joint_count(self) -> int:
@@ -76,9 +88,8 @@ class Mechanics:
         """Set ``load_n`` from the contact forces in the data."""
         d = self.data
         row = np.asarray(d.contact.efc_address)
-        body = self.model.geom_bodyid[d.contact.geom[:, 1]]
-        bears = (row >= 0) & (body > 0)
-        link = body[bears] - 1
+        bears = (row >= 0) & (self.is_ground[d.contact.geom[:, 0]] > 0)
+        link = self.model.geom_bodyid[d.contact.geom[bears, 1]] - 1
         self.load_n[:] = np.bincount(link, d.efc_force[row[bears]], len(self.load_n))
 
 

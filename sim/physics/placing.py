@@ -9,6 +9,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WaterGround, WorldConfig
 from snakewalk.drivers.least_squares import least_squares
+from snakewalk.sim.physics.body import belly_points_m
 from snakewalk.sim.physics.mechanics import Mechanics
 from snakewalk.sim.physics.water import floating_height_m
 
@@ -43,13 +44,10 @@ def place(
     _pose(m, start_m, heading_rad, joint_rad)
     if ground is not None:
         _drape(m, robot, ground)
-    mujoco.mj_kinematics(model, data)
-    centre = np.asarray(data.xipos[1:])
-    data.qpos[2] += float(
-        (_rest_height_m(ground, centre, robot.body_radius_m) - centre[:, 2]).max()
-    )
+    data.qpos[2] -= float(_clearance_m(m, robot, ground).min())
     _settle(m)
     data.qvel[:] = 0.0
+    m.planes.lay(data)
     mujoco.mj_forward(model, data)
     m.start_at_rest()
 
@@ -93,7 +91,10 @@ def _pose(
 
 
 def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField) -> None:
-    """Fit height, lean and pitch joints to the ground under the links: Gauss-Newton on heights."""
+    """Fit height, lean and pitch joints to the ground under the links: Gauss-Newton on clearances.
+
+    Not on the elevation under a link: its belly bridges a trench and rests on a step's edge.
+    """
     model, data = m.model, m.data
     free = np.array([2, 3, 4, *(6 + j for j in robot.pitch_joints)])
     limit = np.array([robot.limit_rad[j] for j in robot.pitch_joints])
@@ -102,9 +103,7 @@ def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField) -> None:
     stiff[0] = 0.0
 
     def above_m() -> Floats:
-        mujoco.mj_kinematics(model, data)
-        x, y, z = np.asarray(data.xipos[1:]).T
-        return np.asarray(z - ground.elevation_m(x, y) - robot.body_radius_m)
+        return _clearance_m(m, robot, ground)
 
     for _ in range(DRAPE_ROUNDS):
         here, qpos = above_m(), data.qpos.copy()
@@ -126,6 +125,7 @@ def _settle(m: Mechanics) -> None:
     model, data = m.model, m.data
     held, start = data.qpos[7:].copy(), data.qpos[:2].copy()
     for _ in range(int(SETTLE_MAX_S / m.step_s)):
+        m.planes.lay(data)
         mujoco.mj_step(model, data)
         data.qvel[:] *= np.exp(-SETTLE_DAMPING_PER_S * m.step_s)
         data.qvel[:2] = 0.0
@@ -137,8 +137,20 @@ def _settle(m: Mechanics) -> None:
             break
 
 
+def _clearance_m(m: Mechanics, robot: RobotConfig, ground: HeightField | None) -> Floats:
+    """(L,) height by which each link's belly clears the ground, negative below it."""
+    mujoco.mj_kinematics(m.model, m.data)
+    axes = np.asarray(m.data.xmat[1:]).reshape(-1, 3, 3)
+    along, aside, _ = belly_points_m(robot).reshape(-1, 3).T[..., None]
+    # products by hand: BLAS adds in another order on another processor
+    places = m.data.xipos[1:, None] + along * axes[:, None, :, 0] + aside * axes[:, None, :, 1]
+    points = places.reshape(-1, 3)
+    above = points[:, 2] - _rest_height_m(ground, points, robot.body_radius_m)
+    return np.asarray(above.reshape(len(axes), -1).min(axis=1))
+
+
 def _rest_height_m(ground: HeightField | None, centre: Floats, radius_m: float) -> Floats:
-    """Least height (L,) at which balls of ``radius_m`` at ``centre`` (L, 3) clear the ground."""
+    """Least height (P,) at which balls of ``radius_m`` at ``centre`` (P, 3) clear the ground."""
     if ground is None:
         return np.full(len(centre), radius_m)
     offsets = np.linspace(-1.0, 1.0, 9) * radius_m

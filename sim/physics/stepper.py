@@ -22,6 +22,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.sim.physics.friction import ellipse_force, stop_drag
 from snakewalk.sim.physics.layout import step_layout
 from snakewalk.sim.physics.mechanics import LEAST_DEPTH_M, Mechanics, PhysicsError
+from snakewalk.sim.physics.tangent_planes import PLANES, lay_planes
 from snakewalk.sim.physics.water import add_water, immersed
 from snakewalk.sim.plant import ServoDrive, shaft_torque
 
@@ -110,7 +111,7 @@ def _add_friction(
     qvel: Floats,
     chain: tuple[Floats, ...],
     work: tuple[Floats, ...],
-    geom_body: NDArray[np.int32],
+    geoms: tuple[NDArray[np.int32], ...],
     law: tuple[float, ...],
     load: Floats,
     totals: Floats,
@@ -119,22 +120,23 @@ def _add_friction(
     """Ellipse at every contact of now under the load of the last step, collected into ``qfrc``."""
     reals, integers, count, at = contacts
     size, at_dist, at_place, at_up, at_geom, _ = at
+    geom_body, is_ground = geoms
     v, w, wrench, depth, before = work
-    mu_along, mu_across, mass_kg, radius_m, step_s = law
+    mu, mass_kg, radius_m, step_s = (law[0], law[1], law[2]), law[3], law[4], law[5]
     centre, rotation = chain[0], chain[1]
     still = stop_drag(centre[1:], mass_kg, radius_m, step_s)
     depth[:] = 0.0
     for c in range(count):
+        if not is_ground[integers[2 * size * c + at_geom]]:
+            continue  # an obstacle's, which has MuJoCo's own friction, or two links'
         i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
-        if i < 0:  # an obstacle's: it has MuJoCo's own friction
-            continue
         depth[i] += max(-reals[size * c + at_dist], LEAST_DEPTH_M)
     _move(v, w, before, qvel, chain, step_s)
     wrench[:] = 0.0
     for c in range(count):
-        i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
-        if i < 0:
+        if not is_ground[integers[2 * size * c + at_geom]]:
             continue
+        i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
         share = max(-reals[size * c + at_dist], LEAST_DEPTH_M) / depth[i]
         p = reals[size * c + at_place : size * c + at_place + 3]
         n = reals[size * c + at_up : size * c + at_up + 3]
@@ -150,9 +152,7 @@ def _add_friction(
         g0, g1, g2 = n[1] * e2 - n[2] * e1, n[2] * e0 - n[0] * e2, n[0] * e1 - n[1] * e0
         v_along = s0 * e0 + s1 * e1 + s2 * e2
         v_across = s0 * g0 + s1 * g1 + s2 * g2
-        f_along, f_across = ellipse_force(
-            share * load[i], v_along, v_across, mu_along, mu_across, still, load[i]
-        )
+        f_along, f_across = ellipse_force(share * load[i], v_along, v_across, mu, still, load[i])
         totals[0] -= (f_along * v_along + f_across * v_across) * step_s
         totals[1] += abs(v_across) * share * step_s / len(v)
         f0 = f_along * e0 + f_across * g0
@@ -170,15 +170,18 @@ def _add_friction(
 
 
 def _weigh(
-    load: Floats, contacts: tuple[Any, ...], force_n: Floats, geom_body: NDArray[np.int32]
+    load: Floats,
+    contacts: tuple[Any, ...],
+    force_n: Floats,
+    geoms: tuple[NDArray[np.int32], ...],
 ) -> None:
-    """Sum the contact forces of each link."""
+    """Sum the ground's contact forces on each link."""
     _, integers, count, at = contacts
+    geom_body, is_ground = geoms
     for c in range(count):
         row = integers[2 * at[0] * c + at[5]]
-        i = geom_body[integers[2 * at[0] * c + at[4] + 1]] - 1
-        if row >= 0 and i >= 0:
-            load[i] += force_n[row]
+        if row >= 0 and is_ground[integers[2 * at[0] * c + at[4]]]:
+            load[geom_body[integers[2 * at[0] * c + at[4] + 1]] - 1] += force_n[row]
 
 
 def _steps(
@@ -187,7 +190,8 @@ def _steps(
     state: tuple[Floats, Floats, Floats],
     chain: tuple[Floats, ...],
     work: tuple[Floats, ...],
-    geom_body: NDArray[np.int32],
+    geoms: tuple[NDArray[np.int32], ...],
+    ground: tuple[Any, ...],
     law: tuple[float, ...],
     gear_drag: float,
     drive: tuple[Floats, ...],
@@ -199,9 +203,10 @@ def _steps(
     qpos, qvel, qfrc = state
     on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit = drive[:9]
     current, torque, pwm, drawn_j, returned_j, heat_j, work_j = drive[9:]
+    places, balls, z_m, corner, planes, plane_m, plane_quat = ground
     joints = len(goal)
     speed = np.empty(joints)
-    step_s = law[4]
+    step_s = law[5]
     step1, step2, model, data = where[0], where[1], where[2], where[3]
     at = (
         where[7] // 8,
@@ -215,6 +220,9 @@ def _steps(
     contact_list = carray(pointer(where[5]), (1,), np.int64)
     force_list = carray(pointer(where[6]), (1,), np.int64)
     for _ in range(steps):
+        if len(balls) > 0:
+            call(where[13], model, data)
+            lay_planes(places, balls, law[4], z_m, corner, planes, plane_m, plane_quat)
         call(step1, model, data)
         qfrc[:] = 0.0
         for j in range(joints):
@@ -241,7 +249,7 @@ def _steps(
             count,
             at,
         )
-        _add_friction(contacts, qfrc, qvel, chain, work, geom_body, law, load, totals, water)
+        _add_friction(contacts, qfrc, qvel, chain, work, geoms, law, load, totals, water)
         call(step2, model, data)
         for j in range(joints):
             # a force does its work at the mean of the speeds before and after Euler's step
@@ -255,7 +263,7 @@ def _steps(
             totals[2] += gear_drag * speed[j] * middle * step_s
         load[:] = 0.0
         force_n = carray(pointer(force_list[0]), (1 << 30,), np.float64)
-        _weigh(load, contacts, force_n, geom_body)
+        _weigh(load, contacts, force_n, geoms)
 
 
 def _run(
@@ -266,7 +274,7 @@ def _run(
     constants: Floats,
 ) -> None:
     """Advance, with all arrays by their addresses: handing over forty would take 7 us a call."""
-    joints, bodies, geoms = sizes[0], sizes[1], sizes[2]
+    joints, bodies, geom_count, ball_count = sizes[0], sizes[1], sizes[2], sizes[3]
     links = joints + 1
     at = carray(pointer(arrays[0]), (joints + 7,), np.float64)
     rate = carray(pointer(arrays[1]), (joints + 6,), np.float64)
@@ -286,15 +294,20 @@ def _run(
     )
     load = carray(pointer(arrays[12]), (links,), np.float64)
     totals = carray(pointer(arrays[13]), (3,), np.float64)
-    geom_body = carray(pointer(arrays[14]), (geoms,), np.int32)
+    geoms = (
+        carray(pointer(arrays[14]), (geom_count,), np.int32),
+        carray(pointer(arrays[15]), (geom_count,), np.int32),
+    )
+    ground = (
+        carray(pointer(arrays[16]), (geom_count, 3), np.float64),
+        carray(pointer(arrays[17]), (ball_count,), np.int32),
+        carray(pointer(arrays[18]), (sizes[4], sizes[5]), np.float64),
+        (constants[13], constants[14], constants[15]),
+        carray(pointer(arrays[19]), (ball_count, PLANES), np.int32),
+        carray(pointer(arrays[20]), (geom_count, 3), np.float64),
+        carray(pointer(arrays[21]), (geom_count, 4), np.float64),
+    )
     drive = (
-        carray(pointer(arrays[15]), (joints,), np.float64),
-        carray(pointer(arrays[16]), (joints,), np.float64),
-        carray(pointer(arrays[17]), (joints,), np.float64),
-        carray(pointer(arrays[18]), (joints,), np.float64),
-        carray(pointer(arrays[19]), (joints,), np.float64),
-        carray(pointer(arrays[20]), (joints,), np.float64),
-        carray(pointer(arrays[21]), (joints,), np.float64),
         carray(pointer(arrays[22]), (joints,), np.float64),
         carray(pointer(arrays[23]), (joints,), np.float64),
         carray(pointer(arrays[24]), (joints,), np.float64),
@@ -304,12 +317,19 @@ def _run(
         carray(pointer(arrays[28]), (joints,), np.float64),
         carray(pointer(arrays[29]), (joints,), np.float64),
         carray(pointer(arrays[30]), (joints,), np.float64),
+        carray(pointer(arrays[31]), (joints,), np.float64),
+        carray(pointer(arrays[32]), (joints,), np.float64),
+        carray(pointer(arrays[33]), (joints,), np.float64),
+        carray(pointer(arrays[34]), (joints,), np.float64),
+        carray(pointer(arrays[35]), (joints,), np.float64),
+        carray(pointer(arrays[36]), (joints,), np.float64),
+        carray(pointer(arrays[37]), (joints,), np.float64),
     )
-    law = (constants[0], constants[1], constants[2], constants[3], constants[4])
+    law = (constants[0], constants[1], constants[2], constants[3], constants[4], constants[5])
     state = (at, rate, force)
     _steps(
-        *(steps, where, state, chain, work, geom_body, law, constants[5], drive, load, totals),
-        constants[6:12],
+        *(steps, where, state, chain, work, geoms, ground, law, constants[6], drive, load, totals),
+        constants[7:13],
     )
 
 
@@ -359,6 +379,7 @@ class CompiledSteps:
                 layout.contact_normal,
                 layout.contact_geom,
                 layout.contact_row,
+                layout.kinematics_address,
             ],
             dtype=np.int64,
         )
@@ -367,13 +388,22 @@ class CompiledSteps:
             *(d.qpos, d.qvel, d.qfrc_applied),
             *(d.xipos, d.xmat, d.xanchor, d.xaxis),
             *(np.zeros((links, 3)), np.zeros((links, 3)), np.zeros((links, 6)), np.zeros(links)),
-            *(m.before_m, m.load_n, m.totals, m.model.geom_bodyid),
+            *(m.before_m, m.load_n, m.totals, m.model.geom_bodyid, m.is_ground),
+            *(d.geom_xpos, m.planes.balls, m.planes.z_m, m.planes.planes),
+            *(m.model.geom_pos, m.model.geom_quat),
         )
-        self._sizes = np.array([m.joint_count, m.model.nbody, m.model.ngeom], dtype=np.int64)
+        sizes = (
+            m.joint_count,
+            m.model.nbody,
+            m.model.ngeom,
+            len(m.planes.balls),
+            *m.planes.z_m.shape,
+        )
+        self._sizes = np.array(sizes, dtype=np.int64)
         self._constants = np.array(
             [
-                *(m.mu_along, m.mu_across, m.link_mass_kg, m.radius_m, m.step_s),
-                *(m.gear_drag_n_m_s, *m.water),
+                *(*m.mu, m.link_mass_kg, m.radius_m, m.step_s),
+                *(m.gear_drag_n_m_s, *m.water, *m.planes.corner_m),
             ]
         )
         self._drive: ServoDrive | None = None

@@ -20,13 +20,13 @@ WAVELENGTH_JOINTS = 14.0
 
 
 def a_body(
-    mu: tuple[float, float] = (0.1, 0.7),
+    mu: tuple[float, ...] = (0.1, 0.7),
     step_s: float = 0.002,
     ground: HeightField | None = None,
     **options: float,
 ) -> MujocoPlant:
-    """A ``yaw16`` with friction ``mu`` (along, across), straight, at rest."""
-    friction = FrictionConfig(along=mu[0], across=mu[1])
+    """A ``yaw16`` with friction ``mu`` (along, across, and perhaps back), straight, at rest."""
+    friction = FrictionConfig(along=mu[0], across=mu[1], back=mu[2] if len(mu) > 2 else None)
     world = FLAT.model_copy(update={"friction": friction})
     return MujocoPlant(ROBOT, world, ground, step_s, **options)  # type: ignore[arg-type]
 

@@ -30,6 +30,7 @@ class NumpySteps:
         """Advance ``steps`` steps."""
         m = self._m
         for _ in range(steps):
+            m.planes.lay(m.data)
             mujoco.mj_step1(m.model, m.data)
             force = friction_forces(m)
             rate = m.data.qvel[6:]
@@ -57,9 +58,9 @@ def friction_forces(m: Mechanics) -> Floats:
     d = m.data
     out = np.zeros(m.model.nv)
     contacts = d.contact
-    link = m.model.geom_bodyid[contacts.geom[:, 1]] - 1
-    ours = link >= 0  # the others are an obstacle's: they have MuJoCo's own friction
-    link = link[ours]
+    # the others are an obstacle's, which have MuJoCo's own friction, or those of two links
+    ours = m.is_ground[contacts.geom[:, 0]] > 0
+    link = m.model.geom_bodyid[contacts.geom[ours, 1]] - 1
     depth = np.maximum(-contacts.dist[ours], LEAST_DEPTH_M)
     load = m.load_n[link]
     share = depth / np.bincount(link, depth, len(m.load_n))[link]
@@ -76,9 +77,7 @@ def friction_forces(m: Mechanics) -> Floats:
     across = np.cross(up, along)
     v_along, v_across = (sliding * along).sum(axis=1), (sliding * across).sum(axis=1)
     still = stop_drag(centre, m.link_mass_kg, m.radius_m, m.step_s)
-    f_along, f_across = ellipse_forces(
-        normal_n, v_along, v_across, m.mu_along, m.mu_across, still, load
-    )
+    f_along, f_across = ellipse_forces(normal_n, v_along, v_across, m.mu, still, load)
     m.totals[0] -= float(f_along @ v_along + f_across @ v_across) * m.step_s
     m.totals[1] += float((np.abs(v_across) * share).sum()) * m.step_s / len(centre)
     force = f_along[:, None] * along + f_across[:, None] * across
@@ -98,12 +97,13 @@ def ellipse_forces(
     normal_n: Floats,
     along_m_s: Floats,
     across_m_s: Floats,
-    mu_along: float,
-    mu_across: float,
+    mu: tuple[float, float, float],
     still_n_s_m: float,
     link_normal_n: Floats,
 ) -> tuple[Floats, Floats]:
     """``ellipse_force`` of C contacts at once; all arrays (C,)."""
+    mu_forward, mu_across, mu_back = mu
+    mu_along = np.where(along_m_s >= 0.0, mu_forward, mu_back)
     gauge = np.hypot(mu_along * along_m_s, mu_across * across_m_s)
     floor = link_normal_n / still_n_s_m
     slow_along = np.maximum(gauge, mu_along**2 * floor)

@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PlanarBody:
-    """A chain of equal links, head first, each on one point of the floor under its centre."""
+    """A chain of equal links, head first, each on points of the floor that share its weight."""
 
     links: int
     link_m: float
@@ -31,6 +31,10 @@ class PlanarBody:
     mu_along: float
     mu_across: float
     gravity_m_s2: float = 9.81
+    points_m: tuple[float, ...] = (0.0,)
+    """Of a link, forward of its centre."""
+    mu_back: float | None = None
+    """Of sliding backward; None: ``mu_along``."""
     creep_m_s: float = 2e-5
     """Sliding below which Coulomb's jump is a slope; the answer is that of the limit 0."""
 
@@ -56,7 +60,9 @@ def simulate(
     so that heading ``i`` is that of the head less the first ``i`` angles.
     """
     mass = body.links * body.mass_kg
-    weight = body.mass_kg * body.gravity_m_s2
+    offset = np.array(body.points_m)[:, None]
+    weight = body.mass_kg * body.gravity_m_s2 / len(offset)
+    mu_back = body.mu_along if body.mu_back is None else body.mu_back
 
     def frame(t: float) -> tuple[Floats, Floats, Floats, Floats]:
         """Headings, their rates, centres about the centre of mass and their rates, head's frame."""
@@ -90,15 +96,18 @@ def simulate(
         ahead = np.stack([np.cos(a + theta), np.sin(a + theta)])
         left = np.stack([-ahead[1], ahead[0]])
         forth, aside = (velocity * ahead).sum(axis=0), (velocity * left).sum(axis=0)
+        aside = aside + (turn + w) * offset  # (points, links)
+        mu_along = np.where(forth > 0.0, body.mu_along, mu_back)
         creep = body.mu_across * body.creep_m_s
-        gauge = np.sqrt((body.mu_along * forth) ** 2 + (body.mu_across * aside) ** 2 + creep**2)
-        pull = (
-            -weight * (body.mu_along**2 * forth * ahead + body.mu_across**2 * aside * left) / gauge
+        gauge = np.sqrt((mu_along * forth) ** 2 + (body.mu_across * aside) ** 2 + creep**2)
+        along, across = (
+            -weight * mu_along**2 * forth / gauge,
+            -weight * body.mu_across**2 * aside / gauge,
         )
-        torque = (arm[0] * pull[1] - arm[1] * pull[0]).sum()
-        return np.array(
-            [*momentum / mass, turn, *pull.sum(axis=1), torque, -(pull * velocity).sum()]
-        )
+        pull = along.sum(axis=0) * ahead + across.sum(axis=0) * left
+        torque = (arm[0] * pull[1] - arm[1] * pull[0]).sum() + (offset * across).sum()
+        taken = -(along * forth + across * aside).sum()
+        return np.array([*momentum / mass, turn, *pull.sum(axis=1), torque, taken])
 
     start = np.zeros(7)
     done = solve_ivp(

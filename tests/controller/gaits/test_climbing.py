@@ -69,12 +69,21 @@ def test_opposite_hands_are_mirror_images_and_backward_is_reversed(gait: Gait) -
 def test_it_climbs_as_far_a_cycle_as_a_rolling_body_does(
     gait: HelixPole | HelixPipe, world: str, sign: float
 ) -> None:
-    """``2 pi r cos(rise)``: straight up, against the body's weight."""
+    """``2 pi r cos(rise)``, straight up, against the body's weight, and a fifth to a third more.
+
+    Links of 7 cm are chords of the coil: their ends roll on another circle than their middles.
+    """
     run = follow(gait, "alternating16", world, 13.0, hold_s=1.0)
     climb = run.way_m(2)[2]
     print(f"{gait.name}: {climb:.3f} m a cycle, rolling without slip {gait.advance_m():.3f}")
-    assert climb == pytest.approx(sign * gait.advance_m(), rel=0.15)
+    assert 1.0 < sign * climb / gait.advance_m() < 1.35
     assert run.plant.contact_count >= 3
+
+
+def test_short_links_climb_a_pole_as_rolling_without_slip_does() -> None:
+    gait = HelixPole()
+    climb = follow(gait, "alternating32", "pole", 13.0, hold_s=1.0).way_m(2)[2]
+    assert climb == pytest.approx(gait.advance_m(), rel=0.05)
 
 
 def test_a_pipe_that_lies_is_crept_through_and_backward_goes_back() -> None:
@@ -83,7 +92,7 @@ def test_a_pipe_that_lies_is_crept_through_and_backward_goes_back() -> None:
     for backward, sign in ((False, 1.0), (True, -1.0)):
         gait = HelixPipe.of({"backward": backward})
         way = follow(gait, "alternating16", world, 8.0, hold_s=1.0).way_m(1)[0]
-        assert way == pytest.approx(sign * gait.advance_m(), rel=0.2)
+        assert 1.0 < sign * way / gait.advance_m() < 1.35
 
 
 def slipping(friction: float) -> WorldConfig:

@@ -6,7 +6,8 @@ import pytest
 from snakewalk.sim.physics.friction import BENT_STOP_SHARE, ellipse_force, stop_drag
 from tests.oracles.numpy_steps import ellipse_forces
 
-MU = (0.1, 0.7)
+MU = (0.1, 0.7, 0.3)
+"""Forward, across, back."""
 LOAD_N = 1.1
 DRAG = 33.0
 RNG = np.random.default_rng(5)
@@ -14,17 +15,21 @@ SLIDING = RNG.normal(size=(200, 2))
 
 
 def force(v: np.ndarray) -> np.ndarray:
-    return np.array(ellipse_force(LOAD_N, v[0], v[1], *MU, DRAG, LOAD_N))
+    return np.array(ellipse_force(LOAD_N, v[0], v[1], MU, DRAG, LOAD_N))
 
 
-def test_sliding_force_lies_on_the_ellipse() -> None:
+def test_sliding_force_lies_on_the_half_ellipse_that_opposes_it() -> None:
     for v in SLIDING:
-        assert np.hypot(*(force(v) / (np.array(MU) * LOAD_N))) == pytest.approx(1.0)
+        along = MU[0] if v[0] > 0.0 else MU[2]
+        assert np.hypot(*(force(v) / (np.array([along, MU[1]]) * LOAD_N))) == pytest.approx(1.0)
+        assert force(v)[0] * v[0] < 0.0
 
 
 def test_no_other_force_of_the_ellipse_takes_more_energy() -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 721)
-    others = LOAD_N * np.stack([MU[0] * np.cos(angle), MU[1] * np.sin(angle)], axis=1)
+    # a force forward resists sliding back
+    along = np.where(np.cos(angle) > 0.0, MU[2], MU[0])
+    others = LOAD_N * np.stack([along * np.cos(angle), MU[1] * np.sin(angle)], axis=1)
     for v in SLIDING:
         taken = -force(v) @ v
         assert taken >= (-others @ v).max() - 1e-12
@@ -43,14 +48,14 @@ def test_force_shrinks_to_nothing_without_a_jump() -> None:
         forces = np.array([force(speed * way) for speed in speeds])
         assert np.abs(np.diff(forces, axis=0)).max() < DRAG * 1.01 * speeds[1]
     assert tuple(force(np.zeros(2))) == (0.0, 0.0)
-    assert ellipse_force(0.0, 1.0, 1.0, *MU, DRAG, 0.0) == (0.0, 0.0)
+    assert ellipse_force(0.0, 1.0, 1.0, MU, DRAG, 0.0) == (0.0, 0.0)
 
 
 def test_many_at_once_are_one_by_one() -> None:
     v = np.concatenate([SLIDING, 1e-4 * SLIDING, np.zeros((1, 2))])
     load = RNG.uniform(0.0, 3.0, len(v))
-    along, across = ellipse_forces(0.5 * load, v[:, 0], v[:, 1], *MU, DRAG, load)
-    single = [ellipse_force(0.5 * n, *each, *MU, DRAG, n) for n, each in zip(load, v, strict=True)]
+    along, across = ellipse_forces(0.5 * load, v[:, 0], v[:, 1], MU, DRAG, load)
+    single = [ellipse_force(0.5 * n, *each, MU, DRAG, n) for n, each in zip(load, v, strict=True)]
     np.testing.assert_allclose(np.stack([along, across], axis=1), single, atol=1e-15)
 
 
