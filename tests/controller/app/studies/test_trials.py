@@ -1,11 +1,14 @@
 """Trials: what a seed changes, how often a row counts, and what a row says of failures."""
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.commands.trials import trials as command
 from snakewalk.controller.app.studies import trials as study
 from snakewalk.controller.app.studies.trials import Case, Trial, plan_trials, prepare_case, wilson
 
@@ -72,6 +75,25 @@ def test_a_row_counts_passes_misses_and_causes() -> None:
     assert (row.runs, row.complete, row.first_pass, row.passed_by) == (5, "2 of 5", 1, 3)
     assert (row.path_error_m, row.path_error_max_m) == (0.15, 0.9)
     assert row.why == "2 slip; 1 ZeroDivisionError: by zero"
+
+
+def test_the_command_runs_each_case_and_a_fixed_one_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mujoco")
+    run = tmp_path / "near.toml"
+    run.write_text('name = "near"\nwaypoints_m = [[0.4, 0.0]]\ntime_limit_s = 20.0\n')
+    command(
+        [str(run)], seeds=2, first_seed=40, start_spread=0.0, motion=["serpenoid"],
+        workers=1, as_json=True,
+    )  # fmt: skip
+    found = json.loads(capsys.readouterr().out)
+    assert (found["seeds"], found["start_spread_m"]) == ([40, 41], 0.0)
+    (row,) = found["table"]
+    assert (row["run"], row["complete"], row["first_pass"]) == (str(run), "1 of 1", 1)
+    assert row["complete_95"] == [0.207, 1.0]
+    (trial,) = found["trials"]
+    assert (trial["seed"], trial["start_m"], trial["cause"]) == (40, [0.0, 0.0], "")
 
 
 @pytest.mark.parametrize(
