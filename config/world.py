@@ -205,14 +205,14 @@ class PlannerConfig(Strict):
         0.2, gt=0.0, lt=1.5, description="steepest slope under the footprint that the body climbs"
     )
     climb_weight: float = Field(
-        2.0, ge=0.0, description="metres of level path that a metre up at the limit costs more"
+        1.0, ge=0.0, description="metres of level path that a metre up at the limit costs more"
     )
     side_weight: float = Field(1.0, ge=0.0, description="the same for a side slope at that limit")
     clearance_m: float = Field(
         0.6, ge=0.0, description="wanted to ground that cannot be climbed: half a body"
     )
     clearance_weight: float = Field(
-        2.0, ge=0.0, description="metres of level path that a metre at such ground costs more"
+        1.0, ge=0.0, description="metres of level path that a metre at such ground costs more"
     )
     node_spacing_m: float = Field(0.15, gt=0.0)
     bend_radius_m: float = Field(0.4, ge=0.0, description="wanted of every bend, where possible")

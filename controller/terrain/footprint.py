@@ -30,9 +30,8 @@ class Footprint:
         self._nearness = np.zeros(ground.z_m.shape)
         if steep.any():
             far_m = np.asarray(distance_transform_edt(~steep, sampling=ground.spacing_m), float)
-            self._nearness = np.maximum(
-                1.0 - far_m / max(config.clearance_m, ground.spacing_m), 0.0
-            )
+            far = far_m / max(config.clearance_m, ground.spacing_m)
+            self._nearness = np.maximum(1.0 - far, 0.0) ** 2
 
     def slope_rad(self, points_m: Floats) -> Floats:
         """Inclination (...) of the plane fitted to the footprint at points (..., 2)."""

@@ -23,13 +23,13 @@ class SafeGraph:
     contour, also across the steepest slope, and grows with the square of an edge's length. Here a
     metre of an edge weighs the *windowed* variance per node spacing, and ``length_weight`` times
 
-        1 + climb_weight (up / limit)^2 + side_weight (side / limit)^2
-          + clearance_weight (1 - distance to ground that cannot be climbed / clearance),
+        1 + climb_weight (up / limit)^4 + side_weight (side / limit)^4
+          + clearance_weight (1 - distance to ground that cannot be climbed / clearance)^2,
 
     where up along the edge and side across it are the footprint's slopes, as tangents, and so is
     the climb limit. Flat ground does not tie, and cutting an edge in two changes nothing. Slopes
-    over the limit cost much in every direction: a limit of the climb alone would be kept by
-    hairpins shorter than the body.
+    far below the limit cost little more than their variance, those over it much, in every
+    direction: a limit of the climb alone would be kept by hairpins shorter than the body.
     """
 
     def __init__(self, relief: Relief) -> None:
@@ -97,11 +97,11 @@ class SafeGraph:
         config = self._relief.config
         up, side = self.footprint.slopes(points_m, direction) / np.tan(config.climb_limit_rad)
         level = 1.0 + config.clearance_weight * self.footprint.nearness(points_m)
-        level = level + config.side_weight * side**2
+        level = level + config.side_weight * side**4
         variance = self._relief.variance_m2(*np.moveaxis(points_m, -1, 0)) / config.node_spacing_m
         there, back = (
             variance
-            + config.length_weight * (level + config.climb_weight * np.maximum(climb, 0.0) ** 2)
+            + config.length_weight * (level + config.climb_weight * np.maximum(climb, 0.0) ** 4)
             for climb in (up, -up)
         )
         return there, back

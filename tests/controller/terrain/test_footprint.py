@@ -43,7 +43,7 @@ def test_nearness_falls_over_the_clearance() -> None:
     near = footprint.nearness(np.stack([x, 0.0 * x], axis=-1))
     wall = x[np.flatnonzero(near == 1.0)[0]]
     assert 0.65 < wall < 0.85
-    np.testing.assert_allclose(near, np.clip(1.0 - (wall - x) / 0.8, 0.0, 1.0), atol=0.07)
+    np.testing.assert_allclose(near, np.clip(1.0 - (wall - x) / 0.8, 0.0, 1.0) ** 2, atol=0.12)
     level = Footprint(field(lambda x, y: 0.1 * x), config)
     assert (level.nearness(np.stack([x, 0.0 * x], axis=-1)) == 0.0).all()
 
@@ -54,11 +54,11 @@ def test_uphill_costs_more_than_downhill_and_a_contour_less() -> None:
     a, b, c = (np.array([at]) for at in ((-0.5, 0.0), (0.5, 0.0), (-0.5, 1.0)))
     up, down, safe = (float(part[0]) for part in graph.edge_cost(a, b))
     assert safe
-    assert (down, up) == tuple(float(part[0]) for part in graph.edge_cost(b, a))[:2]
+    assert [float(part[0]) for part in graph.edge_cost(b, a)] == pytest.approx([down, up, 1.0])
     contour, back, _ = (float(part[0]) for part in graph.edge_cost(a, c))
     assert contour == pytest.approx(back)
     assert down < contour < up
-    share = (0.12 / np.tan(CONFIG.climb_limit_rad)) ** 2
+    share = (0.12 / np.tan(CONFIG.climb_limit_rad)) ** 4
     assert up - down == pytest.approx(CONFIG.length_weight * CONFIG.climb_weight * share)
     assert contour - down == pytest.approx(CONFIG.length_weight * CONFIG.side_weight * share)
 
@@ -78,7 +78,7 @@ def band(x, y):
     return 0.3 * np.clip((x + half) / (2.0 * half), 0.0, 1.0)
 
 
-def test_a_bank_is_climbed_by_the_pass_and_left_by_it_as_well() -> None:
+def test_a_bank_is_climbed_by_the_pass_and_descended_straight() -> None:
     planner = TerrainPlanner(field(band, half=3.0), PlannerConfig(variance_limit_m2=1e-2))
     ends = np.array([(-2.2, -0.6), (2.2, -0.6)])
     blind = PlannerConfig(
@@ -86,8 +86,8 @@ def test_a_bank_is_climbed_by_the_pass_and_left_by_it_as_well() -> None:
     )
     straight = TerrainPlanner(field(band, half=3.0), blind).plan(ends)
     assert looked_at(straight)[:, 1].max() < 0.2
-    for points in (ends, ends[::-1]):
-        assert looked_at(planner.plan(points))[:, 1].max() > 0.5
+    assert looked_at(planner.plan(ends))[:, 1].max() > 0.8
+    assert looked_at(planner.plan(ends[::-1]))[:, 1].max() < 0.2
 
 
 def test_half_a_body_is_kept_from_a_hill_where_there_is_room() -> None:
