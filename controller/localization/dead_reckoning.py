@@ -55,5 +55,6 @@ class DeadReckoning:
             self._velocity,
         )
         c, s = np.cos(self._heading_rad), np.sin(self._heading_rad)
-        self._head_m = self._head_m + step_s * np.array([[c, -s], [s, c]]) @ self._velocity[:2]
+        u, v = self._velocity[:2]
+        self._head_m = self._head_m + step_s * np.array([c * u - s * v, s * u + c * v])
         self._heading_rad += step_s * float(self._velocity[2])

@@ -38,11 +38,10 @@ class CameraModel:
         """Build the model of an upright pinhole camera above ``centre_m``."""
         scale = camera.field_width_m / camera.width_px
         c, s = scale * np.cos(camera.turn_rad), scale * np.sin(camera.turn_rad)
-        turn = np.array([[c, s], [s, -c]])  # the image's y runs down
-        middle = 0.5 * np.array([camera.width_px - 1, camera.height_px - 1])
+        x, y = 0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1)
         floor = np.eye(3)
-        floor[:2, :2] = turn
-        floor[:2, 2] = np.asarray(centre_m) - turn @ middle
+        floor[:2, :2] = [[c, s], [s, -c]]  # the image's y runs down
+        floor[:2, 2] = centre_m[0] - (c * x + s * y), centre_m[1] - (s * x - c * y)
         return cls(floor, np.array(centre_m, dtype=float), camera.height_m)
 
     @classmethod
