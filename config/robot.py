@@ -18,10 +18,13 @@ class ServoConfig(Strict):
     supply_v: float = Field(12.0, ge=3.0, le=26.0)
     position_p_gain: int = Field(800, ge=0, le=16383, description="register 84")
     pitch_p_gain: int = Field(
-        120, ge=0, le=16383, description="register 84 of the pitch joints: softer follows ground"
+        400, ge=0, le=16383, description="register 84 of the pitch joints: softer follows ground"
+    )
+    pitch_lead_s: float = Field(
+        0.25, ge=0.0, le=2.0, description="how early pitch goals are sent: filter and servo lag"
     )
     pitch_current_limit_a: float = Field(
-        0.2, gt=0.0, description="goal current of the pitch joints: current-based position mode"
+        0.1, gt=0.0, description="goal current of the pitch joints: current-based position mode"
     )
     armature_kg_m2: float = Field(
         0.045, ge=0.0, le=1.0, description="inertia of rotor and gears at the shaft, in simulation"

@@ -17,7 +17,7 @@ MotionName = Literal[
 class StatesConfig(Strict):
     """The library of body shapes ([PT] 2.5)."""
 
-    coefficients: int = Field(7, ge=1, le=20)
+    coefficients: int = Field(4, ge=1, le=20)
     random_count: int = Field(200, ge=0, le=100_000)
     gain_limit: float = Field(0.6, ge=0.0, le=1.0, description="least quasi-static eta_q kept")
     turn_limit_rad: float = Field(
@@ -28,13 +28,26 @@ class StatesConfig(Strict):
 class WalkConfig(Strict):
     """How states follow each other and how the measured pose steers (docs/method.md)."""
 
-    decision_fraction: float = Field(0.5, gt=0.05, le=1.0, description="of a body per decision")
-    carrot_m: float = Field(0.6, gt=0.05)
+    decision_fraction: float = Field(1.0, gt=0.05, le=1.0, description="of a state that is walked")
+    proposals: int = Field(
+        120, ge=1, le=1000, description="first states in the order of W: the smoothest of them ..."
+    )
+    candidates: int = Field(6, ge=1, le=50, description="... so many, are rolled out")
+    climb_progress: float = Field(
+        0.65, ge=0.0, le=1.0, description="under this predicted progress states ride on wide waves"
+    )
+    climb_share: float = Field(0.2, ge=0.0, le=1.0, description="of a state on a wide wave")
+    bend_limit_rad: float = Field(
+        2.4, ge=0.0, description="turn of the mean line over a body length, at most"
+    )
+    carrot_m: float = Field(0.6, gt=0.05, description="ahead on the path: where states aim")
     heading_tolerance_rad: float = Field(0.5, gt=0.0)
-    ramp_limit_rad: float = Field(0.8, ge=0.0)
     nearest_count: int = Field(12, ge=1, description="taken when no state is within tolerance")
+    ramp_limit_rad: float = Field(
+        0.8, ge=0.0, description="walk-blind: heading error that a ramp cancels on a piece"
+    )
     fallback: bool = Field(
-        True, description="after a waypoint was passed by, go on as a serpenoid until it is reached"
+        True, description="a serpenoid from the second miss of a waypoint on until it is reached"
     )
 
 

@@ -19,10 +19,12 @@ class Retarget:
             raise ValueError(f"{robot.name} has no yaw joint; a skeleton cannot be put on it")
         links = robot.joint_count + 1
         edges = np.concatenate([[0], yaw + 1, [links]])
-        self._at = edges * points / links
+        self.edges = edges * points / links
+        """(G + 1,) ends of the rigid groups, in points from the head."""
         self._yaw = yaw
         self._joints = robot.joint_count
-        self._group_of_link = np.repeat(np.arange(len(yaw) + 1), np.diff(edges))
+        self.group_of_link = np.repeat(np.arange(len(yaw) + 1), np.diff(edges))
+        """(L,) the rigid group of each link."""
         self._points = points
         self._link_length_m = robot.link_length_m
         self._length_m = robot.length_m
@@ -31,10 +33,10 @@ class Retarget:
         """(..., G) mean tangent angle over each rigid group; ``skeleton_rad`` is (..., points)."""
         zero = np.zeros((*skeleton_rad.shape[:-1], 1))
         area = np.concatenate([zero, np.cumsum(skeleton_rad, axis=-1)], axis=-1)
-        low = np.minimum(self._at.astype(int), self._points - 1)
-        part = self._at - low
+        low = np.minimum(self.edges.astype(int), self._points - 1)
+        part = self.edges - low
         at_edges = area[..., low] * (1.0 - part) + area[..., low + 1] * part
-        return np.asarray(np.diff(at_edges, axis=-1) / np.diff(self._at))
+        return np.asarray(np.diff(at_edges, axis=-1) / np.diff(self.edges))
 
     def joints_rad(self, skeleton_rad: Floats) -> Floats:
         """(..., J) joint angles; pitch joints are 0; the pitch fit sets them."""
@@ -46,7 +48,7 @@ class Retarget:
     def residual_m(self, skeleton_rad: Floats) -> Floats:
         """(...) largest distance between link ends and the skeleton, both centred on their mean."""
         skeleton = np.asarray(skeleton_rad, dtype=float)
-        links = self.group_headings_rad(skeleton)[..., self._group_of_link]
+        links = self.group_headings_rad(skeleton)[..., self.group_of_link]
         robot = _ends(links, self._link_length_m)
         fine = _ends(skeleton, self._length_m / self._points)
         at = np.linspace(0.0, self._points, links.shape[-1] + 1)

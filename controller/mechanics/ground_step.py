@@ -21,7 +21,7 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 Known = Literal["tail", "head"]
 _STEPS = 60
 _TOLERANCE = 1e-10  # of a segment length
-_FIELD = f"{readonly_array(dimensions=2, layout='C')}, float64, float64, float64"
+FIELD = f"{readonly_array(dimensions=2, layout='C')}, float64, float64, float64"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +93,8 @@ class GroundStep:
         return GroundedSkeleton(points, pitch, gap)
 
 
-@compiled(f"UniTuple(float64, 3)({_FIELD}, float64, float64)")
-def _plane(
+@compiled(f"UniTuple(float64, 3)({FIELD}, float64, float64)")
+def plane(
     z: Floats, x0: float, y0: float, spacing: float, x: float, y: float
 ) -> tuple[float, float, float]:
     """``HeightField.plane`` of one point: elevation and gradient."""
@@ -111,7 +111,7 @@ def _plane(
 
 
 @compiled(
-    f"void({_FIELD}, float64[:, ::1], float64[:, ::1], {readonly_array(dimensions=2)}, float64,"
+    f"void({FIELD}, float64[:, ::1], float64[:, ::1], {readonly_array(dimensions=2)}, float64,"
     f" {readonly_array()}, boolean, float64[:, :, ::1], float64[:, ::1], float64[:, ::1])"
 )
 def _place(
@@ -139,7 +139,7 @@ def _place(
     for t in range(frames):
         here = segments if from_tail else 0
         x, y = known_m[t, 0], known_m[t, 1]
-        ground, gx, gy = _plane(z_m, x0, y0, spacing, x, y)
+        ground, gx, gy = plane(z_m, x0, y0, spacing, x, y)
         z = ground + half_m[here]
         points[t, here, 0], points[t, here, 1], points[t, here, 2] = x, y, z
         miss = 0.0
@@ -157,7 +157,7 @@ def _place(
                 tilt = low if over > 0.0 else high
             for _ in range(_STEPS):
                 c, s = cos(tilt), sin(tilt)
-                ground, gx, gy = _plane(z_m, x0, y0, spacing, x + dx * c, y + dy * c)
+                ground, gx, gy = plane(z_m, x0, y0, spacing, x + dx * c, y + dy * c)
                 miss = level + r * s - ground
                 if not reachable or abs(miss) <= _TOLERANCE * r:
                     break

@@ -119,8 +119,8 @@ def _solved(
     quadratic: Floats,
     velocity: Floats,
 ) -> bool:
-    """``_balance`` of arrays of any layout."""
-    return _balance(
+    """``balance`` of arrays of any layout."""
+    return balance(
         np.ascontiguousarray(points_m, dtype=float),
         np.ascontiguousarray(headings_rad, dtype=float),
         np.ascontiguousarray(shape_m_s, dtype=float),
@@ -140,7 +140,7 @@ def _solved(
 def _power(
     rows: Floats, start: Floats, still: float, linear: Floats, quadratic: Floats, w: Floats
 ) -> float:
-    """Power that all links dissipate, less gravity's; arguments as in ``_balance``."""
+    """Power that all links dissipate, less gravity's; arguments as in ``balance``."""
     power = 0.0
     for i in range(3):
         power -= linear[i] * w[i]
@@ -173,7 +173,7 @@ def _is_unbounded(rows: Floats, linear: Floats, w: Floats) -> bool:
     "boolean(float64[:, ::1], float64[::1], float64[:, ::1], float64, float64, float64[::1],"
     " float64[::1], float64[:, ::1], float64[::1])"
 )
-def _balance(
+def balance(
     points_m: Floats,
     headings_rad: Floats,
     shape_m_s: Floats,

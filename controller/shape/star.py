@@ -13,6 +13,49 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 
 
+class StarVisits:
+    """What a walk on the star remembers of its V states: M, F, and the order of the last ones."""
+
+    def __init__(self, count: int) -> None:
+        self._visits = np.zeros(count, dtype=np.int64)
+        self._failures = np.zeros(count, dtype=np.int64)
+        self.taken = [0]
+        """States in the order in which they were taken; the walk begins on state 0."""
+        self._visits[0] = 1
+
+    @property
+    def distinct(self) -> int:
+        """States taken at least once."""
+        return int(np.count_nonzero(self._visits))
+
+    def take(self, state: int) -> None:
+        """Go on to a state; leaving for a visited one counts in F of the state left."""
+        if self._visits[state]:
+            self._failures[self.taken[-1]] += 1
+        self._visits[state] += 1
+        self.taken.append(state)
+
+    def order(
+        self, error_rad: Floats, tolerance_rad: float, nearest_count: int, rest: int = 1
+    ) -> tuple[Iterator[int], int]:
+        """Candidates, best first, and how many heads are within the tolerance.
+
+        Args:
+            error_rad: (V,) heading error of each state, were it next.
+            tolerance_rad: of the error.
+            nearest_count: how many of the nearest count where none is within the tolerance.
+            rest: the last so many states are left out.
+
+        """
+        size = np.abs(error_rad)
+        if rest < len(size):
+            size[self.taken[-rest:]] = np.inf
+        near = np.flatnonzero(size <= tolerance_rad)
+        pool = near if len(near) else np.argsort(size, kind="stable")[:nearest_count]
+        ranks = star_order(self._visits[pool], self._failures[pool], error_rad[pool])
+        return (int(pool[k]) for k in ranks), len(near)
+
+
 def star_order(M: Ints, F: Ints, heading_error_rad: Floats) -> Iterator[int]:
     """Candidates, best first; the first takes O(V), only then are the others sorted.
 

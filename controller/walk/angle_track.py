@@ -56,3 +56,7 @@ class AngleTrack:
         """Displacement (2,), in segments, of a head that follows the samples without slip."""
         angles = self._samples[start:stop] + rotation_rad
         return np.array([np.cos(angles).sum(), np.sin(angles).sum()])
+
+    def samples(self, start: int) -> Floats:
+        """Samples from ``start`` on."""
+        return self._samples[start:]

@@ -20,10 +20,12 @@ from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.rotations import offset_rad
 from snakewalk.controller.mechanics.pitch_fit import PitchFitter
+from snakewalk.controller.mechanics.rollout import PATH_STEP_M, PathTable
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.controller.walk.steering import PathPose
 from snakewalk.controller.walk.time_law import TimeLaw
 
 
@@ -45,6 +47,8 @@ _OFF_PATH_BODIES = 0.5
 
 # Segments of track that remain when the next piece is decided: the time law looks ahead.
 _LOOKAHEAD_SEGMENTS = 6.0
+_THINK_SEGMENTS = 9.0
+"""Track on which a decision is thought about, a little in each cycle, before it is needed."""
 _PITCH_SMOOTHING_S = 0.1
 
 # Shorter steps are saved up: they are too short to measure a speed.
@@ -52,8 +56,8 @@ _SHORTEST_STEP_S = 1e-5
 
 # Body lengths of track before another path may be planned: turning back takes about as much.
 _REPLAN_AFTER_BODIES = 2.0
-Planner = Callable[[Floats], SplinePath]
-"""Plans a path through (n, 2) points in order."""
+Planner = Callable[[Floats, float | None], SplinePath]
+"""Plans a path through (n, 2) points in order, from a heading where one is given."""
 
 
 class ShapeChooser(Protocol):
@@ -61,9 +65,44 @@ class ShapeChooser(Protocol):
 
     track: AngleTrack
 
+    def think(self, pose: PathPose) -> bool:
+        """Spend a cycle on the next decision; the first call after a decision takes the pose.
+
+        Returns:
+            Whether there is more to think about.
+
+        """
+        ...
+
+    def decide(self, pose: PathPose) -> Decision:
+        """Append the next piece, of what was thought if there was time for that."""
+        ...
+
+
+class AimedChooser(Protocol):
+    """Chooses by the direction of an aim alone."""
+
+    track: AngleTrack
+
     def decide(self, offset_rad: float, aim_rad: float) -> Decision:
         """Append the next piece towards the aim."""
         ...
+
+
+class Aimed:
+    """A ``ShapeChooser`` of one that needs no more than a direction, and no time."""
+
+    def __init__(self, chooser: AimedChooser) -> None:
+        self._chooser = chooser
+        self.track = chooser.track
+
+    def think(self, pose: PathPose) -> bool:
+        """Nothing: it decides at once."""
+        return False
+
+    def decide(self, pose: PathPose) -> Decision:
+        """Append the next piece towards the aim of ``pose``."""
+        return self._chooser.decide(pose.offset_rad, pose.aim_rad)
 
 
 class Pilot:
@@ -82,6 +121,7 @@ class Pilot:
         pace: Pace,
         plan: Planner,
         pitch_fitter: PitchFitter | None = None,
+        pitch_lead_s: float = 0.0,
         fall_back: Callable[[bool], None] | None = None,
         start_m: Floats,
         waypoints_m: Sequence[tuple[float, float]],
@@ -106,6 +146,8 @@ class Pilot:
         self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
         self._length_m = length_m
         self._plan_path(np.asarray(start_m, float), 0)
+        self._links = len(self._goal_rad) + 1
+        self._pitch_lead_s = pitch_lead_s
         self._segment_m = length_m / chooser.track.points
         self._carrot_m = carrot_m
         self._radius_m = waypoint_radius_m
@@ -114,6 +156,7 @@ class Pilot:
         self._start: tuple[Floats, float] | None = None
         self.reached = 0
         self._replan_after = 0.0
+        self._missed_before = -1
         self.missed = 0
         """How often a waypoint was passed outside its radius, and a new path was planned to it."""
         self.decision: Decision | None = None
@@ -186,10 +229,13 @@ class Pilot:
         followers_m = self._followers_m
         followers_m[0], followers_m[1] = view.centre_m[:2], view.link_m[0, :2]
         self.path.project(followers_m, self._along_m, self._gap_m)
-        self._count(followers_m[0], followers_m[1])
+        self._count(followers_m[0], followers_m[1], float(view.headings_rad.mean()))
         self.decision = None
-        if self.head >= self._chooser.track.end - _LOOKAHEAD_SEGMENTS:
-            self.decision = self._chooser.decide(*self._aim(view))
+        left = self._chooser.track.end - self.head
+        if left <= _LOOKAHEAD_SEGMENTS:
+            self.decision = self._chooser.decide(self._path_pose(view))
+        elif left <= _LOOKAHEAD_SEGMENTS + _THINK_SEGMENTS:
+            self._chooser.think(self._path_pose(view))
         if self.complete:
             self._time_law.stop()
         self._time_law.advance(dt_s)
@@ -202,7 +248,8 @@ class Pilot:
         """
         if self._pitch_fitter is None:
             return goal_rad
-        target = self._pitch_fitter(view.link_m[0], view.headings_rad).goal_rad
+        head_m, headings_rad = self._ahead(view)
+        target = self._pitch_fitter(head_m, headings_rad).goal_rad
         if self._pitch_rad is None:
             self._pitch_rad = target
         self._pitch_rad = self._pitch_rad + min(1.0, dt_s / _PITCH_SMOOTHING_S) * (
@@ -210,7 +257,27 @@ class Pilot:
         )
         return goal_rad + self._pitch_rad
 
-    def _count(self, centre_m: Floats, head_m: Floats) -> None:
+    def _ahead(self, view: BodyView) -> tuple[Floats, Floats]:
+        """Head (2,) and headings (L,) of the links when goals of now have become the pitch.
+
+        The body is taken to follow its track: goals for the ground under it now would come late.
+        """
+        track, head_m, headings_rad = self._chooser.track, view.link_m[0, :2], view.headings_rad
+        pulse = min(self._pitch_lead_s * self._time_law.speed_segments_s, track.end - self.head)
+        if pulse <= 0.0:
+            return head_m, headings_rad
+        turn = self._at_links(track.body_rad(self.head + pulse) - track.body_rad(self.head))
+        headings_rad = headings_rad + turn
+        forward = np.array([np.cos(headings_rad[0]), np.sin(headings_rad[0])])
+        return head_m + pulse * self._segment_m * forward, headings_rad
+
+    def _at_links(self, body: Floats) -> Floats:
+        """Values (L,) at the links' middles of values (N,) along the body."""
+        points = len(body)
+        at = (np.arange(self._links) + 0.5) * points / self._links - 0.5
+        return np.interp(at, np.arange(points), body)
+
+    def _count(self, centre_m: Floats, head_m: Floats, heading_rad: float) -> None:
         """Count a waypoint when the centre is near it; when it was passed by, go back for it."""
         if self.complete:
             return
@@ -220,10 +287,11 @@ class Pilot:
             self._fall_back(False)
         elif self._feedback and self.head >= self._replan_after and self._is_off_path(centre_m):
             self.missed += 1
-            self._fall_back(True)
+            self._fall_back(self.reached == self._missed_before)
+            self._missed_before = self.reached
             self._replan_after = self.head + _REPLAN_AFTER_BODIES * self._chooser.track.points
             with suppress(InputError):  # no safe path leads back from here: the old one stays
-                self._plan_path(head_m, self.reached)
+                self._plan_path(head_m, self.reached, heading_rad)
 
     def _is_off_path(self, centre_m: Floats) -> bool:
         """Whether the next waypoint was passed by, or the body is half its length off the path."""
@@ -238,14 +306,21 @@ class Pilot:
             or gap_m > _OFF_PATH_BODIES * self._length_m
         )
 
-    def _plan_path(self, from_m: Floats, first: int) -> None:
-        """Plan from a point through the waypoints from ``first`` on."""
-        self.path = self._plan(np.vstack([from_m, self._waypoints_m[first:]]))
+    def _plan_path(self, from_m: Floats, first: int, heading_rad: float | None = None) -> None:
+        """Plan from a point, with the body's heading, through the waypoints from ``first`` on."""
+        self.path = self._plan(np.vstack([from_m, self._waypoints_m[first:]]), heading_rad)
+        whole = np.arange(0.0, self.path.length_m, PATH_STEP_M)
+        self._table = PathTable.of(self.path.position(np.append(whole, self.path.length_m)))
         self._along_m = np.zeros(2)  # of the body's centre, and of its head
         self._passed_m = [0.0] * len(self._waypoints_m)
         at = 0.0
         for k in range(first, len(self._waypoints_m)):
             at = self._passed_m[k] = self.path.first_pass(self._waypoints_m[k], at)
+
+    def _path_pose(self, view: BodyView) -> PathPose:
+        offset, aim = self._aim(view)
+        at = round(self.along_m / PATH_STEP_M)
+        return PathPose(self.head, offset, view.centre_m[:2].copy(), aim, self._table, at)
 
     def _aim(self, view: BodyView) -> tuple[float, float]:
         """Offset from track to world, and the direction of the aim there."""
@@ -267,10 +342,7 @@ class Pilot:
         return offset, aim_rad(self.path, ahead_m, float(self._along_m[1]) + lead_m, self._carrot_m)
 
     def _measured(self, view: BodyView) -> tuple[float, Floats, Floats]:
-        body = self._chooser.track.body_rad(self.head)
-        links = len(view.link_m)
-        at = (np.arange(links) + 0.5) * self._chooser.track.points / links - 0.5
-        believed = np.interp(at, np.arange(len(body)), body)
+        believed = self._at_links(self._chooser.track.body_rad(self.head))
         return offset_rad(view.headings_rad, believed), view.link_m[0, :2], view.centre_m[:2]
 
     def _dead_reckoned(self, start_m: Floats, offset: float) -> Floats:

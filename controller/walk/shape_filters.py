@@ -16,6 +16,9 @@ from snakewalk.controller.mechanics.traction import quasi_static_gain
 from snakewalk.controller.shape.crossing import self_touches
 from snakewalk.controller.shape.library import ShapeFilter
 
+MADE = ("joint limits", "self-contact")
+"""Tests of what the robot can make at all; the others say which shapes are worth making."""
+
 
 def shape_filters(
     robot: RobotConfig, friction: FrictionConfig, states: StatesConfig, points: int = 100

@@ -1,20 +1,18 @@
-"""The snake walk as a motion source: shapes appended to the angle track, steered by the pose.
+"""The walk by the printed rule ([PT] 2.6.2): the next shape heads towards the aim.
 
-[PT] 2.6.2 with what a body with friction needs: a decision every half state, of which only the tail
-half is appended; a carrot on the path; a linear ramp that cancels the heading error
-of the chosen shape. ``decision_fraction = 1`` and ``ramp_limit_rad = 0`` is the printed rule.
+A linear ramp may cancel the heading error of the chosen shape; ``ramp_limit_rad = 0`` is the rule
+as printed. ``predictive_walker`` is the walk that runs on hills.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.run import WalkConfig
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.motion.path_progress import Decision
-from snakewalk.controller.shape.star import star_order
+from snakewalk.controller.shape.star import StarVisits
 from snakewalk.controller.walk.angle_track import AngleTrack
 
 Accept = Callable[[Floats], bool]
@@ -29,10 +27,7 @@ class Walker:
         self._shapes = shapes_rad
         self._walk = walk
         self._accept = accept
-        self._visits = np.zeros(len(shapes_rad), dtype=np.int64)
-        self._failures = np.zeros(len(shapes_rad), dtype=np.int64)
-        self._current = 0
-        self._visits[0] = 1
+        self._star = StarVisits(len(shapes_rad))
         self.track = AngleTrack(shapes_rad[0] - shapes_rad[0].mean())
 
     def decide(self, offset_rad: float, aim_rad: float) -> Decision:
@@ -46,29 +41,17 @@ class Walker:
         walk, track = self._walk, self.track
         placed = self._shapes + (track.last_rad - self._shapes[:, -1])[:, None]
         error = wrap(placed.mean(axis=1) + offset_rad - aim_rad)
-        size = np.abs(error)
-        size[self._current] = np.inf  # a walk leaves its state
-        near = np.flatnonzero(size <= walk.heading_tolerance_rad)
-        pool = near if len(near) else np.argsort(size, kind="stable")[: walk.nearest_count]
-        state = self._choose(pool, placed, error)
+        ranks, near = self._star.order(error, walk.heading_tolerance_rad, walk.nearest_count)
+        state = self._choose(ranks, placed, error)
         track.append(self._piece(placed[state], error[state]))
-        if self._visits[state]:
-            self._failures[self._current] += 1  # left for a state already visited (corrected F)
-        self._visits[state] += 1
-        self._current = state
+        self._star.take(state)
         ramp = self._ramp(error[state])
-        return Decision(state, float(error[state]), ramp, len(near), self.visited)
+        return Decision(state, float(error[state]), ramp, near, self._star.distinct)
 
-    @property
-    def visited(self) -> int:
-        """Distinct states visited so far."""
-        return int(np.count_nonzero(self._visits))
-
-    def _choose(self, pool: NDArray[np.intp], placed_rad: Floats, error_rad: Floats) -> int:
-        """First of ``pool`` in the order of W whose body is acceptable; the very first if none."""
+    def _choose(self, ranks: Iterator[int], placed_rad: Floats, error_rad: Floats) -> int:
+        """First in the order of W whose body is acceptable; the very first if none."""
         first = -1
-        for k in star_order(self._visits[pool], self._failures[pool], error_rad[pool]):
-            state = int(pool[k])
+        for state in ranks:
             if self._fits(self._piece(placed_rad[state], error_rad[state])):
                 return state
             first = state if first < 0 else first

@@ -9,12 +9,13 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import RunConfig, WalkConfig
+from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.runs.prepared_run import pose_with
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.mechanics.pitch_fit import PitchFitter
+from snakewalk.controller.mechanics.rollout import Rollout
 from snakewalk.controller.mechanics.traction import quasi_static_gain
 from snakewalk.controller.motion.source import MotionSource, Pace
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
@@ -24,9 +25,11 @@ from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.walk.joint_track import JointTrack
-from snakewalk.controller.walk.pilot import Pilot, ShapeChooser
-from snakewalk.controller.walk.serpenoid import Serpenoid, SerpenoidFallback
-from snakewalk.controller.walk.shape_filters import passes_all, shape_filters
+from snakewalk.controller.walk.pilot import Aimed, Pilot, ShapeChooser
+from snakewalk.controller.walk.predictive_walker import PredictiveWalker
+from snakewalk.controller.walk.serpenoid import Serpenoid
+from snakewalk.controller.walk.shape_filters import MADE, passes_all, shape_filters
+from snakewalk.controller.walk.steering import Steering
 from snakewalk.controller.walk.time_law import TimeLaw
 from snakewalk.controller.walk.walker import Walker
 
@@ -98,6 +101,12 @@ class WalkRun:
         return float(quasi_static_gain(some, self.world.friction).mean())
 
     @property
+    def pulse_segments_s(self) -> float:
+        """How fast the shape shall travel along the body."""
+        behaviour = self.run.behaviour
+        return behaviour.pulse_body_lengths_s * (1.0 - behaviour.sliding) * POINTS
+
+    @property
     def start_heading_rad(self) -> float:
         """Mean heading of the body at the start."""
         given = self.run.start_heading_rad
@@ -119,22 +128,24 @@ class WalkRun:
         ``level`` leaves the pitch joints at 0, whatever the ground.
         """
         run, robot = self.run, self.robot
-        pulse_segments_s = (
-            run.behaviour.pulse_body_lengths_s * (1.0 - run.behaviour.sliding) * POINTS
-        )
         chooser = self._chooser()
         return Pilot(
             chooser,
             TimeLaw(
                 JointTrack(chooser.track, self.retarget.joints_rad, robot.limit_rad),
-                pulse_segments_s,
+                self.pulse_segments_s,
                 speed_limit_rad_s=robot.joint_speed_limit_rad_s,
                 acceleration_limit_rad_s2=robot.joint_acceleration_limit_rad_s2,
             ),
             pace=Pace.limit(robot),
             plan=self.planner,
             pitch_fitter=None if level or self.ground is None else self.pitch_fitter,
-            fall_back=chooser.fall_back if isinstance(chooser, SerpenoidFallback) else None,
+            pitch_lead_s=robot.servo.pitch_lead_s,
+            fall_back=(
+                chooser.fall_back
+                if isinstance(chooser, PredictiveWalker) and run.walk.fallback
+                else None
+            ),
             start_m=np.array(run.start_m),
             waypoints_m=run.waypoints_m,
             length_m=robot.length_m,
@@ -187,15 +198,19 @@ class WalkRun:
 
     def _chooser(self) -> ShapeChooser:
         if self.run.motion == "serpenoid":
-            return Serpenoid(POINTS)
-        walk = self.run.walk
-        if self.run.motion == "walk-printed":
-            walk = WalkConfig(
-                decision_fraction=1.0,
-                ramp_limit_rad=0.0,
-                heading_tolerance_rad=walk.heading_tolerance_rad,
-                nearest_count=walk.nearest_count,
-            )
-        order = np.random.default_rng(self.run.seed).permutation(len(self.library.shapes_rad))
-        walker = Walker(self.library.shapes_rad[order], walk, passes_all(self.shape_filters))
-        return SerpenoidFallback(walker) if self.run.motion == "walk" and walk.fallback else walker
+            return Aimed(Serpenoid(POINTS))
+        run, walk = self.run, self.run.walk
+        order = np.random.default_rng(run.seed).permutation(len(self.library.shapes_rad))
+        shapes_rad = self.library.shapes_rad[order]
+        if run.motion == "walk-printed":
+            walk = walk.model_copy(update={"decision_fraction": 1.0, "ramp_limit_rad": 0.0})
+        if run.motion != "walk":
+            return Aimed(Walker(shapes_rad, walk, passes_all(self.shape_filters)))
+        rollout = Rollout(self.robot, self.world.friction, self.ground, POINTS)
+        return PredictiveWalker(
+            shapes_rad,
+            walk,
+            lambda track: Steering(rollout, track, self.pulse_segments_s),
+            len(self.robot.yaw_joints),
+            passes_all({name: self.shape_filters[name] for name in MADE}),
+        )

@@ -121,7 +121,7 @@ def test_beyond_the_border_the_edge_goes_on_level() -> None:
     np.testing.assert_allclose(placed.pitch_rad[:20], 0.0, atol=1e-8)
 
 
-@pytest.mark.parametrize("plane", [ground_step._plane, ground_step._plane.py_func])
+@pytest.mark.parametrize("plane", [ground_step.plane, ground_step.plane.py_func])
 def test_the_look_up_of_one_point_is_that_of_the_field(plane: Callable[..., Any]) -> None:
     field = rough(9, 0.1)
     x, y = np.random.default_rng(2).uniform(-1.6, 1.6, (2, 200))

@@ -34,7 +34,7 @@ def test_the_track_refuses_to_be_read_beyond_its_ends() -> None:
 
 def test_a_piece_continues_the_head_without_a_step() -> None:
     library = shapes(50)
-    walker = Walker(library, WalkConfig())
+    walker = Walker(library, WalkConfig(decision_fraction=0.5))
     for _ in range(40):
         end = walker.track.end
         walker.decide(0.3, RNG.uniform(-3, 3))
@@ -45,7 +45,7 @@ def test_a_piece_continues_the_head_without_a_step() -> None:
 
 def test_the_ramp_cancels_the_heading_error_within_its_limit() -> None:
     library = shapes(200)
-    walker = Walker(library, WalkConfig(heading_tolerance_rad=3.2))
+    walker = Walker(library, WalkConfig(decision_fraction=0.5, heading_tolerance_rad=3.2))
     aim = 0.4
     for _ in range(30):
         decision = walker.decide(0.0, aim)
@@ -55,7 +55,7 @@ def test_the_ramp_cancels_the_heading_error_within_its_limit() -> None:
 
 
 def test_unvisited_states_come_first_and_none_is_repeated_before_all_are_seen() -> None:
-    walker = Walker(shapes(30), WalkConfig(heading_tolerance_rad=10.0))
+    walker = Walker(shapes(30), WalkConfig(decision_fraction=0.5, heading_tolerance_rad=10.0))
     states = [walker.decide(0.0, 0.0).state for _ in range(29)]
     assert sorted([0, *states]) == list(range(30))
 

@@ -42,8 +42,9 @@ def test_trials_never_fork_beside_the_physics(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(os, "fork", forked)
     changes = {"time_limit_s": 0.5}
-    (trial,) = trials("flat-slalom", [Case("serpenoid")], 1, 1, changes)
-    assert trial.refused is None
+    planned = [(Case("flat-slalom", "serpenoid"), 0)]
+    (trial,) = trials(planned, 1, spread_m=0.0, changes=changes)
+    assert trial.cause == "time"
     assert trial.duration_s > 0.0
 
 

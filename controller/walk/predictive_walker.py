@@ -1,0 +1,266 @@
+"""The snake walk that predicts: W proposes shapes, a rollout says where each would carry the body.
+
+[PT] 2.6.2 with what a body on a slope needs. A state is walked for a part of its length; every
+tenth of a body the rest of it is bent anew, as far as the head has not been there. States and bends
+are judged by ``Steering``. W orders the states, so that the walk never repeats itself; the rollout
+chooses among the first of them.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Indices
+from snakewalk.config.run import WalkConfig
+from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.motion.path_progress import Decision
+from snakewalk.controller.shape.star import StarVisits
+from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.controller.walk.serpenoid import SERPENOID, SerpenoidParameters, phase_at_end
+from snakewalk.controller.walk.steering import PathPose, Steering
+
+PIECES = 10
+"""Decisions per body length."""
+CLIMBING = (
+    SerpenoidParameters(amplitude_rad=1.1, waves=1.1),
+    SerpenoidParameters(amplitude_rad=1.3, waves=1.0),
+)
+"""Carriers of states uphill. On paper a slope of 15 degrees leaves the first 0.27 of the progress
+without slip, one of 18 degrees the second 0.17, and a fifth of a state takes 0.02 of that."""
+_JOIN = 0.1
+"""Of a body: in this a state that repeats itself goes from its head's angle to its tail's."""
+_REST = 20
+"""Decisions in which no state comes again."""
+_BATCH = 6
+"""Rollouts in a cycle: 1 to 3 ms of a processor of 2020."""
+_SCREEN = 0.5 * np.array([-1.0, 0.0, 1.0])
+_GRID = (np.linspace(-1.0, 1.0, 5), np.linspace(-1.0, 1.0, 3))
+_AROUND = np.array(
+    [[-1, 0], [1, 0], [0, -1], [0, 1], [-1, -1], [1, 1], [-1, 1], [1, -1]], dtype=float
+)
+_FINER = np.array([0.25, 0.5])
+"""Steps to the neighbours of the best of the grid: half of the grid's."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Option:
+    """A wave that may come next, without its bend."""
+
+    state: int
+    base_rad: float
+    """Angle of its mean line at its begin."""
+    wave_rad: Floats
+    """(n,) what comes, oldest first, about the mean line; a body length of it is rolled out."""
+    carrier: SerpenoidParameters | None = None
+    """Wide wave on which the state rides uphill; None on easier ground."""
+    carrier_at: int = 0
+    """Sample of the carrier at the begin."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """A piece of track, and what its rollout costs."""
+
+    cost_m2: float
+    progress: float
+    """Over that at the wanted pulse without slip."""
+    option: _Option
+    bends: Floats
+    """(2,) of the mean line over the first and the second half body, over the limit."""
+    piece_rad: Floats
+
+
+class PredictiveWalker:
+    """Grows an ``AngleTrack`` from a library of shapes (S, N), head first."""
+
+    def __init__(
+        self,
+        shapes_rad: Floats,
+        walk: WalkConfig,
+        make_steering: Callable[[AngleTrack], Steering],
+        joints: int,
+        accept: Callable[[Floats], bool] = lambda body: True,
+    ) -> None:
+        """Start on the first shape.
+
+        Args:
+            shapes_rad: the library; zero means.
+            walk: limits of what is proposed.
+            make_steering: for the track that this walker grows.
+            joints: of yaw, along the body.
+            accept: whether a body (N,) may be made: joints within limits, nothing touches.
+
+        """
+        if len(shapes_rad) == 0:
+            raise ValueError("the walk needs at least one shape")
+        self._shapes, self._walk, self._accept = shapes_rad, walk, accept
+        self._star = StarVisits(len(shapes_rad))
+        self.track = AngleTrack(shapes_rad[0])
+        self.steering = make_steering(self.track)
+        points = self.track.points
+        self._keep = max(1, round(points / PIECES))
+        self._span = max(2, round(points / (joints + 1)))
+        self._walked = max(1, round(walk.decision_fraction * points))
+        self._at = self._until = 0
+        self._option: _Option | None = None
+        self._base_rad = 0.0
+        self._bends = np.zeros(2)
+        self._near = 0
+        self._tried: list[_Tried] = []
+        self._thinking: Iterator[bool] | None = None
+        self._plain: SerpenoidParameters | None = None
+
+    def fall_back(self, lost: bool) -> None:
+        """Set whether to go on as a serpenoid: at the very last, steered the same way."""
+        if lost and self._plain is None:
+            self._plain = SerpenoidParameters()
+            self._base_rad, self._at = phase_at_end(self.track, self._plain)
+            self._thinking = None
+        elif not lost and self._plain is not None:
+            self._plain, self._until, self._thinking = None, 0, None
+
+    def think(self, pose: PathPose) -> bool:
+        """Spend a cycle on the next decision; the first call takes the pose.
+
+        Returns:
+            Whether there is more to think about.
+
+        """
+        if self._thinking is None:
+            self.steering.observe(pose)
+            self._tried = []
+            self._thinking = self._judge(pose)
+        return next(self._thinking, False)
+
+    def decide(self, pose: PathPose) -> Decision:
+        """Append the best piece of those judged so far; at rest, of all."""
+        if self._thinking is None:
+            self.think(pose)
+        while self.track.end == self.track.points and self.think(pose):
+            pass
+        self._thinking = None
+        best = self._best()
+        option, keep = best.option, self._keep
+        if self._is_new:
+            self._star.take(option.state)
+            self._at, self._option = 0, option
+            self._until = self._walked
+        self.track.append(best.piece_rad[:keep])
+        bend = best.bends[0] * self._walk.bend_limit_rad
+        self._base_rad = option.base_rad + bend * keep / self.track.points
+        self._at += keep
+        self._bends = best.bends
+        error = float(wrap(self._base_rad + pose.offset_rad - pose.aim_rad))
+        return Decision(option.state, error, float(bend), self._near, self._star.distinct)
+
+    @property
+    def _is_new(self) -> bool:
+        """Whether the next piece begins another state."""
+        return self._plain is None and self._at >= self._until
+
+    def _best(self) -> _Tried:
+        """Cheapest piece whose body may be made; the cheapest if none may."""
+        ranked = sorted(self._tried, key=lambda each: each.cost_m2)
+        old = self.track.body_rad(self.track.end)[: self.track.points - self._keep]
+        for each in ranked:
+            if self._accept(np.concatenate([each.piece_rad[: self._keep][::-1], old])):
+                return each
+        return ranked[0]
+
+    def _judge(self, pose: PathPose) -> Iterator[bool]:
+        """Judge options and bends, a batch at a time, the most likely ones first."""
+        first = np.append(np.column_stack([_SCREEN, np.zeros(3)]), [self._bends], axis=0)
+        yield from self._screen(pose, self._options(pose), first)
+        if self._is_new and self._best_so_far().progress < self._walk.climb_progress:
+            for carrier in CLIMBING:
+                yield from self._screen(pose, self._options(pose, carrier), first)
+        option = self._best_so_far().option
+        grid = np.stack(np.meshgrid(*_GRID), axis=-1).reshape(-1, 2)
+        yield from self._screen(pose, [option], grid)
+        for finer in (_FINER, 0.5 * _FINER):
+            best = self._best_so_far()
+            near = np.clip(best.bends + finer * _AROUND, -1.0, 1.0)
+            yield from self._screen(pose, [best.option], near)
+
+    def _screen(self, pose: PathPose, options: list[_Option], bends: Floats) -> Iterator[bool]:
+        """Roll out every option with every row of ``bends`` (C, 2)."""
+        tried = [(option, each) for option in options for each in bends]
+        for k in range(0, len(tried), _BATCH):
+            self._roll(pose, tried[k : k + _BATCH])
+            yield True
+
+    def _best_so_far(self) -> _Tried:
+        return min(self._tried, key=lambda each: each.cost_m2)
+
+    def _roll(self, pose: PathPose, tried: list[tuple[_Option, Floats]]) -> None:
+        bends = np.array([each for _, each in tried])
+        points = self.track.points
+        waves = np.array([option.base_rad + option.wave_rad[:points] for option, _ in tried])
+        pieces = waves + self._bent(bends, waves.shape[1])
+        cost_m2, progress = self.steering.judge(pose, pieces)
+        self._tried += [
+            _Tried(float(cost_m2[k]), float(progress[k]), option, bends[k], pieces[k])
+            for k, (option, _) in enumerate(tried)
+        ]
+
+    def _bent(self, bends: Floats, count: int) -> Floats:
+        """Turn (C, count) of mean lines by ``bends`` (C, 2)."""
+        points, limit = self.track.points, self._walk.bend_limit_rad
+        k, half = np.arange(1, count + 1), points // 2
+        first, second = np.minimum(k, half) / points, np.maximum(k - half, 0) / points
+        return np.asarray(limit * (bends[:, :1] * first + bends[:, 1:] * second))
+
+    def _options(self, pose: PathPose, carrier: SerpenoidParameters | None = None) -> list[_Option]:
+        """What may come next: the rest of the state, or the smoothest of the first states of W."""
+        points, walk = self.track.points, self._walk
+        if self._plain is not None:
+            wave = self._plain.wave_rad(self._at + np.arange(points), points)
+            self._near = 1
+            return [_Option(SERPENOID, self._base_rad, wave)]
+        if self._option is not None and not self._is_new:
+            going_on = self._option.wave_rad[self._at :]
+            return [_Option(self._option.state, self._base_rad, going_on)]
+        share, at = (1.0, 0) if carrier is None else (walk.climb_share, self._phase(carrier))
+        carried = np.zeros(self._walked + points + 1)
+        if carrier is not None:
+            carried = carrier.wave_rad(at - 1 + np.arange(len(carried)), points)
+        placed = self.track.last_rad - share * self._shapes[:, -1] - carried[0]
+        error = wrap(placed + pose.offset_rad - pose.aim_rad)
+        ranks, self._near = self._star.order(
+            error, walk.heading_tolerance_rad, walk.nearest_count, _REST
+        )
+        states = np.array(list(islice(ranks, walk.proposals)))
+        waves = share * self._waves_rad(states) + carried[1:]
+        rough = self._roughness(placed[states, None] + waves[:, : self._walked])
+        return [
+            _Option(int(states[k]), float(placed[states[k]]), waves[k], carrier, at)
+            for k in np.argsort(rough, kind="stable")[: walk.candidates]
+        ]
+
+    def _phase(self, carrier: SerpenoidParameters) -> int:
+        """Sample of a carrier that comes next: it goes on, or begins as the track bends."""
+        option = self._option
+        if option is not None and option.carrier is carrier:
+            return option.carrier_at + self._at
+        return phase_at_end(self.track, carrier)[1]
+
+    def _waves_rad(self, states: Indices) -> Floats:
+        """(n, m) what follows the tails' angles, oldest first; a state repeats itself."""
+        shapes = self._shapes[states][:, ::-1]
+        join = round(_JOIN * shapes.shape[1]) + 2
+        joined = np.linspace(shapes[:, -1], shapes[:, 0], join, axis=1)
+        whole = np.concatenate([shapes, joined[:, 1:-1]], axis=1)
+        count = self._walked + self.track.points
+        return np.take(whole, np.arange(1, count + 1), axis=1, mode="wrap")
+
+    def _roughness(self, angles_rad: Floats) -> Floats:
+        """Mean square (n,) of what joints on angles (n, m) accelerate, in a unit of their own."""
+        span = self._span
+        tail = self.track.at_rad(np.arange(self.track.end - 2.0 * span, self.track.end))
+        rows = np.concatenate([np.tile(tail, (len(angles_rad), 1)), angles_rad], axis=1)
+        total = np.cumsum(rows, axis=1)
+        mean = (total[:, span:] - total[:, :-span]) / span
+        joint = mean[:, span:] - mean[:, :-span]
+        return np.asarray((np.diff(joint, 2, axis=1) ** 2).mean(axis=1))

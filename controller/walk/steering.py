@@ -1,0 +1,129 @@
+"""Predictive steering: of several pieces of track, the one whose rollout follows the path best.
+
+What the body does beside the prediction, per length of pulse, is identified while it moves and
+added to every rollout: friction that differs from the configured, uneven loads, a soft joint.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.mechanics.rollout import Drift, PathTable, PlanarPose, Rolled, Rollout
+from snakewalk.controller.walk.angle_track import AngleTrack
+
+
+@dataclass(frozen=True, slots=True)
+class PathPose:
+    """Where the body is, and where its path leads."""
+
+    head: float
+    """Segments that the head has travelled along the track."""
+    offset_rad: float
+    """Rotation from the track's angles to the world."""
+    centre_m: Floats
+    """(2,) centre of mass."""
+    aim_rad: float
+    """Direction to the carrot on the path, in the world."""
+    path: PathTable
+    """The path in force."""
+    path_at: int
+    """Index of the path's point nearest to the centre."""
+
+
+@dataclass(frozen=True, slots=True)
+class SteeringWeights:
+    """What a rollout costs, in square metres; chosen on seeds that no table shows."""
+
+    off_path: float = 1.0
+    """Mean square distance of the centre from the path."""
+    end: float = 1.0
+    """Its square at the end of the rollout."""
+    head: float = 0.5
+    """The head's."""
+    heading_m: float = 0.3
+    """Lever on which the heading error at the end counts as a distance."""
+    delay_m2: float = 0.1
+    """For standing still; in proportion less for progress at up to the wanted pulse."""
+
+
+_SPAN_SEGMENTS = 40.0
+_UPDATE = 0.25
+"""Share of a new measurement in the drift: its memory is four decisions, 0.4 body lengths."""
+
+
+class Steering:
+    """Judges pieces of track by where they would carry the body."""
+
+    def __init__(
+        self,
+        rollout: Rollout,
+        track: AngleTrack,
+        cruise_segments_s: float,
+        weights: SteeringWeights | None = None,
+    ) -> None:
+        self._rollout = rollout
+        self._track = track
+        self._cruise = cruise_segments_s
+        self._weights = weights or SteeringWeights()
+        self._past: deque[PathPose] = deque()
+        self.drift = Drift()
+        """Identified so far."""
+
+    def observe(self, pose: PathPose) -> None:
+        """Compare what the body did over the last span of pulse with its prediction."""
+        past = self._past
+        past.append(pose)
+        while len(past) > 2 and past[1].head <= pose.head - _SPAN_SEGMENTS:
+            past.popleft()
+        before = past[0]
+        pulse = pose.head - before.head
+        if pulse < 0.5 * _SPAN_SEGMENTS:
+            return
+        made = self._roll(before, np.empty((1, 0)), Drift(), until=pose.head)
+        gap_m = pose.centre_m - made.centre_m[0]
+        mean = pose.offset_rad + float(self._track.body_rad(pose.head).mean())
+        c, s = np.cos(mean), np.sin(mean)
+        turn = float(wrap(pose.offset_rad - made.offset_rad[0]))
+        seen = c * gap_m[0] + s * gap_m[1], c * gap_m[1] - s * gap_m[0], turn
+        was = self.drift.ahead_m, self.drift.left_m, self.drift.turn_rad
+        self.drift = Drift(
+            *(w + _UPDATE * (float(v) / pulse - w) for v, w in zip(seen, was, strict=True))
+        )
+
+    def judge(self, pose: PathPose, pieces_rad: Floats) -> tuple[Floats, Floats]:
+        """Roll out pieces (C, n) that would be appended to the track.
+
+        Returns:
+            Cost (C,) in square metres; progress (C,) along the path, over that at the wanted pulse
+            without slip.
+
+        """
+        weights, rolled = self._weights, self._roll(pose, pieces_rad, self.drift)
+        progress = rolled.along_m / (rolled.time_s * self._cruise * self._rollout.segment_m)
+        cost = (
+            weights.off_path * rolled.off_path_m**2
+            + weights.end * rolled.end_off_m**2
+            + weights.head * rolled.head_off_m**2
+            + (weights.heading_m * rolled.heading_rad) ** 2
+            + weights.delay_m2 * (1.0 - progress)
+        )
+        return np.asarray(cost), np.asarray(progress)
+
+    def _roll(
+        self, pose: PathPose, pieces_rad: Floats, drift: Drift, until: float | None = None
+    ) -> Rolled:
+        start = max(int(pose.head) - self._track.points - 1, 0)
+        return self._rollout(
+            self._track.samples(start),
+            pieces_rad,
+            pose.head - start,
+            PlanarPose(pose.centre_m, pose.offset_rad),
+            pose.path,
+            pose.path_at,
+            self._cruise,
+            drift,
+            None if until is None else until - start,
+        )
