@@ -90,7 +90,7 @@ def examine(
     robot, friction = load_robot(robot_name), load_world(world_name).friction
     track, states = load_track(name_or_path, rate_hz), StatesConfig()
     wave = measure_wave(track)
-    shapes = to_angles(to_states(track.angles_rad, states.coefficients))
+    shapes = to_angles(to_states(track.angles_rad))
     refused: dict[str, int] = {}
     kept = shapes
     for reason, refuse in shape_filters(robot, friction, states).items():
@@ -112,7 +112,7 @@ def examine(
         time_towards_head=round(wave.headward, 2),
         bend_k_rad=round(float(np.median(track.bend_rad)), 2),
         bend_k_most_rad=round(float(track.bend_rad.max()), 2),
-        energy_kept=round(float(energy_kept(track.angles_rad, states.coefficients).mean()), 4),
+        energy_kept=round(float(energy_kept(track.angles_rad).mean()), 4),
         robot=robot.name,
         states_kept=len(kept),
         states_refused=refused,
