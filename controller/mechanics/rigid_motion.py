@@ -92,15 +92,51 @@ def inertial_velocity(
 
     """
     velocity = np.zeros(3) if guess is None else np.array(guess, dtype=float)
-    inertia = 1.0 / (GRAVITY_M_S2 * step_s)
-    x, y = points_m[:, 0], points_m[:, 1]
-    links, sx, sy = float(len(x)), x.sum(), y.sum()
-    quadratic = inertia * np.array([[links, 0.0, -sy], [0.0, links, sx], [-sy, sx, x @ x + y @ y]])
-    linear = inertia * _wrench(points_m, before_m_s - shape_m_s)
+    linear, quadratic = np.zeros(3), np.empty((3, 3))
+    add_inertia(points_m, shape_m_s, before_m_s, step_s, linear, quadratic)
     if tangential is not None:
         linear += _wrench(points_m, tangential)
     _solved(points_m, headings_rad, shape_m_s, friction, normal, linear, quadratic, velocity)
     return velocity
+
+
+@compiled(
+    "void(float64[:, :], float64[:, :], float64[:, :], float64, float64[::1], float64[:, ::1])"
+)
+def add_inertia(
+    points_m: Floats,
+    shape_m_s: Floats,
+    before_m_s: Floats,
+    step_s: float,
+    linear: Floats,
+    quadratic: Floats,
+) -> None:
+    """Inertia of a step in the power per weight of a link; as in ``inertial_velocity``.
+
+    Args:
+        points_m: (L, 2)
+        shape_m_s: (L, 2)
+        before_m_s: (L, 2)
+        step_s: of time.
+        linear: (3,) gains the part that is linear in (vx, vy, omega).
+        quadratic: (3, 3) becomes that of their products.
+
+    """
+    mass = 1.0 / (GRAVITY_M_S2 * step_s)
+    quadratic[:] = 0.0
+    for i in range(len(points_m)):
+        x, y = points_m[i, 0], points_m[i, 1]
+        px = mass * (before_m_s[i, 0] - shape_m_s[i, 0])
+        py = mass * (before_m_s[i, 1] - shape_m_s[i, 1])
+        linear[0] += px
+        linear[1] += py
+        linear[2] += x * py - y * px
+        quadratic[0, 0] += mass
+        quadratic[1, 1] += mass
+        quadratic[2, 2] += mass * (x * x + y * y)
+        quadratic[0, 2] -= mass * y
+        quadratic[1, 2] += mass * x
+    quadratic[2, 0], quadratic[2, 1] = quadratic[0, 2], quadratic[1, 2]
 
 
 def _wrench(points_m: Floats, force: Floats) -> Floats:

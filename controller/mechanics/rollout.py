@@ -11,13 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
-from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.mechanics.ground_step import FIELD, plane
-from snakewalk.controller.mechanics.rigid_motion import balance
+from snakewalk.controller.mechanics.rigid_motion import add_inertia, balance
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 _STEP_SEGMENTS = 2.5
@@ -276,30 +275,6 @@ def _pull(
 
 
 @compiled(
-    "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, float64[::1],"
-    " float64[:, ::1])"
-)
-def _add_inertia(
-    points: Floats, shape: Floats, moving: Floats, step_s: float, linear: Floats, inertia: Floats
-) -> None:
-    """Inertia of a step as terms of the power, as in ``rigid_motion.inertial_velocity``."""
-    mass = 1.0 / (GRAVITY_M_S2 * step_s)
-    inertia[:] = 0.0
-    for i in range(len(points)):
-        x, y = points[i, 0], points[i, 1]
-        vx, vy = mass * (moving[i, 0] - shape[i, 0]), mass * (moving[i, 1] - shape[i, 1])
-        linear[0] += vx
-        linear[1] += vy
-        linear[2] += x * vy - y * vx
-        inertia[0, 0] += mass
-        inertia[1, 1] += mass
-        inertia[2, 2] += mass * (x * x + y * y)
-        inertia[0, 2] -= mass * y
-        inertia[1, 2] += mass * x
-    inertia[2, 0], inertia[2, 1] = inertia[0, 2], inertia[1, 2]
-
-
-@compiled(
     f"void({readonly_array(layout='C')}, float64[:, ::1], float64, int64, float64, float64[::1],"
     f" {FIELD}, float64[::1], int64[::1], float64[::1], float64[:, ::1], int64, float64,"
     " float64[::1], float64[:, ::1])"
@@ -352,7 +327,7 @@ def _roll(
             if not level:
                 _pull(z_m, x0, y0, spacing, x, y, points, normal, linear)
             if not balance(points, heading, shape, along, across, normal, linear, none, velocity):
-                _add_inertia(points, shape, moving, dt, linear, inertia)
+                add_inertia(points, shape, moving, dt, linear, inertia)
                 balance(points, heading, shape, along, across, normal, linear, inertia, velocity)
             for i in range(links):
                 moving[i, 0] = shape[i, 0] + velocity[0] - velocity[2] * points[i, 1]

@@ -65,8 +65,8 @@ class ShapeChooser(Protocol):
 
     track: AngleTrack
 
-    def think(self, pose: PathPose) -> bool:
-        """Spend a cycle on the next decision; the first call after a decision takes the pose.
+    def think(self, look: Callable[[], PathPose]) -> bool:
+        """Spend a cycle on the next decision; only the first call after a decision looks.
 
         Returns:
             Whether there is more to think about.
@@ -96,7 +96,7 @@ class Aimed:
         self._chooser = chooser
         self.track = chooser.track
 
-    def think(self, pose: PathPose) -> bool:
+    def think(self, look: Callable[[], PathPose]) -> bool:
         """Nothing: it decides at once."""
         return False
 
@@ -235,7 +235,7 @@ class Pilot:
         if left <= _LOOKAHEAD_SEGMENTS:
             self.decision = self._chooser.decide(self._path_pose(view))
         elif left <= _LOOKAHEAD_SEGMENTS + _THINK_SEGMENTS:
-            self._chooser.think(self._path_pose(view))
+            self._chooser.think(lambda: self._path_pose(view))
         if self.complete:
             self._time_law.stop()
         self._time_law.advance(dt_s)

@@ -121,14 +121,15 @@ class PredictiveWalker:
         elif not lost and self._plain is not None:
             self._plain, self._until, self._thinking = None, 0, None
 
-    def think(self, pose: PathPose) -> bool:
-        """Spend a cycle on the next decision; the first call takes the pose.
+    def think(self, look: Callable[[], PathPose]) -> bool:
+        """Spend a cycle on the next decision; only the first call looks where the body is.
 
         Returns:
             Whether there is more to think about.
 
         """
         if self._thinking is None:
+            pose = look()
             self.steering.observe(pose)
             self._tried = []
             self._thinking = self._judge(pose)
@@ -137,8 +138,8 @@ class PredictiveWalker:
     def decide(self, pose: PathPose) -> Decision:
         """Append the best piece of those judged so far; at rest, of all."""
         if self._thinking is None:
-            self.think(pose)
-        while self.track.end == self.track.points and self.think(pose):
+            self.think(lambda: pose)
+        while self.track.end == self.track.points and self.think(lambda: pose):
             pass
         self._thinking = None
         best = self._best()

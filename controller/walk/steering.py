@@ -62,12 +62,11 @@ class Steering:
         rollout: Rollout,
         track: AngleTrack,
         cruise_segments_s: float,
-        weights: SteeringWeights | None = None,
     ) -> None:
         self._rollout = rollout
         self._track = track
         self._cruise = cruise_segments_s
-        self._weights = weights or SteeringWeights()
+        self._weights = SteeringWeights()
         self._past: deque[PathPose] = deque()
         self.drift = Drift()
         """Identified so far."""

@@ -82,12 +82,12 @@ def test_thinking_in_cycles_decides_what_thinking_at_once_decides() -> None:
     for _ in range(12):
         here = pose(in_cycles.track)
         cycles = 1
-        while in_cycles.think(here):
+        while in_cycles.think(lambda here=here: here):
             cycles += 1
         assert cycles < 20
         # a later pose is not looked at: the decision is about the one that thinking began with
         late = in_cycles.decide(pose(in_cycles.track, offset_rad=0.4))
-        while at_once.think(here):
+        while at_once.think(lambda here=here: here):
             pass
         made = at_once.decide(here)
         assert made.state == late.state
@@ -99,7 +99,7 @@ def test_a_decision_that_comes_too_early_takes_the_best_so_far() -> None:
     chooser = walker(5)
     chooser.decide(pose(chooser.track))
     end = chooser.track.end
-    chooser.think(pose(chooser.track))
+    chooser.think(lambda: pose(chooser.track))
     made = chooser.decide(pose(chooser.track))
     assert chooser.track.end == end + 10
     assert abs(made.ramp_rad) <= 2.4
