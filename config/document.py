@@ -30,10 +30,6 @@ seed = 3                         [servo]
                                  model = "XL330-M288"
 [behaviour]                      supply_v = 5.0
 pulse_body_lengths_s = 0.2
-
-[safety]                         # for 12 V servos these have defaults
-voltage_min_v = 4.0
-voltage_max_v = 6.0
 ```
 
 Units are in the names: `_m`, `_rad`, `_s`, `_a` (ampere), `_v`, `_c` (Celsius), `_kg`, `_n_m`.

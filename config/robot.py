@@ -16,6 +16,12 @@ class ServoConfig(Strict):
     first_id: int = Field(1, ge=0, le=252, description="ID of the joint next to the head")
     baud: Baud = 1_000_000
     supply_v: float = Field(12.0, ge=3.0, le=26.0)
+    supply_min_v: float | None = Field(
+        None, gt=0.0, description="a run stops below; default: 10/12 of supply_v"
+    )
+    supply_max_v: float | None = Field(
+        None, gt=0.0, description="a run stops above; default: 14.8/12 of supply_v"
+    )
     position_p_gain: int = Field(800, ge=0, le=16383, description="register 84")
     pitch_p_gain: int = Field(
         400, ge=0, le=16383, description="register 84 of the pitch joints: softer follows ground"
@@ -32,6 +38,25 @@ class ServoConfig(Strict):
     gear_drag_n_m_s: float = Field(
         0.03, ge=0.0, le=10.0, description="viscous loss of the gears at the shaft, in simulation"
     )
+
+    @model_validator(mode="after")
+    def _supply_is_within_its_limits(self) -> Self:
+        low_v, high_v = self.supply_limits_v
+        if not low_v <= self.supply_v <= high_v:
+            raise ValueError(
+                f"supply_v = {self.supply_v:g} is not within supply_min_v = {low_v:g} and "
+                f"supply_max_v = {high_v:g}"
+            )
+        return self
+
+    @property
+    def supply_limits_v(self) -> tuple[float, float]:
+        """Least and greatest supply of a run that gives none of its own."""
+        low_v, high_v = self.supply_min_v, self.supply_max_v
+        return (
+            self.supply_v * 10.0 / 12.0 if low_v is None else low_v,
+            self.supply_v * 14.8 / 12.0 if high_v is None else high_v,
+        )
 
 
 class BellyConfig(Strict):
@@ -123,6 +148,10 @@ class RobotConfig(Strict):
     def servo_ids(self) -> tuple[int, ...]:
         """Bus IDs, head first."""
         return tuple(range(self.servo.first_id, self.servo.first_id + self.joint_count))
+
+    def joint_name(self, joint: int) -> str:
+        """Name of a joint in all messages: its place, counted from 1 at the head, and servo ID."""
+        return f"joint {joint + 1} (ID {self.servo_ids[joint]})"
 
     @property
     def yaw_joints(self) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from snakewalk.config.base import Strict
 from snakewalk.config.camera import CameraConfig, PoseName
 from snakewalk.config.gait import GaitConfig
 from snakewalk.config.playback import PlaybackConfig
+from snakewalk.config.robot import ServoConfig
 
 MotionName = Literal[
     "walk", "walk-printed", "walk-blind", "serpenoid", "gait", "playback", "repertoire", "source"
@@ -67,8 +68,12 @@ class SafetyConfig(Strict):
     current_limit_a: float = Field(2.0, gt=0.0)
     current_time_s: float = Field(0.5, ge=0.0, description="how long it may be exceeded")
     temperature_limit_c: float = Field(70.0, gt=0.0)
-    voltage_min_v: float = Field(10.0, gt=0.0)
-    voltage_max_v: float = Field(14.8, gt=0.0)
+    voltage_min_v: float | None = Field(
+        None, gt=0.0, description="default: the robot's servo.supply_min_v"
+    )
+    voltage_max_v: float | None = Field(
+        None, gt=0.0, description="default: the robot's servo.supply_max_v"
+    )
     stale_limit_s: float = Field(0.1, gt=0.0)
     advance_fraction: float = Field(0.5, ge=0.0, lt=1.0, description="alarm below this share")
     watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="register 98, 20 ms steps")
@@ -76,6 +81,14 @@ class SafetyConfig(Strict):
         "stop", description="after a vanished port or a rebooted servo: torque off, ask, or go on"
     )
     recovery_time_s: float = Field(10.0, gt=0.0, description="how long it is waited for")
+
+    def voltage_limits_v(self, servo: ServoConfig) -> tuple[float, float]:
+        """Least and greatest supply of servos of this kind: the run's, else the robot's."""
+        low_v, high_v = servo.supply_limits_v
+        return (
+            low_v if self.voltage_min_v is None else self.voltage_min_v,
+            high_v if self.voltage_max_v is None else self.voltage_max_v,
+        )
 
 
 class RunConfig(Strict):

@@ -33,7 +33,7 @@ class Recorded:
         reach, limit = np.abs(self._spline(fine)).max(axis=0), np.array(robot.limit_rad)
         for joint in np.flatnonzero(reach > limit)[:1]:
             raise InputError(
-                f"recording: joint {joint + 1} bends to {reach[joint]:.2f} rad; "
+                f"recording: {robot.joint_name(joint)} bends to {reach[joint]:.2f} rad; "
                 f"its limit is {limit[joint]:.2f}"
             )
         speed = np.abs(self._spline(fine, 1)).max(axis=0)

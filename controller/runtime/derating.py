@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.types import JointState
@@ -22,9 +23,8 @@ HEAT_BAND_C = 10.0
 HEAT_EDGE_C = 2.0
 CURRENT_START, CURRENT_END = 0.75, 0.98
 """Shares of the current limit."""
-VOLTAGE_BAND_V = 0.8
-"""Above the least supply."""
-VOLTAGE_EDGE_V = 0.2
+VOLTAGE_BAND, VOLTAGE_EDGE = 1 / 15, 1 / 60
+"""Shares of the supply, above the least one: 0.8 and 0.2 V of 12 V."""
 FALL_S, RISE_S = 0.4, 6.0
 """Time constants of the rate."""
 CURRENT_S = 0.2
@@ -45,21 +45,25 @@ class Allowed:
 UNLIMITED = Allowed(1.0, "")
 
 
-def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allowed:
+def allowed(
+    state: JointState, current_a: Floats, safety: SafetyConfig, robot: RobotConfig
+) -> Allowed:
     """Return what a state allows; what was not read yet (NaN) limits nothing.
 
     Args:
         state: of the servos.
         current_a: (J,) averaged magnitudes.
         safety: the limits at which servos are stopped.
+        robot: names the joints.
 
     """
     heat, amps, volts = state.temperature_c, current_a, state.voltage_v
     limit_c, limit_a, voltage_min_v = (
         safety.temperature_limit_c,
         safety.current_limit_a,
-        safety.voltage_min_v,
+        safety.voltage_limits_v(robot.servo)[0],
     )
+    band_v, edge_v = VOLTAGE_BAND * robot.servo.supply_v, VOLTAGE_EDGE * robot.servo.supply_v
     ratings = (
         (_falling(heat, limit_c - HEAT_BAND_C, limit_c - HEAT_EDGE_C), heat, "{:.0f} C", limit_c),
         (
@@ -69,7 +73,7 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
             limit_a,
         ),
         (
-            _falling(-volts, -voltage_min_v - VOLTAGE_BAND_V, -voltage_min_v - VOLTAGE_EDGE_V),
+            _falling(-volts, -voltage_min_v - band_v, -voltage_min_v - edge_v),
             volts,
             "{:.1f} V",
             voltage_min_v,
@@ -80,7 +84,7 @@ def allowed(state: JointState, current_a: Floats, safety: SafetyConfig) -> Allow
     rate = LEAST + (1.0 - LEAST) * float(rates[joint])
     if rate >= 1.0:
         return UNLIMITED
-    text = f"joint {joint + 1} at {unit.format(values[joint])}, limit {unit.format(limit)}"
+    text = f"{robot.joint_name(joint)} at {unit.format(values[joint])}, limit {unit.format(limit)}"
     return Allowed(rate, text)
 
 
@@ -124,12 +128,17 @@ class Derating:
     """Call ``update`` in every cycle; multiplies the rate of whatever moves."""
 
     def __init__(
-        self, safety: SafetyConfig, on_event: Callable[[str, str], None] = lambda kind, text: None
+        self,
+        safety: SafetyConfig,
+        robot: RobotConfig,
+        on_event: Callable[[str, str], None] = lambda kind, text: None,
     ) -> None:
         self.rate = 1.0
         self.least = 1.0
         """Lowest rate so far."""
-        self._safety = safety
+        self._safety, self._robot = safety, robot
+        servo = robot.servo
+        self._voltage_low_v = safety.voltage_limits_v(servo)[0] + VOLTAGE_BAND * servo.supply_v
         self._on_event = on_event
         self._current_a = np.zeros(0)
         self._is_reported = False
@@ -147,9 +156,9 @@ class Derating:
             state.voltage_v,
             CURRENT_START * safety.current_limit_a,
             safety.temperature_limit_c - HEAT_BAND_C,
-            safety.voltage_min_v + VOLTAGE_BAND_V,
+            self._voltage_low_v,
         )
-        now = UNLIMITED if unlimited else allowed(state, self._current_a, safety)
+        now = UNLIMITED if unlimited else allowed(state, self._current_a, safety, self._robot)
         if now.rate == self.rate:
             return self.rate
         time_s = FALL_S if now.rate < self.rate else RISE_S

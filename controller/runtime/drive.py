@@ -109,7 +109,7 @@ class Drive:
         self._log, self._robot, self._run = log, robot, run
         self._gain = gain
         self._slip_monitor = SlipMonitor(robot.length_m, gain, run.safety.advance_fraction)
-        self._derating = Derating(run.safety, self._on_derating)
+        self._derating = Derating(run.safety, robot, self._on_derating)
         self._on_progress, self._on_event = on_progress, on_event
         self._wire_busy_s = wire_busy_s
         self._wire_s = wire_busy_s()

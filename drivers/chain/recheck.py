@@ -71,7 +71,7 @@ def recheck(
             faults.append(ChainFault(FaultCause.OTHER_FIRMWARE, text))
         raw = np.array([bus.read(servo.servo_id, "Present Position")])
         moved[joint] = units.position_rad(raw)[0] - position_rad[joint]
-        name = f"joint {joint} (servo {servo.servo_id})"
+        name = robot.joint_name(joint)
         turns = round(moved[joint] / math.tau) if np.isfinite(moved[joint]) else 0
         if turns:
             text = f"{name}: off by {turns:+d} turns: its turn count is lost"

@@ -164,7 +164,7 @@ def check_pose(robot: RobotConfig, position_rad: NDArray[np.float64]) -> None:
 
     """
     faults = [
-        f"joint {joint} (servo {robot.servo_ids[joint]}): stands at {angle:.2f} rad, beyond its "
+        f"{robot.joint_name(joint)}: stands at {angle:.2f} rad, beyond its "
         f"limit of {limit:g}: bend it back by hand; if it is straight, its turn count or zero "
         "position is wrong: reboot it, check Homing Offset"
         for joint, (angle, limit) in enumerate(zip(position_rad, robot.limit_rad, strict=True))

@@ -14,6 +14,8 @@ from snakewalk.drivers.types import LIMIT_SLACK_RAD
 class SafetyLimits:
     """Limits of one robot; a value at its limit is allowed."""
 
+    joint_names: tuple[str, ...]
+    """J names for messages: ``joint 5 (ID 5)``."""
     limit_rad: Floats
     """(J,) half range of the goals."""
     limit_slack_rad: float
@@ -32,7 +34,9 @@ class SafetyLimits:
     @staticmethod
     def from_config(robot: RobotConfig, safety: SafetyConfig) -> "SafetyLimits":
         """Limits from the robot's and the run's configuration."""
+        voltage_min_v, voltage_max_v = safety.voltage_limits_v(robot.servo)
         return SafetyLimits(
+            joint_names=tuple(map(robot.joint_name, range(robot.joint_count))),
             limit_rad=np.array(robot.limit_rad),
             limit_slack_rad=LIMIT_SLACK_RAD,
             goal_rate_rad_s=safety.goal_rate_rad_s,
@@ -40,7 +44,7 @@ class SafetyLimits:
             current_limit_a=safety.current_limit_a,
             current_time_s=safety.current_time_s,
             temperature_limit_c=safety.temperature_limit_c,
-            voltage_min_v=safety.voltage_min_v,
-            voltage_max_v=safety.voltage_max_v,
+            voltage_min_v=voltage_min_v,
+            voltage_max_v=voltage_max_v,
             stale_limit_s=safety.stale_limit_s,
         )

@@ -131,7 +131,7 @@ def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | 
         return None
     age_s = state.age_s + since_s
     joint = int(np.argmin(age_s <= limits.stale_limit_s))
-    return f"joint {joint}: not read for {age_s[joint]:.3f} s"
+    return f"{limits.joint_names[joint]}: not read for {age_s[joint]:.3f} s"
 
 
 def state_fault(
@@ -162,13 +162,23 @@ def state_fault(
             state.temperature_c,
             "{:.0f} C: too hot",
         ),
-        (state.voltage_v < limits.voltage_min_v, state.voltage_v, "{:.1f} V: supply too low"),
-        (state.voltage_v > limits.voltage_max_v, state.voltage_v, "{:.1f} V: supply too high"),
+        (
+            state.voltage_v < limits.voltage_min_v,
+            state.voltage_v,
+            f"{{:.1f}} V: supply too low, under {limits.voltage_min_v:.4g} V: servo.supply_min_v "
+            "of the robot, or safety.voltage_min_v of the run",
+        ),
+        (
+            state.voltage_v > limits.voltage_max_v,
+            state.voltage_v,
+            f"{{:.1f}} V: supply too high, over {limits.voltage_max_v:.4g} V: servo.supply_max_v "
+            "of the robot, or safety.voltage_max_v of the run",
+        ),
     )
     for bad, values, what in checks:
         if bad.any():
             joint = int(np.argmax(bad))
-            fault = f"joint {joint}: " + what.format(values[joint])
+            fault = f"{limits.joint_names[joint]}: " + what.format(values[joint])
             names = alarm_names(int(values[joint])) if what == "alarm" else ""
             return f"{fault}: {names}" if names else fault
     return None
@@ -271,5 +281,5 @@ def _command_fault(command: JointCommand, limits: SafetyLimits) -> str | None:
         if not bad.any():
             return None
         joint = int(np.argmax(bad))
-        return f"joint {joint}: commanded {goal[joint]}: not a number"
+        return f"{limits.joint_names[joint]}: commanded {goal[joint]}: not a number"
     return None

@@ -76,8 +76,8 @@ class SourceRun(PathlessRun):
             worst = int(np.argmax(reach / most))
             if reach[worst] > most[worst] * _SLACK:
                 faults.append(
-                    f"the motion source: joint {worst + 1} {what} {reach[worst]:.2f} {unit}; "
-                    f"its limit is {most[worst]:.2f}"
+                    f"the motion source: {self.robot.joint_name(worst)} {what} {reach[worst]:.2f} "
+                    f"{unit}; its limit is {most[worst]:.2f}"
                 )
         if faults:
             raise InputError(faults)

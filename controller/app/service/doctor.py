@@ -58,7 +58,7 @@ def examine(
             servos.return_delay(reports),
             servos.alarms(reports),
             servos.torque(reports),
-            servos.supply(reports, safety.voltage_min_v, safety.voltage_max_v),
+            servos.supply(reports, *safety.voltage_limits_v(robot.servo)),
             servos.heat(reports, safety.temperature_limit_c),
         ]
         on_progress("group reads")

@@ -77,7 +77,9 @@ def test_all_faults_of_parameters_are_reported_at_once() -> None:
 
 def test_a_gait_that_bends_a_joint_too_far_is_refused_with_the_joint_and_its_limit() -> None:
     gait = make_gait("concertina", {"winding_rad": 1.5, "folds": 4.0})
-    with pytest.raises(InputError, match=r"joint \d+ would bend to \d\.\d+ rad; its limit is 1.50"):
+    with pytest.raises(
+        InputError, match=r"\(ID \d+\) would bend to \d\.\d+ rad; its limit is 1.50"
+    ):
         gait.check(ROBOTS["alternating16"])
 
 

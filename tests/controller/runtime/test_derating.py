@@ -5,12 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.runtime.derating import LEAST, Derating, allowed
 from snakewalk.drivers.types import JointState
 
 SAFETY = SafetyConfig()
 J = 4
+ROBOT = RobotConfig(name="four", joint_axes="yyyy")
 
 
 def state(celsius: float = 30.0, volts: float = 12.0, amps: float = 0.3) -> JointState:
@@ -30,11 +32,11 @@ def state(celsius: float = 30.0, volts: float = 12.0, amps: float = 0.3) -> Join
 
 
 def rate(found: JointState) -> float:
-    return allowed(found, np.abs(found.current_a), SAFETY).rate
+    return allowed(found, np.abs(found.current_a), SAFETY, ROBOT).rate
 
 
 def test_a_cool_robot_on_a_good_supply_runs_at_full_rate() -> None:
-    assert allowed(state(), np.full(J, 0.3), SAFETY).reason == ""
+    assert allowed(state(), np.full(J, 0.3), SAFETY, ROBOT).reason == ""
     assert rate(state()) == 1.0
 
 
@@ -46,15 +48,15 @@ def test_what_was_not_read_yet_limits_nothing() -> None:
 @pytest.mark.parametrize(
     ("found", "reason"),
     [
-        (state(celsius=66.0), "joint 2 at 66 C, limit 70 C"),
-        (state(amps=1.8), "joint 2 at 1.80 A, limit 2.00 A"),
-        (state(volts=10.5), "joint 1 at 10.5 V, limit 10.0 V"),
+        (state(celsius=66.0), "joint 2 (ID 2) at 66 C, limit 70 C"),
+        (state(amps=1.8), "joint 2 (ID 2) at 1.80 A, limit 2.00 A"),
+        (state(volts=10.5), "joint 1 (ID 1) at 10.5 V, limit 10.0 V"),
     ],
 )
 def test_near_a_limit_it_slows_down_and_names_joint_value_and_limit(
     found: JointState, reason: str
 ) -> None:
-    now = allowed(found, np.abs(found.current_a), SAFETY)
+    now = allowed(found, np.abs(found.current_a), SAFETY, ROBOT)
     assert LEAST < now.rate < 1.0
     assert now.reason == reason
 
@@ -79,7 +81,7 @@ def test_before_every_limit_the_least_rate_is_reached() -> None:
 
 def test_it_says_once_that_it_slows_and_once_that_it_is_back() -> None:
     said: list[str] = []
-    derating = Derating(SAFETY, lambda kind, text: said.append(text))
+    derating = Derating(SAFETY, ROBOT, lambda kind, text: said.append(text))
     hot, cool = state(celsius=67.0), state()
     for found, seconds in ((hot, 3.0), (cool, 60.0)):
         before = derating.rate
@@ -87,13 +89,21 @@ def test_it_says_once_that_it_slows_and_once_that_it_is_back() -> None:
             now = derating.update(found, 0.02)
             assert abs(now - before) < 0.05, "the rate itself has no step"
             before = now
-    assert said == ["slowing down: joint 2 at 67 C, limit 70 C", "at full rate again"]
+    assert said == ["slowing down: joint 2 (ID 2) at 67 C, limit 70 C", "at full rate again"]
     assert derating.rate == 1.0
     assert derating.least < 0.5
 
 
 def test_a_peak_of_current_shorter_than_the_average_is_no_load() -> None:
-    derating = Derating(SAFETY)
+    derating = Derating(SAFETY, ROBOT)
     for k in range(200):
         derating.update(state(amps=2.2 if k % 50 == 0 else 0.5), 0.02)
     assert derating.least == 1.0
+
+
+def test_the_band_above_the_least_supply_is_that_of_the_robots_own_supply() -> None:
+    """At 5 V a band of 0.8 V would slow a robot down on a supply that is as it should be."""
+    small = RobotConfig(name="small", joint_axes="yyyy", servo=ServoConfig(supply_v=5.0))
+    fine, low = state(volts=4.7), state(volts=4.3)
+    assert allowed(fine, np.full(J, 0.1), SAFETY, small).rate == 1.0
+    assert allowed(low, np.full(J, 0.1), SAFETY, small).rate < 1.0

@@ -121,7 +121,7 @@ def test_all_faults_of_a_chain_at_once(line: Recorder, chain: ServoChain) -> Non
 
 def test_a_pose_beyond_the_limits_is_refused() -> None:
     line = Recorder(ServoBank(ROBOT.servo_ids), [0.0, 0.0, 1.9, 0.0])
-    with pytest.raises(ChainError, match=r"joint 2 \(servo 3\): stands at 1\.9"):
+    with pytest.raises(ChainError, match=r"joint 3 \(ID 3\): stands at 1\.9"):
         ServoChain(DynamixelBus(line), ROBOT).enable()
     assert line.bank["Torque Enable"].tolist() == [0] * 4
 

@@ -223,8 +223,8 @@ def test_without_an_operator_confirm_means_no() -> None:
         (lambda r: r.alter("Firmware Version", 2, 47), "servo 3: firmware 47, was 48: another"),
         (lambda r: r.alter("Hardware Error Status", 0, 4), "servo 1: alarm: overheating"),
         (lambda r: r.alter("ID", 3, 44), "no answer from servo 4"),
-        (lambda r: r.limp("Homing Offset", 0, 400), "joint 0 (servo 1): moved by +0.6"),
-        (lambda r: r.limp("Homing Offset", 1, 4096), "joint 1 (servo 2): off by +1 turns"),
+        (lambda r: r.limp("Homing Offset", 0, 400), "joint 1 (ID 1): moved by +0.6"),
+        (lambda r: r.limp("Homing Offset", 1, 4096), "joint 2 (ID 2): off by +1 turns"),
     ],
 )
 def test_what_is_not_as_it_was_does_not_go_on(

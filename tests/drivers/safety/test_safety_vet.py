@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from snakewalk.config.loader import load_robot
+from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.vet import SafetyMemory, Verdict, vet
@@ -13,6 +14,7 @@ from snakewalk.drivers.types import JointCommand, JointState
 
 J = 3
 LIMITS = SafetyLimits(
+    joint_names=("joint 1 (ID 7)", "joint 2 (ID 8)", "joint 3 (ID 9)"),
     limit_rad=np.array([1.5, 1.2, 1.5]),
     limit_slack_rad=0.2,
     goal_rate_rad_s=4.0,
@@ -151,7 +153,7 @@ def run_currents(currents: list[float], valid: list[bool], dt_s: float = 0.1) ->
         )  # fmt: skip
         verdict = vet(JointCommand(k * dt_s, np.zeros(J)), now, last, LIMITS, k * dt_s)
         if verdict.veto is not None:
-            assert "joint 0" in verdict.veto
+            assert "joint 1 (ID 7)" in verdict.veto
             return k
         last = verdict.memory
     return None
@@ -168,7 +170,7 @@ def test_over_current_counts_only_while_it_lasts() -> None:
 @pytest.mark.parametrize("joint", range(J))
 def test_what_is_not_a_number_is_vetoed(bad: float, joint: int) -> None:
     verdict = vetted(one(bad, joint))
-    assert verdict.veto == f"joint {joint}: commanded {bad}: not a number"
+    assert verdict.veto == f"{LIMITS.joint_names[joint]}: commanded {bad}: not a number"
     assert (verdict.goal_rad == 0.0).all()
     for name in ("position_rad", "velocity_rad_s", "current_a", "age_s"):
         assert vetted(now=state(**{name: one(bad, joint)})).veto is not None or (
@@ -186,13 +188,13 @@ def test_every_hardware_error_is_vetoed(bit: int) -> None:
     errors = np.array([0, 1 << bit, 0], np.uint8)
     assert vetted(now=state(hardware_error=errors)).veto is not None
     alert = vetted(now=state(error=np.array([0, 0, 0x80], np.uint8)))
-    assert alert.veto == "joint 2: alarm"
+    assert alert.veto == "joint 3 (ID 9): alarm"
 
 
 def test_the_veto_names_the_alarm() -> None:
     errors = np.array([0, 0x24, 0], np.uint8)
     assert vetted(now=state(hardware_error=errors)).veto == (
-        "joint 1: alarm: overheating, overload"
+        "joint 2 (ID 8): alarm: overheating, overload"
     )
 
 
@@ -245,3 +247,30 @@ def test_limits_come_from_the_files() -> None:
     limits = SafetyLimits.from_config(load_robot("alternating16"), SafetyConfig())
     assert limits.limit_rad[:2].tolist() == [1.5, 1.2]
     assert (limits.goal_rate_rad_s, limits.stale_limit_s) == (4.0, 0.1)
+
+
+def test_supply_limits_are_those_of_the_robot_unless_the_run_gives_its_own() -> None:
+    """A robot on 5 V stopped at its first cycle: 10 V were the limit of every run."""
+    small = RobotConfig(
+        name="small", joint_axes="yy", servo=ServoConfig(model="XL330-M288", supply_v=5.0)
+    )
+    limits = SafetyLimits.from_config(small, SafetyConfig())
+    assert limits.voltage_min_v < 4.5 < 5.5 < limits.voltage_max_v
+    own = SafetyLimits.from_config(small, SafetyConfig(voltage_min_v=4.9, voltage_max_v=5.1))
+    assert (own.voltage_min_v, own.voltage_max_v) == (4.9, 5.1)
+    usual = SafetyLimits.from_config(load_robot("yaw16"), SafetyConfig())
+    assert (usual.voltage_min_v, usual.voltage_max_v) == pytest.approx((10.0, 14.8))
+
+
+def test_a_supply_outside_its_own_limits_is_refused() -> None:
+    with pytest.raises(ValueError, match="supply_v = 5 is not within supply_min_v = 10"):
+        ServoConfig(supply_v=5.0, supply_min_v=10.0)
+
+
+def test_the_names_of_a_joint_are_its_place_from_the_head_and_its_id() -> None:
+    robot = RobotConfig(name="far", joint_axes="yyy", servo=ServoConfig(first_id=41))
+    assert SafetyLimits.from_config(robot, SafetyConfig()).joint_names == (
+        "joint 1 (ID 41)",
+        "joint 2 (ID 42)",
+        "joint 3 (ID 43)",
+    )

@@ -112,10 +112,16 @@ def test_a_run_lasts_no_longer_than_asked(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "fault"),
     [
-        (lambda robot: Bend(robot, angle_rad=1.8, rate_rad_s=1.0), r"joint 8 bends to 1.80 rad"),
-        (lambda robot: Bend(robot, angle_rad=1.0, rate_rad_s=6.0), r"joint 8 moves at 3.0. rad/s;"),
-        (Jump, r"joint \d+ accelerates at 2\d\.\d\d rad/s2; its limit is 25.00"),
-        (Hasty, r"joint 1 announces 9.00 rad/s; its limit is 2.00"),
+        (
+            lambda robot: Bend(robot, angle_rad=1.8, rate_rad_s=1.0),
+            r"8 \(ID 8\) bends to 1.80 rad",
+        ),
+        (
+            lambda robot: Bend(robot, angle_rad=1.0, rate_rad_s=6.0),
+            r"8 \(ID 8\) moves at 3.0. rad/s;",
+        ),
+        (Jump, r"joint \d+ \(ID \d+\) accelerates at 2\d\.\d\d rad/s2; its limit is 25.00"),
+        (Hasty, r"joint 1 \(ID 1\) announces 9.00 rad/s; its limit is 2.00"),
         (Undefined, r"at 0.5\d s its goals are .*nan"),
         (Short, r"robot yaw16 takes 16 finite angles"),
     ],
