@@ -23,6 +23,8 @@ class ServoConfig(Strict):
         None, gt=0.0, description="a run stops above; default: 14.8/12 of supply_v"
     )
     position_p_gain: int = Field(800, ge=0, le=16383, description="register 84")
+    position_i_gain: int = Field(0, ge=0, le=16383, description="register 82")
+    position_d_gain: int = Field(0, ge=0, le=16383, description="register 80")
     pitch_p_gain: int = Field(
         400, ge=0, le=16383, description="register 84 of the pitch joints: softer follows ground"
     )

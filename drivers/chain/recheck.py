@@ -1,6 +1,7 @@
 """Recheck after an interruption: whether this is the same chain, in the same pose."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,17 +22,20 @@ class Recheck:
     """The chain as found, and every fault that forbids going on."""
 
     faults: tuple[ChainFault, ...]
-    torque_off: tuple[int, ...]
-    """Joints whose torque is off: their servos have rebooted."""
+    reset: tuple[int, ...]
+    """Joints whose torque is off, or whose registers are not as they were set: their servos have
+    rebooted, or another program has written to them."""
+    names: tuple[str, ...]
+    """Of these joints."""
     moved_rad: Floats
     """(J,) from where each joint was last seen to where it is; NaN where it was not read."""
 
     def __str__(self) -> str:
         if self.faults:
             return "; ".join(map(str, self.faults))
-        off = f", torque off at joint {', '.join(map(str, self.torque_off))}"
+        reset = f", to be set up again: {', '.join(self.names)}" if self.names else ""
         moved = float(np.abs(self.moved_rad).max())
-        return f"the same servos, moved by at most {moved:.3f} rad{off if self.torque_off else ''}"
+        return f"the same servos, moved by at most {moved:.3f} rad{reset}"
 
 
 def recheck(
@@ -39,15 +43,17 @@ def recheck(
     robot: RobotConfig,
     units: ServoUnits,
     before: Inspection | None,
+    configured: Mapping[int, Mapping[str, int]],
     position_rad: Floats,
 ) -> Recheck:
-    """Compare model, firmware, alarm, torque and position with what they were.
+    """Compare model, firmware, alarm, torque, RAM settings and position with what they were.
 
     Args:
         bus: where the servos are.
         robot: whose they are.
         units: of their model.
         before: as found at the start; None: nothing to compare with.
+        configured: values of RAM registers as they were set, by joint.
         position_rad: (J,) where the joints were last seen.
 
     Raises:
@@ -58,15 +64,15 @@ def recheck(
     now = inspect(bus, robot)
     moved = np.full(robot.joint_count, np.nan)
     if now.faults:
-        return Recheck(now.faults, (), moved)
+        return Recheck(now.faults, (), (), moved)
     faults: list[ChainFault] = []
     known = {s.servo_id: s for s in before.servos} if before is not None else {}
     for joint, servo in enumerate(now.servos):
         old = known.get(servo.servo_id, servo)
         if servo.firmware != old.firmware:
             text = (
-                f"servo {servo.servo_id}: firmware {servo.firmware}, was {old.firmware}: another "
-                "servo?"
+                f"{robot.joint_name(joint)}: firmware {servo.firmware}, was {old.firmware}: "
+                "another servo?"
             )
             faults.append(ChainFault(FaultCause.OTHER_FIRMWARE, text))
         raw = np.array([bus.read(servo.servo_id, "Present Position")])
@@ -79,5 +85,13 @@ def recheck(
         elif not abs(moved[joint]) <= MOVED_RAD:
             text = f"{name}: moved by {moved[joint]:+.2f} rad since it was last seen"
             faults.append(ChainFault(FaultCause.MOVED, text))
-    off = tuple(joint for joint, servo in enumerate(now.servos) if not servo.torque_on)
-    return Recheck(tuple(faults), off, moved)
+    reset = tuple(
+        joint
+        for joint, servo in enumerate(now.servos)
+        if not servo.torque_on
+        or any(
+            bus.read(servo.servo_id, register) != value
+            for register, value in configured.get(joint, {}).items()
+        )
+    )
+    return Recheck(tuple(faults), reset, tuple(map(robot.joint_name, reset)), moved)

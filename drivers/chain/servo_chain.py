@@ -1,10 +1,12 @@
 """The chain of servos as a joint link: radians to raw goals, raw blocks to a ``JointState``."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from snakewalk.config.arrays import Bools, Floats, Int32s
+from snakewalk.config.arrays import Floats, Int32s, Ints
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.budget import WireBudget, chain_budget
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, ControlCycle, CycleCounters
@@ -12,16 +14,23 @@ from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, Readings
 from snakewalk.drivers.chain.recheck import Recheck, recheck
 from snakewalk.drivers.chain.start_up import (
+    RAM_SETTINGS,
     Inspection,
     check_pose,
     configure,
     goal_limits_raw,
     inspect,
+    let_reply,
 )
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import BusError, ChainError, PortError
 from snakewalk.drivers.port.byte_port import BytePort, reopen
-from snakewalk.drivers.protocol.registers import WATCHDOG_TRIPPED, WATCHDOG_UNIT_S, ServoUnits
+from snakewalk.drivers.protocol.registers import (
+    WATCHDOG_TICKS_MAX,
+    WATCHDOG_TRIPPED,
+    WATCHDOG_UNIT_S,
+    ServoUnits,
+)
 from snakewalk.drivers.types import JointCommand, JointState
 
 SLOW_EVERY = 16
@@ -61,11 +70,17 @@ class ServoChain:
         self.inspection: Inspection | None = None
         """The servos as found by the last ``enable``."""
         self.on_event: Callable[[str], None] = lambda line: None
-        """Gets one line when fast reads are given up."""
+        """Gets a line on each setting that another program has left in a servo, and when fast reads
+        are given up."""
         self._bus = bus
         self._clock = bus.port.clock
         self._units = ServoUnits.of(bus.table)
-        self._watchdog_s = watchdog_s
+        # rounded up: at least the time that was asked for
+        ticks = math.ceil(watchdog_s / WATCHDOG_UNIT_S - 1e-9)
+        self._watchdog_ticks = min(WATCHDOG_TICKS_MAX, max(1, ticks))
+        self._watchdog_s = self._watchdog_ticks * WATCHDOG_UNIT_S
+        self._configured: dict[int, dict[str, int]] = {}
+        self._liveness: LivenessCheck | None = None
         self._rate_hz = rate_hz
         self._goals = GoalEncoder(self._units, goal_limits_raw(robot, self._units))
         self._readings = Readings(robot.joint_count, bus.table, self._units)
@@ -109,12 +124,13 @@ class ServoChain:
             PortError: the port is gone.
 
         """
+        let_reply(self._bus, self.robot)
         self.inspection = inspect(self._bus, self.robot)
         if self.inspection.faults:
             raise ChainError([str(fault) for fault in self.inspection.faults])
         if self._rate_hz is not None:
             self._budget(fast=self.inspection.fast_reads).check(self._rate_hz)
-        configure(self._bus, self.robot, self._units)
+        self._configured = configure(self._bus, self.robot, self._units, None, self.on_event)
         self._prepare_reads(fast=self.inspection.fast_reads)
         return self._begin()
 
@@ -127,13 +143,14 @@ class ServoChain:
 
         """
         before = self._readings.state(self._clock.now_s()).position_rad
-        return recheck(self._bus, self.robot, self._units, self.inspection, before)
+        known, settings = self.inspection, self._configured
+        return recheck(self._bus, self.robot, self._units, known, settings, before)
 
     def resume(self, found: Recheck) -> JointState:
         """Go on after an interruption: torque that is on stays on, nothing moves.
 
-        Servos that lost their torque (rebooted) are set up again. The others get their watchdog
-        cleared and, right behind it, goal = present.
+        Servos that lost their torque or their settings (rebooted) are set up again. The others get
+        their watchdog cleared and, right behind it, goal = present.
 
         Raises:
             ChainError: ``found`` forbids it.
@@ -143,7 +160,8 @@ class ServoChain:
         """
         if found.faults:
             raise ChainError([str(fault) for fault in found.faults])
-        configure(self._bus, self.robot, self._units, found.torque_off)
+        again = configure(self._bus, self.robot, self._units, found.reset, self.on_event)
+        self._configured.update(again)
         return self._begin()
 
     def _begin(self) -> JointState:
@@ -187,10 +205,13 @@ class ServoChain:
         bus.sync_write(ids, "Torque Enable", 1)
         for servo_id in ids:
             self._expect(servo_id, "Torque Enable", 1)
-        ticks = min(127, max(1, round(self._watchdog_s / WATCHDOG_UNIT_S)))
+        ticks = self._watchdog_ticks
         bus.sync_write(ids, "Bus Watchdog", ticks)
         for servo_id in ids:
             self._expect(servo_id, "Bus Watchdog", ticks)
+        self._liveness = LivenessCheck(
+            bus, self.robot, self._configured, ticks, fast=self._fast_reads
+        )
         self._armed = True
         return self.read()
 
@@ -223,7 +244,8 @@ class ServoChain:
         """Read all joints once; in every 16th call voltages and temperatures too.
 
         Raises:
-            BusError: a servo has lost its torque (it has rebooted), or its watchdog has stopped it.
+            BusError: a servo has lost its torque or a setting (it has rebooted, or another program
+                has written to it), or its watchdog has stopped it or is not armed.
             PortError: the port is gone.
 
         """
@@ -237,10 +259,8 @@ class ServoChain:
         self._reads += 1
         if place == 0:
             self._readings.update_slow(self._slow.read())
-        elif self._armed and place == SLOW_EVERY // 3:
-            self._liveness.torque()
-        elif self._armed and place == 2 * SLOW_EVERY // 3:
-            self._liveness.watchdog()
+        elif self._armed and self._liveness is not None:
+            self._liveness.check(self._reads - 1)
         return self._readings.state(self._clock.now_s())
 
     def write(self, command: JointCommand) -> None:
@@ -265,7 +285,6 @@ class ServoChain:
         bus, ids = self._bus, self.robot.servo_ids
         self._cycle: ControlCycle = bus.cycle(ids, fast=fast)
         self._slow: ControlCycle = bus.slow_cycle(ids, fast=fast)
-        self._liveness = LivenessCheck(bus, ids, fast=fast)
         self._fast_reads = fast
 
     def _budget(self, *, fast: bool) -> WireBudget:
@@ -293,7 +312,8 @@ class ServoChain:
     def _expect(self, servo_id: int, name: str, value: int) -> None:
         got = self._bus.read(servo_id, name)
         if got != value:
-            raise BusError(f"servo {servo_id}: {name} is {got} after {value} was written to all")
+            joint = self.robot.joint_name(self.robot.servo_ids.index(servo_id))
+            raise BusError(f"{joint}: {name} is {got} after {value} was written to all")
 
     def _first_state(self) -> JointState:
         for _ in range(_FIRST_READS):
@@ -313,37 +333,91 @@ class ServoChain:
 
 
 class LivenessCheck:
-    """Whether torque is still on and no watchdog has expired: two group reads of one byte."""
+    """Whether torque is still on, the watchdogs are armed, and no setting was lost.
 
-    def __init__(self, bus: DynamixelBus, servo_ids: Sequence[int], *, fast: bool) -> None:
-        self._ids = tuple(servo_ids)
-        self._torque = bus.block(servo_ids, "Torque Enable", "Torque Enable", fast=fast)
-        self._watchdog = bus.block(servo_ids, "Bus Watchdog", "Bus Watchdog", fast=fast)
+    One group read of one register at a time; servos that do not reply are not judged.
+    """
 
-    def torque(self) -> None:
-        """Check that torque is on; servos that do not reply are not judged.
+    def __init__(
+        self,
+        bus: DynamixelBus,
+        robot: RobotConfig,
+        configured: Mapping[int, Mapping[str, int]],
+        watchdog_ticks: int,
+        *,
+        fast: bool,
+    ) -> None:
+        """Prepare the reads.
+
+        Args:
+            bus: where the servos are.
+            robot: whose they are.
+            configured: values of RAM registers as they were set, by joint.
+            watchdog_ticks: Bus Watchdog(98) as it was armed.
+            fast: begin with fast sync reads.
+
+        """
+        self._robot = robot
+        joints = range(robot.joint_count)
+
+        def read(register: str, expected: Mapping[int, int]) -> _RegisterCheck:
+            ids = [robot.servo_ids[joint] for joint in expected]
+            cycle = bus.block(ids, register, register, fast=fast)
+            values = np.array(list(expected.values()))
+            return _RegisterCheck(register, cycle, tuple(expected), values)
+
+        self._torque = read("Torque Enable", dict.fromkeys(joints, 1))
+        self._watchdog = read("Bus Watchdog", dict.fromkeys(joints, watchdog_ticks))
+        self._settings = []
+        for register in RAM_SETTINGS:
+            expected = {j: v[register] for j, v in configured.items() if register in v}
+            if expected:
+                self._settings.append(read(register, dict(sorted(expected.items()))))
+
+    def check(self, cycle: int) -> None:
+        """Make the check whose turn it is in a cycle.
+
+        In a round of ``SLOW_EVERY`` cycles: torque, watchdog, and one of the settings.
 
         Raises:
-            BusError: torque is off.
+            BusError: a servo is not as it was set.
             PortError: the port is gone.
 
         """
-        reply = self._torque.read()
-        self._raise_for(reply.valid & (reply.data[:, 0] == 0), "torque is off: has it rebooted?")
+        rounds, place = divmod(cycle, SLOW_EVERY)
+        if place == SLOW_EVERY // 3:
+            self._judge(self._torque)
+        elif place == 2 * SLOW_EVERY // 3:
+            self._judge(self._watchdog)
+        elif place == SLOW_EVERY - 3:
+            self._judge(self._settings[rounds % len(self._settings)])
 
-    def watchdog(self) -> None:
-        """Check that no watchdog has run out; servos that do not reply are not judged.
+    def _judge(self, check: "_RegisterCheck") -> None:
+        reply = check.cycle.read()
+        values = sum(reply.data[:, k].astype(np.int64) << 8 * k for k in range(reply.data.shape[1]))
+        bad = np.flatnonzero(reply.valid & (values != check.expected))
+        if not len(bad):
+            return
+        value = int(np.asarray(values)[bad[0]])
+        if check is self._torque:
+            what = "torque is off: has it rebooted?"
+        elif check is self._watchdog and value == WATCHDOG_TRIPPED:
+            what = "its bus watchdog has stopped it"
+        else:
+            what = (
+                f"{check.register} is {value}, not {check.expected[bad[0]]}: has it rebooted, or "
+                "does another program write to it?"
+            )
+        which = ", ".join(self._robot.joint_name(check.joints[k]) for k in bad)
+        raise BusError(f"{which}: {what}")
 
-        Raises:
-            BusError: a watchdog has expired.
-            PortError: the port is gone.
 
-        """
-        reply = self._watchdog.read()
-        tripped = reply.valid & (reply.data[:, 0] == WATCHDOG_TRIPPED)
-        self._raise_for(tripped, "its bus watchdog has stopped it")
+@dataclass(frozen=True, slots=True)
+class _RegisterCheck:
+    """Group read of one register, and what it must return."""
 
-    def _raise_for(self, bad: Bools, what: str) -> None:
-        if bad.any():
-            which = ", ".join(str(i) for i, b in zip(self._ids, bad, strict=True) if b)
-            raise BusError(f"servo {which}: {what}")
+    register: str
+    cycle: ControlCycle
+    joints: tuple[int, ...]
+    expected: Ints
+    """(N,) of these joints."""

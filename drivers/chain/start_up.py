@@ -5,7 +5,7 @@ of 500 us a servo, alarms from before, turn counts lost at a reboot.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,18 +13,28 @@ from numpy.typing import NDArray
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.errors import ChainError, ChainFault, FaultCause
+from snakewalk.drivers.errors import BusError, ChainError, ChainFault, FaultCause, ServoError
 from snakewalk.drivers.protocol.control_table import model_numbers
 from snakewalk.drivers.protocol.registers import (
     CURRENT_POSITION_MODE,
+    NO_SECONDARY_ID,
     POSITION_MODE,
+    PWM_FULL,
     RETURN_DELAY_UNIT_S,
+    REVERSE,
+    SHUTDOWN_ALARMS,
+    TIME_PROFILE,
+    TORQUE_ON_BY_GOAL,
     VOLTAGE_UNIT_V,
     ServoUnits,
     alarm_names,
 )
 from snakewalk.drivers.types import LIMIT_SLACK_RAD
 
+RAM_SETTINGS = ("Position P Gain", "Goal PWM", "Goal Current")
+"""Settings that a reboot or another program would undo, and that are compared while it runs."""
+ALL_REPLY = 2
+"""Status Return Level(68)."""
 FAST_READ_FIRMWARE = 45
 """First firmware with fast sync read (e-manual, DYNAMIXEL Protocol 2.0, Fast Sync Read)."""
 
@@ -72,16 +82,17 @@ def inspect(bus: DynamixelBus, robot: RobotConfig) -> Inspection:
         faults.append(ChainFault(FaultCause.NO_ANSWER, text))
     servos = []
     for servo_id, servo in found.items():
+        joint = robot.joint_name(robot.servo_ids.index(servo_id))
         name = model_numbers().get(servo.model_number, f"number {servo.model_number}")
         if servo.model_number != bus.table.model_number:
-            text = f"servo {servo_id}: is a {name}, not a {bus.table.model}"
+            text = f"{joint}: is a {name}, not a {bus.table.model}"
             faults.append(ChainFault(FaultCause.OTHER_MODEL, text))
             continue
         report = _report(bus, servo_id, name)
         servos.append(report)
         if report.hardware_error:
             text = (
-                f"servo {servo_id}: alarm: {alarm_names(report.hardware_error)}; "
+                f"{joint}: alarm: {alarm_names(report.hardware_error)}; "
                 "remove the cause and reboot it"
             )
             faults.append(ChainFault(FaultCause.ALARM, text))
@@ -102,9 +113,62 @@ def _report(bus: DynamixelBus, servo_id: int, name: str) -> ServoReport:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class ChainSetting:
+    """A register that shapes the motion or the safety of a chain, and what it must hold."""
+
+    register: str
+    value: int
+    bits: int = -1
+    """Mask of the bits that matter; the others stay as they are."""
+    usual: bool = True
+    """Whether other values are what a factory or another robot leaves; else a change is told."""
+
+
+def chain_settings(
+    robot: RobotConfig, units: ServoUnits, joint: int, goal_pwm: int
+) -> tuple[ChainSetting, ...]:
+    """Settings of one joint's servo, in the order in which they are written.
+
+    Args:
+        robot: limits and gains.
+        units: of its model.
+        joint: index of the joint.
+        goal_pwm: the servo's PWM Limit(36): a Goal PWM(100) that another program left below it
+            would weaken the joint.
+
+    """
+    low, high = goal_limits_raw(robot, units)[joint]
+    pitch = robot.joint_axes[joint] == "p"
+    servo = robot.servo
+    return (
+        ChainSetting("Return Delay Time", 0),
+        # before the rest: a new mode resets the gains
+        ChainSetting("Operating Mode", CURRENT_POSITION_MODE if pitch else POSITION_MODE),
+        # Torque that a goal or a power-up switches on is torque without a watchdog
+        ChainSetting("Drive Mode", 0, TIME_PROFILE | TORQUE_ON_BY_GOAL, usual=False),
+        ChainSetting("Startup Configuration", 0, usual=False),
+        ChainSetting("Shutdown", SHUTDOWN_ALARMS, SHUTDOWN_ALARMS, usual=False),
+        ChainSetting("Min Position Limit", int(low)),
+        ChainSetting("Max Position Limit", int(high)),
+        ChainSetting("Position P Gain", servo.pitch_p_gain if pitch else servo.position_p_gain),
+        ChainSetting("Position I Gain", servo.position_i_gain),
+        ChainSetting("Position D Gain", servo.position_d_gain),
+        ChainSetting("Feedforward 1st Gain", 0, usual=False),
+        ChainSetting("Feedforward 2nd Gain", 0, usual=False),
+        ChainSetting("Profile Acceleration", 0),
+        ChainSetting("Profile Velocity", 0),
+        ChainSetting("Goal PWM", goal_pwm, usual=False),
+    )
+
+
 def configure(
-    bus: DynamixelBus, robot: RobotConfig, units: ServoUnits, joints: Iterable[int] | None = None
-) -> None:
+    bus: DynamixelBus,
+    robot: RobotConfig,
+    units: ServoUnits,
+    joints: Iterable[int] | None = None,
+    on_event: Callable[[str], None] = lambda line: None,
+) -> dict[int, dict[str, int]]:
     """Torque off, then every setting that the chain relies on, each read back.
 
     Args:
@@ -112,42 +176,108 @@ def configure(
         robot: the settings.
         units: of their model.
         joints: only these; None is all.
+        on_event: gets a line for each setting that another program has left behind, and for what
+            is unusual and stays.
+
+    Returns:
+        Values of the RAM registers that a reboot or another program would change, by joint.
 
     Raises:
         ChainError: a setting of the robot is beyond what a servo allows.
         BusError: a servo does not do what an instruction asks.
 
     """
-    limits = goal_limits_raw(robot, units)
-    for joint in range(robot.joint_count) if joints is None else joints:
+    which = tuple(range(robot.joint_count) if joints is None else joints)
+    for joint in which:
         servo_id = robot.servo_ids[joint]
         bus.write_verified(servo_id, "Torque Enable", 0)  # the EEPROM is locked while it is on
         # in its error state goals are refused; if cleared with torque on, an old goal would count
         bus.write(servo_id, "Bus Watchdog", 0)
-        bus.write_verified(servo_id, "Status Return Level", 2)
-        bus.write_verified(servo_id, "Return Delay Time", 0)
-        pitch = robot.joint_axes[joint] == "p"
-        mode = CURRENT_POSITION_MODE if pitch else POSITION_MODE
-        bus.write_verified(servo_id, "Operating Mode", mode)  # before the rest: it resets gains
-        bus.write_verified(servo_id, "Min Position Limit", int(limits[joint, 0]))
-        bus.write_verified(servo_id, "Max Position Limit", int(limits[joint, 1]))
-        gain = robot.servo.pitch_p_gain if pitch else robot.servo.position_p_gain
-        bus.write_verified(servo_id, "Position P Gain", gain)
-        bus.write_verified(servo_id, "Profile Acceleration", 0)
-        bus.write_verified(servo_id, "Profile Velocity", 0)
-        if pitch:
-            _limit_current(bus, servo_id, robot.servo.pitch_current_limit_a, units)
+    none = ChainSetting("Secondary(Shadow) ID", NO_SECONDARY_ID, usual=False)
+    for joint in which:  # all, before anything that one of them could take for its own
+        _apply(bus, robot, joint, none, on_event)
+    return {joint: _configure_joint(bus, robot, units, joint, on_event) for joint in which}
 
 
-def _limit_current(bus: DynamixelBus, servo_id: int, current_a: float, units: ServoUnits) -> None:
+def _configure_joint(
+    bus: DynamixelBus,
+    robot: RobotConfig,
+    units: ServoUnits,
+    joint: int,
+    on_event: Callable[[str], None],
+) -> dict[str, int]:
+    servo_id, name = robot.servo_ids[joint], robot.joint_name(joint)
+    pwm_limit = bus.read(servo_id, "PWM Limit")
+    if pwm_limit == 0:
+        raise ChainError(f"{name}: PWM Limit is 0: it cannot move; set it to {PWM_FULL}")
+    values = {}
+    for setting in chain_settings(robot, units, joint, pwm_limit):
+        if setting.register in bus.table:
+            values[setting.register] = _apply(bus, robot, joint, setting, on_event)
+    if robot.joint_axes[joint] == "p":
+        values["Goal Current"] = _limit_current(bus, robot, joint, units)
+    if pwm_limit < PWM_FULL:
+        on_event(f"{name}: PWM Limit is {pwm_limit} of {PWM_FULL}: weak and slow")
+    if bus.read(servo_id, "Drive Mode") & REVERSE:
+        on_event(f"{name}: Drive Mode is reverse: it turns the other way round")
+    offset = bus.read(servo_id, "Homing Offset")
+    if offset:
+        angle = offset * units.rad_per_position
+        on_event(f"{name}: Homing Offset is {offset}: its zero is moved by {angle:+.2f} rad")
+    return {register: values[register] for register in RAM_SETTINGS if register in values}
+
+
+def _apply(
+    bus: DynamixelBus,
+    robot: RobotConfig,
+    joint: int,
+    setting: ChainSetting,
+    on_event: Callable[[str], None],
+) -> int:
+    """Write a setting where it differs, and read it back; returns the register's value."""
+    servo_id, register = robot.servo_ids[joint], setting.register
+    try:
+        before = bus.read(servo_id, register)
+    except ServoError:
+        if register == "Startup Configuration":
+            return 0  # a firmware before 45 has none
+        raise
+    value = before & ~setting.bits | setting.value & setting.bits
+    if value != before:
+        bus.write(servo_id, register, value)
+        got = bus.read(servo_id, register)
+        if got != value:
+            raise BusError(
+                f"{robot.joint_name(joint)}: {register}: wrote {value}, reads back {got}"
+            )
+        if not setting.usual:
+            on_event(f"{robot.joint_name(joint)}: {register} was {before}, is {value} now")
+    return value
+
+
+def _limit_current(bus: DynamixelBus, robot: RobotConfig, joint: int, units: ServoUnits) -> int:
+    servo_id, current_a = robot.servo_ids[joint], robot.servo.pitch_current_limit_a
     limit = bus.read(servo_id, "Current Limit")
     goal = max(1, units.current_raw(current_a))
     if goal > limit:
         raise ChainError(
-            f"servo {servo_id}: pitch_current_limit_a = {current_a:g}: the servo's Current Limit "
-            f"is {limit * units.a_per_current:.2f} A"
+            f"{robot.joint_name(joint)}: pitch_current_limit_a = {current_a:g}: the servo's "
+            f"Current Limit is {limit * units.a_per_current:.2f} A"
         )
     bus.write_verified(servo_id, "Goal Current", goal)
+    return goal
+
+
+def let_reply(bus: DynamixelBus, robot: RobotConfig) -> None:
+    """Let servos reply to every instruction, whose Status Return Level(68) forbids it.
+
+    At level 0 a servo replies to pings only, at level 1 to pings and reads: what it must be told
+    is sent without waiting for a reply, and only to servos of the robot's model.
+    """
+    found = bus.find(robot.servo_ids)
+    right = [i for i, servo in found.items() if servo.model_number == bus.table.model_number]
+    if right:
+        bus.sync_write(right, "Status Return Level", ALL_REPLY)
 
 
 def goal_limits_raw(robot: RobotConfig, units: ServoUnits) -> NDArray[np.int32]:

@@ -21,6 +21,9 @@ _SIGNED = frozenset(
     }
 )
 
+_SHUTDOWN_ADDRESS = 63
+"""Of the layout that has Startup Configuration at 60."""
+
 
 @dataclass(frozen=True, slots=True)
 class Register:
@@ -131,6 +134,11 @@ def load_control_table(model: str) -> ControlTable:
     registers: dict[str, Register] = {}
     for address, size, name, *_ in sections["control table"]:
         registers.setdefault(name, Register(name, int(address), int(size), name in _SIGNED))
+    shutdown = registers.get("Shutdown")
+    if shutdown is not None and shutdown.address == _SHUTDOWN_ADDRESS:
+        # in the e-manual's tables from firmware 45 (330: 46) on, but not in the SDK's files
+        startup = Register("Startup Configuration", 60, 1, signed=False)
+        registers.setdefault(startup.name, startup)
     zero = int(info["value_of_zero_radian_position"])
     # the lowest value is exactly -pi; on some models the highest is one step below +pi
     steps = zero - int(info["value_of_min_radian_position"])

@@ -29,6 +29,8 @@ VOLTAGE_UNIT_V = 0.1
 """Present Input Voltage(144), all series of Protocol 2.0."""
 WATCHDOG_UNIT_S = 0.02
 """Bus Watchdog(98)."""
+WATCHDOG_TICKS_MAX = 127
+"""Greatest time of it, in its units."""
 WATCHDOG_TRIPPED = 0xFF
 """Bus Watchdog(98) reads -1 in its error state."""
 RETURN_DELAY_UNIT_S = 2e-6
@@ -43,6 +45,17 @@ MODES = (0, 1, 3, 4, 5, 16)
 """Operating Mode(11)."""
 CURRENT_MODES = (CURRENT_MODE, CURRENT_POSITION_MODE)
 """Those that a model without current sensing lacks."""
+
+PWM_FULL = 885
+"""Goal PWM(100) and PWM Limit(36) of full output, X series."""
+NO_SECONDARY_ID = 255
+"""Secondary(Shadow) ID(12): values from 253 on are none."""
+SECONDARY_ID_LIMIT = 252
+REVERSE, TIME_PROFILE, TORQUE_ON_BY_GOAL = 0x01, 0x04, 0x08
+"""Drive Mode(10), bits 0, 2 and 3."""
+SHUTDOWN_ALARMS = 0x34
+"""Shutdown(63): the alarms that switch a servo off by its factory setting: overload, electrical
+shock, overheating."""
 
 
 class Alarm(IntFlag):

@@ -15,12 +15,13 @@ from snakewalk.drivers.protocol.registers import (
     CURRENT_POSITION_MODE,
     EXTENDED_MODE,
     POSITION_MODE,
+    PWM_FULL,
     VELOCITY_MODE,
     VELOCITY_UNIT_RAD_S,
 )
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
-from snakewalk.sim.servo.motor import PWM_FULL, TICKS_PER_RAD, MotorColumns, p_gain_per_rad
+from snakewalk.sim.servo.motor import TICKS_PER_RAD, MotorColumns, p_gain_per_rad
 from snakewalk.sim.servo.profile import Trajectory
 
 CONTROL_S = 1e-3

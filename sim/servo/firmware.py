@@ -11,7 +11,10 @@ from snakewalk.drivers.protocol.registers import (
     CURRENT_MODE,
     CURRENT_POSITION_MODE,
     POSITION_MODE,
+    PWM_FULL,
     PWM_MODE,
+    REVERSE,
+    TORQUE_ON_BY_GOAL,
     WATCHDOG_TRIPPED,
 )
 from snakewalk.sim.plant import Plant
@@ -21,7 +24,6 @@ from snakewalk.sim.servo.control_loops import CONTROL_S, ControlLoops
 from snakewalk.sim.servo.event_queue import EventQueue
 from snakewalk.sim.servo.motor import (
     MOTORS,
-    PWM_FULL,
     TICKS_PER_RAD,
     TICKS_PER_REV,
     MotorColumns,
@@ -38,8 +40,6 @@ CENTRE_TICKS = 2048
 """Present Position(132) of a straight joint."""
 FAR_RAD = 1e9
 """Goal of a motor that only has to push: the output saturates at its limit."""
-REVERSE, TORQUE_ON_BY_GOAL = 0x01, 0x08
-"""Drive Mode(10), bits 0 and 3."""
 STARTUP_TORQUE_ON, STARTUP_RAM_RESTORE = 0x01, 0x02
 """Startup Configuration(60)."""
 HOMING_LIMIT_TICKS = 1_024

@@ -14,14 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import AnyInts, Floats
-from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A
+from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A, PWM_FULL
 from snakewalk.sim.plant import ServoDrive
 from snakewalk.sim.servo.models import MODELS, ModelFacts
 
 TICKS_PER_REV = 4096
 TICKS_PER_RAD = TICKS_PER_REV / math.tau
-PWM_FULL = 885.0
-"""Goal PWM(100): 885 is 100 %, e-manual."""
 _RPM = math.tau / 60.0
 _DIVISOR = 128.0
 """K_P = Position P Gain(84) / 128, e-manual, in PWM units a tick of position error."""

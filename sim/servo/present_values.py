@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 from snakewalk.drivers.protocol.registers import (
     CURRENT_MODE,
+    PWM_FULL,
     PWM_MODE,
     VELOCITY_MODE,
     VELOCITY_UNIT_RAD_S,
@@ -15,7 +16,7 @@ from snakewalk.drivers.protocol.registers import (
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.control_loops import ControlLoops
-from snakewalk.sim.servo.motor import PWM_FULL, TICKS_PER_RAD, MotorColumns
+from snakewalk.sim.servo.motor import TICKS_PER_RAD, MotorColumns
 from snakewalk.sim.servo.motor_output import MotorOutput
 from snakewalk.sim.servo.protection import Protection
 from snakewalk.sim.servo.servo_loops import write_motion

@@ -99,10 +99,7 @@ _X_SERIES: Mapping[str, Rule] = {
     **dict.fromkeys((f"External Port Mode {n}" for n in (1, 2, 3)), Rule(3, 0, 3)),
     **dict.fromkeys((f"External Port Data {n}" for n in (1, 2, 3)), Rule(0, 0, 4_095)),
 }
-_UNLISTED = (
-    Register("Startup Configuration", 60, 1, signed=False),
-    Register("Backup Ready", 147, 1, signed=False),
-)
+_BACKUP_READY = Register("Backup Ready", 147, 1, signed=False)
 """In the e-manual's tables from firmware 45 (330: 46) on, but not in the SDK's."""
 INDIRECT_FROM, INDIRECT_TO = 64, 661
 """What Indirect Address registers may point at: the RAM area."""
@@ -149,7 +146,7 @@ def registers_of(model: str) -> ModelRegisters:
     shared = _rules(model)
     layout = load_control_table(model)
     listed = {name: layout[name] for name in layout if name in shared}
-    listed |= {register.name: register for register in _UNLISTED}
+    listed[_BACKUP_READY.name] = _BACKUP_READY
     rules = {name: shared[name] for name in listed}
     blocks, first = indirect_blocks(layout), 1
     for block in blocks:

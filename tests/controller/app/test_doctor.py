@@ -60,7 +60,12 @@ SICK = [
     ("torque", "warn", "on at servo 4", {"Torque Enable": (3, 1)}),
     ("firmware", "warn", "servo 1 has no fast sync read", {"Firmware Version": (0, 44)}),
     ("firmware", "warn", "mixed: 46, 48", {"Firmware Version": (0, 46)}),
-    ("model", "fail", "servo 2: is a XM430-W210, not a XM430-W350", {"Model Number": (1, 1030)}),
+    (
+        "model",
+        "fail",
+        "joint 2 (ID 2): is a XM430-W210, not a XM430-W350",
+        {"Model Number": (1, 1030)},
+    ),
     ("servo IDs", "fail", "no answer from servo 3", {"ID": (2, 3), "Baud Rate": (2, 99)}),
     ("servo IDs", "warn", "servo 77 is on the bus and not", {"ID": (2, 77)}),
     ("baud rate", "fail", "servo 2 answers at 57600 baud, not at 1000000", {"Baud Rate": (1, 1)}),

@@ -114,8 +114,8 @@ def test_all_faults_of_a_chain_at_once(line: Recorder, chain: ServoChain) -> Non
         chain.enable()
     text = "\n".join(info.value.faults)
     assert "no answer from servo 2 of 1 to 4 at 1000000 baud" in text
-    assert "servo 3: is a XM430-W210, not a XM430-W350" in text
-    assert "servo 4: alarm: overheating, overload" in text
+    assert "joint 3 (ID 3): is a XM430-W210, not a XM430-W350" in text
+    assert "joint 4 (ID 4): alarm: overheating, overload" in text
     assert line.bank["Torque Enable"].tolist() == [0] * 4
 
 
@@ -240,7 +240,7 @@ def test_torque_goes_off_again_when_the_start_fails_half_way(
         sync_write(self, few, name, value)
 
     monkeypatch.setattr(DynamixelBus, "sync_write", lame)
-    with pytest.raises(BusError, match="servo 3: Torque Enable is 0 after 1"):
+    with pytest.raises(BusError, match=r"joint 3 \(ID 3\): Torque Enable is 0 after 1"):
         chain.enable()
     assert line.bank["Torque Enable"].tolist() == [0] * 4
 

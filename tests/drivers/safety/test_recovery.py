@@ -148,8 +148,10 @@ def test_a_servo_that_reboots_is_noticed_and_set_up_again(rig: Rig) -> None:
     rig.line.bank["Goal Current"][1] = 1193  # as after power-on
     rig.cycles(16)
     assert rig.link.recoveries == 1
-    assert rig.events[0] == "interrupted: servo 2: torque is off: has it rebooted?; the servos hold"
-    assert rig.events[1].endswith("torque off at joint 1")
+    assert rig.events[0] == (
+        "interrupted: joint 2 (ID 2): torque is off: has it rebooted?; the servos hold"
+    )
+    assert rig.events[1].endswith("to be set up again: joint 2 (ID 2)")
     assert rig.torque() == [1] * 4
     assert rig.line.bank["Goal Current"][1] == round(0.6 / 2.69e-3)
     assert rig.line.bank["Bus Watchdog"].tolist() == [10] * 4
@@ -177,7 +179,7 @@ def test_a_tripped_watchdog_is_noticed_though_the_host_talks(rig: Rig) -> None:
     rig.line.bank["Bus Watchdog"][2] = 0xFF
     rig.line.firmware.apply_registers()
     rig.cycles(16)
-    assert "servo 3: its bus watchdog has stopped it" in rig.events[0]
+    assert "joint 3 (ID 3): its bus watchdog has stopped it" in rig.events[0]
     assert rig.line.bank["Bus Watchdog"].tolist() == [10] * 4
 
 
@@ -219,9 +221,12 @@ def test_without_an_operator_confirm_means_no() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda r: r.alter("Model Number", 1, 1030), "servo 2: is a XM430-W210"),
-        (lambda r: r.alter("Firmware Version", 2, 47), "servo 3: firmware 47, was 48: another"),
-        (lambda r: r.alter("Hardware Error Status", 0, 4), "servo 1: alarm: overheating"),
+        (lambda r: r.alter("Model Number", 1, 1030), "joint 2 (ID 2): is a XM430-W210"),
+        (
+            lambda r: r.alter("Firmware Version", 2, 47),
+            "joint 3 (ID 3): firmware 47, was 48: another",
+        ),
+        (lambda r: r.alter("Hardware Error Status", 0, 4), "joint 1 (ID 1): alarm: overheating"),
         (lambda r: r.alter("ID", 3, 44), "no answer from servo 4"),
         (lambda r: r.limp("Homing Offset", 0, 400), "joint 1 (ID 1): moved by +0.6"),
         (lambda r: r.limp("Homing Offset", 1, 4096), "joint 2 (ID 2): off by +1 turns"),

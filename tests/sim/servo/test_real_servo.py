@@ -8,7 +8,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from snakewalk.sim.servo.motor import GEARBOXES, MOTORS, PWM_FULL, p_gain_per_rad
+from snakewalk.drivers.protocol.registers import PWM_FULL
+from snakewalk.sim.servo.motor import GEARBOXES, MOTORS, p_gain_per_rad
 
 XL330 = MOTORS["XL330-M288"]
 GEAR = GEARBOXES["XL330-M288"]
