@@ -122,8 +122,8 @@ class DynamixelBus:
         )
         return register.decode(data)
 
-    def write(self, servo_id: int, name: str, value: int) -> None:
-        """Write a register by its name.
+    def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
+        """Write a register by its name, in as many ``tries`` as other transactions, or so many.
 
         Raises:
             ControlTableError: no such register, or the value does not fit it.
@@ -136,7 +136,8 @@ class DynamixelBus:
         self._retry(
             lambda: write_register(
                 self.port, servo_id, register, data, self.latency_s, self._pending
-            )
+            ),
+            tries,
         )
 
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
@@ -216,9 +217,9 @@ class DynamixelBus:
             pending=self._pending,
         )
 
-    def _retry(self, once: Callable[[], T]) -> T:
+    def _retry(self, once: Callable[[], T], tries: int | None = None) -> T:
         """Run a transaction, and again after silence or damage; a refusal is final."""
-        for remaining in range(self._tries - 1, -1, -1):
+        for remaining in range((tries or self._tries) - 1, -1, -1):
             try:
                 return self._guarded(once)
             except NoAnswerError:

@@ -36,6 +36,12 @@ from snakewalk.drivers.types import JointCommand, JointState
 SLOW_EVERY = 16
 """Cycles from one reading of voltages and temperatures to the next (ours); torque and watchdog are
 checked as often, in other cycles."""
+_OFF_ROUNDS = 3
+"""Group reads in which the servos may confirm that their torque is off (ours)."""
+_OFF_S = 1.0
+"""How long servos that do not are asked one by one, at most, s (ours)."""
+_PORT_PATIENCE_S, _REOPEN_S = 2.0, 0.1
+"""How long torque off waits for a port that is gone, and between the tries to open it (ours)."""
 _FIRST_READS = 5
 """Tries to get one complete reply at the start (ours)."""
 
@@ -218,27 +224,70 @@ class ServoChain:
     def disable(self) -> None:
         """Torque off, then the watchdog, on every servo, also where others fail.
 
+        Servos that do not confirm it in a group read are asked once more, for a limited time.
+
         Raises:
             BusError: servos that did not confirm; their watchdog stays armed and stops them.
-            PortError: the port is gone and cannot be opened again; the watchdog stops the servos.
+            PortError: the port is gone and does not come back; the watchdog stops the servos.
 
         """
         self._armed = False
-        bus, ids = self._bus, self.robot.servo_ids
         try:
-            bus.sync_write(ids, "Torque Enable", 0)
-        except PortError:
-            reopen(bus.port)  # it may be back
-            bus.sync_write(ids, "Torque Enable", 0)
-        silent = []
-        for servo_id in ids:
-            try:
-                bus.write_verified(servo_id, "Torque Enable", 0)
-                bus.write(servo_id, "Bus Watchdog", 0)
-            except BusError:
-                silent.append(str(servo_id))
+            self._send_torque_off()
+            silent = self._without_torque_off()
+        except PortError as error:
+            raise PortError(
+                f"{error}; torque is not off: a servo that has torque holds where its bus watchdog "
+                f"({self._watchdog_s:.3g} s) stops it: switch the servo power off"
+            ) from error
         if silent:
-            raise BusError(f"servo {', '.join(silent)}: torque off is not confirmed")
+            names = ", ".join(map(self.robot.joint_name, silent))
+            raise BusError(f"{names}: torque off is not confirmed")
+
+    def _send_torque_off(self) -> None:
+        """Torque off to all, unconfirmed; waits a little for a port that is gone."""
+        give_up_s = self._clock.now_s() + _PORT_PATIENCE_S
+        while True:
+            try:
+                self._bus.sync_write(self.robot.servo_ids, "Torque Enable", 0)
+                return
+            except PortError:
+                late = self._clock.now_s() >= give_up_s
+                try:
+                    reopen(self._bus.port)  # it may be back
+                except PortError:
+                    if late:
+                        raise
+                    self._clock.sleep_until_s(self._clock.now_s() + _REOPEN_S)
+                else:
+                    if late:
+                        raise
+
+    def _without_torque_off(self) -> list[int]:
+        """Joints that do not confirm that their torque is off; the others' watchdogs are off."""
+        bus, ids = self._bus, self.robot.servo_ids
+        joints = list(range(self.joint_count))
+        for _ in range(_OFF_ROUNDS):
+            asked = [ids[joint] for joint in joints]
+            reply = bus.block(asked, "Torque Enable", "Torque Enable", fast=False).read()
+            off = reply.valid & (reply.data[:, 0] == 0)
+            joints = [joint for joint, done in zip(joints, off, strict=True) if not done]
+            if not joints:
+                break
+            bus.sync_write([ids[joint] for joint in joints], "Torque Enable", 0)
+        give_up_s = self._clock.now_s() + _OFF_S
+        silent = []
+        for joint in joints:  # those behind a silent servo stay silent in a group read
+            try:
+                if self._clock.now_s() >= give_up_s:
+                    raise BusError("no time left")
+                bus.write(ids[joint], "Torque Enable", 0, tries=1)
+            except BusError:
+                silent.append(joint)
+        confirmed = [servo_id for joint, servo_id in enumerate(ids) if joint not in silent]
+        if confirmed:
+            bus.sync_write(confirmed, "Bus Watchdog", 0)
+        return silent
 
     def read(self) -> JointState:
         """Read all joints once; in every 16th call voltages and temperatures too.

@@ -12,6 +12,10 @@ from typing import Protocol, runtime_checkable
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import PortError
 
+DRAIN_LIMIT_S = 0.1
+"""How long a line that does not fall quiet is drained, at most (ours): a stray byte now and then
+must not hold a read for ever. What is left of the noise is for the parser to skip."""
+
 
 class SdkPort(Protocol):
     """What ``dynamixel_sdk`` calls; names and units are its own."""
@@ -104,8 +108,8 @@ class BytePort(SdkPort, Protocol):
     def drain_until_quiet(self, quiet_s: float) -> int:
         """Throw bytes away until none has come for ``quiet_s``; the number thrown away.
 
-        Waits ``quiet_s`` at least, so that a late reply cannot be taken for that to the next
-        request.
+        Ends after ``quiet_s + DRAIN_LIMIT_S`` on a line that does not fall quiet. Waits ``quiet_s``
+        at least, so that a late reply cannot be taken for that to the next request.
         """
         ...
 

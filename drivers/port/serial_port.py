@@ -16,12 +16,14 @@ from serial.tools import list_ports
 
 from snakewalk.drivers.clock import Clock, WallClock
 from snakewalk.drivers.errors import PortError
+from snakewalk.drivers.port.byte_port import DRAIN_LIMIT_S
 
 _LATENCY_MS = 16.0
 """How long an FTDI adapter holds bytes back by default (its ``latency_timer``)."""
 _PROGRAM_S = 0.02
 """How late a program at the other end of a pseudo-terminal may be: it has to be scheduled."""
-_NOISE_LIMIT_BYTES = 1 << 16
+_DEVICE_ERRORS = (serial.SerialException, OSError, termios.error)
+"""What a device that is gone raises; ``termios.error`` is no ``OSError``."""
 _STUCK_S = 1.0
 """After so long a device that takes no more bytes is gone."""
 
@@ -119,25 +121,16 @@ class SerialPort:
         return got
 
     def drain_until_quiet(self, quiet_s: float) -> int:
-        """Throw bytes away until none has come for ``quiet_s``.
-
-        Raises:
-            PortError: the line never falls quiet.
-
-        """
+        """Throw bytes away until none has come for ``quiet_s``, for a limited time."""
         drained = 0
         quiet_at_s = self._clock.now_s() + quiet_s
+        limit_s = quiet_at_s + DRAIN_LIMIT_S
         while self._clock.now_s() < quiet_at_s:
             waiting = max(1, self.getBytesAvailable())
             got = len(self.read_until(waiting, quiet_at_s))
             if got:
                 drained += got
-                quiet_at_s = self._clock.now_s() + quiet_s
-            if drained > _NOISE_LIMIT_BYTES:
-                raise PortError(
-                    f"{self._device}: the line does not fall quiet; something else talks on it, "
-                    "or the baud rate is wrong"
-                )
+                quiet_at_s = min(self._clock.now_s() + quiet_s, limit_s)
         return drained
 
     # what the SDK calls
@@ -149,20 +142,21 @@ class SerialPort:
 
     def closePort(self) -> None:
         if self._serial is not None:
-            self._serial.close()
-            self._serial = self.descriptor = None
+            device, self._serial, self.descriptor = self._serial, None, None
+            with suppress(*_DEVICE_ERRORS):  # a device that is gone is closed as far as it can be
+                device.close()
         self.is_using = False
 
     def clearPort(self) -> None:
         try:
             self._line.reset_input_buffer()
-        except (serial.SerialException, OSError, termios.error) as error:
+        except _DEVICE_ERRORS as error:
             raise self._lost(error) from error
 
     def setBaudRate(self, baudrate: int) -> bool:
         try:
             self._line.baudrate = baudrate
-        except (ValueError, serial.SerialException, OSError):
+        except (ValueError, *_DEVICE_ERRORS):
             return False
         self._baud = baudrate
         return True
@@ -173,7 +167,7 @@ class SerialPort:
     def getBytesAvailable(self) -> int:
         try:
             return int(self._line.in_waiting)
-        except (serial.SerialException, OSError) as error:
+        except _DEVICE_ERRORS as error:
             raise self._lost(error) from error
 
     def readPort(self, length: int) -> bytes:
@@ -211,14 +205,14 @@ class SerialPort:
         try:
             self._serial = serial.Serial(self._device, self._baud, timeout=0.0, exclusive=True)
             self._serial.reset_input_buffer()
-        except (serial.SerialException, OSError, ValueError) as error:
+        except (ValueError, *_DEVICE_ERRORS) as error:
             raise self._open_error(error) from error
         self.descriptor = int(self._serial.fileno())
         self._readable, self._writable = select.poll(), select.poll()
         self._readable.register(self._serial.fileno(), select.POLLIN)
         self._writable.register(self._serial.fileno(), select.POLLOUT)
         # asks an FTDI driver for a latency timer of 1 ms instead of 16; others have none to set
-        with suppress(ValueError, NotImplementedError):
+        with suppress(ValueError, NotImplementedError, *_DEVICE_ERRORS):
             self._serial.set_low_latency_mode(True)
 
     def _lost(self, error: Exception) -> PortError:

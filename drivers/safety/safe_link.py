@@ -13,7 +13,9 @@ from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.vet import SafetyMemory, Verdict, check_state, stale_fault, vet
 from snakewalk.drivers.types import JointCommand, JointState
 
-_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+"""SIGQUIT is Ctrl-\\. SIGTSTP is Ctrl-Z: a program that is stopped cannot switch torque off, and
+the watchdogs would leave the servos holding with torque on."""
 
 
 class SafeLink:
@@ -21,8 +23,9 @@ class SafeLink:
 
     On a veto, on an error of the link below, or on ``request_stop`` it latches: torque goes off,
     ``tripped`` says why, ``write`` raises; ``read`` goes on, for the log. Only ``reset`` by an
-    operator and a new ``enable`` let it move again. Inside the context SIGTERM, SIGINT and SIGHUP
-    unwind the program through the exit; if it is killed, the servos' bus watchdog stops them.
+    operator and a new ``enable`` let it move again. Inside the context SIGTERM, SIGINT, SIGHUP,
+    SIGQUIT and SIGTSTP unwind the program through the exit; if it is killed, the servos' bus
+    watchdog stops them.
 
     With a ``recovery`` it does not latch at once when the line or a servo goes away: the chain
     holds, and goes on from where it stands if the policy of the recovery allows it.
@@ -140,6 +143,12 @@ class SafeLink:
         if self._stop_requested is not None:
             self._trip(self._stop_requested)
             self._refuse_if_tripped()
+        if self._recovery is not None:
+            # the program, or the machine, stood still between the read and here
+            stale = stale_fault(self._state, self._limits, self._clock.now_s())
+            if stale is not None:
+                self._recover(stale, None)
+                return
         verdict = vet(command, self._state, self._memory, self._limits, self._clock.now_s())
         self.last_verdict, self._memory = verdict, verdict.memory
         if verdict.veto is not None:

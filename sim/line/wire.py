@@ -16,6 +16,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 
 from snakewalk.drivers.errors import PortError
+from snakewalk.drivers.port.byte_port import DRAIN_LIMIT_S
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 from snakewalk.sim.line.bus_contention import Reply
 from snakewalk.sim.line.clock import SimClock
@@ -197,10 +198,11 @@ class Wire(ABC):
         return rx_queue.take(count, clock.now_s())
 
     def drain_until_quiet(self, quiet_s: float) -> int:
-        """Discard bytes until none has come for ``quiet_s``; returns their number."""
+        """Discard bytes until none has come for ``quiet_s``, for a limited time; their number."""
         discarded, seen_s = 0, self.clock.now_s()
+        limit_s = seen_s + quiet_s + DRAIN_LIMIT_S
         while True:
-            byte = self.read_until(1, seen_s + quiet_s)
+            byte = self.read_until(1, min(seen_s + quiet_s, limit_s))
             if not byte:
                 return discarded
             seen_s = self.clock.now_s()

@@ -21,7 +21,7 @@ def plan(kinds: tuple[str, ...], seed: int, duration_s: float) -> FaultPlan:
     rng = random.Random(f"{kinds} {seed}")
     faults = []
     for kind in kinds:
-        at_s = rng.uniform(0.3, 1.0)
+        at_s = rng.uniform(0.7, 1.4)  # the start takes half a second
         while at_s < duration_s:
             faults.append({"kind": kind, "at_s": at_s, **_how(kind, rng)})
             at_s += rng.uniform(0.6, 1.4) * _EVERY_S

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from snakewalk.drivers.port.byte_port import DRAIN_LIMIT_S
 from snakewalk.sim.line.clock import SimClock
 
 Script = Callable[[bytes], list[tuple[float, bytes]]]
@@ -41,8 +42,8 @@ class ScriptedPort:
 
     def drain_until_quiet(self, quiet_s: float) -> int:
         self.drains += 1
-        thrown = 0
-        while got := self.read_until(1, self.clock.now_s() + quiet_s):
+        thrown, limit_s = 0, self.clock.now_s() + quiet_s + DRAIN_LIMIT_S
+        while got := self.read_until(1, min(self.clock.now_s() + quiet_s, limit_s)):
             thrown += len(got)
         return thrown
 

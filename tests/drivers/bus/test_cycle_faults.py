@@ -232,3 +232,15 @@ def test_noise_in_front_of_a_reply_does_not_cost_it(servos: Servos) -> None:
     reply = cycle.read()
     assert reply.valid.all()
     assert (cycle.counters.unclean, port.drains) == (1, 1)
+
+
+def test_a_line_that_never_falls_quiet_holds_no_read_for_long() -> None:
+    """A stray byte every 3 ms held one read for as long as the bytes came."""
+
+    def babble(_: bytes) -> list[tuple[float, bytes]]:
+        return [(0.003 * k, b"\x55") for k in range(1, 4000)]
+
+    port = ScriptedPort(babble)
+    cycle = ControlCycle(port, [1, 2, 3])
+    assert not cycle.read().valid.any()
+    assert port.clock.now_s() < 0.2

@@ -1,5 +1,7 @@
 """Start-up order, faults at start, held values and the slow round of the chain."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from snakewalk.drivers.bus.budget import chain_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.chain.start_up import inspect
-from snakewalk.drivers.errors import BudgetError, BusError, ChainError
+from snakewalk.drivers.errors import BudgetError, BusError, ChainError, PortError
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.drivers.types import JointCommand
@@ -225,7 +227,7 @@ def test_disable_reaches_the_others_when_one_is_gone(chain: ServoChain, line: Re
     chain.enable()
     line.bank["ID"][0] = 99
     line.setBaudRate(line.getBaudRate())
-    with pytest.raises(BusError, match="servo 1: torque off is not confirmed"):
+    with pytest.raises(BusError, match=r"joint 1 \(ID 1\): torque off is not confirmed"):
         chain.disable()
     assert line.bank["Torque Enable"][1:].tolist() == [0] * 3
 
@@ -295,3 +297,54 @@ def test_fast_reads_given_up_in_a_run_are_told_with_what_the_wire_still_carries(
     assert event.startswith("fast sync reads given up after 3 failures")
     assert event.endswith(end)
     assert (f"at most {plain_hz:.0f} Hz of plain reads" in event) == (beyond > 1.0)
+
+
+@pytest.mark.parametrize("silent", [(0,), (1, 3), (0, 1, 2, 3)])
+def test_torque_off_is_sent_to_all_and_silent_servos_are_named_in_bounded_time(
+    chain: ServoChain, line: Recorder, silent: tuple[int, ...]
+) -> None:
+    chain.enable()
+    line.mute(np.array(silent), True)
+    line.refresh_ids()
+    begin_s = line.clock.now_s()
+    names = ", ".join(f"joint {k + 1} (ID {k + 1})" for k in silent)
+    with pytest.raises(BusError, match=re.escape(f"{names}: torque off is not confirmed")):
+        chain.disable()
+    assert line.clock.now_s() - begin_s < 0.3
+    assert line.bank["Torque Enable"].tolist() == [0] * 4
+    loud = [k for k in range(4) if k not in silent]
+    line.drain_until_quiet(1e-3)
+    assert line.bank["Bus Watchdog"][loud].tolist() == [0] * len(loud)
+
+
+def test_sixty_silent_servos_do_not_hold_up_the_way_out() -> None:
+    robot = RobotConfig(name="long", joint_axes="y" * 60)
+    line = Recorder(ServoBank(robot.servo_ids), [0.0] * 60)
+    chain = ServoChain(DynamixelBus(line), robot)
+    chain.enable()
+    line.mute(np.arange(60), True)
+    line.refresh_ids()
+    begin_s = line.clock.now_s()
+    with pytest.raises(BusError, match="torque off is not confirmed"):
+        chain.disable()
+    assert line.clock.now_s() - begin_s < 1.2
+    assert line.bank["Torque Enable"].tolist() == [0] * 60
+
+
+def test_a_port_that_stays_away_is_an_error_that_says_what_becomes_of_torque(
+    chain: ServoChain, line: Recorder
+) -> None:
+    chain.enable()
+    line.disconnect()
+    begin_s = line.clock.now_s()
+    with pytest.raises(PortError, match=r"torque is not off: .* switch the servo power off"):
+        chain.disable()
+    assert 1.9 < line.clock.now_s() - begin_s < 2.5
+
+
+def test_torque_off_waits_for_a_port_that_comes_back(chain: ServoChain, line: Recorder) -> None:
+    chain.enable()
+    line.disconnect()
+    line.firmware.events.schedule(line.clock.now_s() + 1.0, line.reconnect)
+    chain.disable()
+    assert line.bank["Torque Enable"].tolist() == [0] * 4

@@ -1,6 +1,7 @@
 """The serial port on a pseudo terminal; the other end is the test."""
 
 import os
+import termios
 import threading
 from collections.abc import Iterator
 
@@ -176,3 +177,25 @@ def test_a_request_longer_than_the_devices_buffer(pair: tuple[int, SerialPort]) 
 
 def test_no_latency_timer_on_a_pseudo_terminal(pair: tuple[int, SerialPort]) -> None:
     assert pair[1].latency_timer_ms is None
+
+
+def test_a_device_that_is_gone_is_a_port_error_whatever_the_terminal_raises(
+    pair: tuple[int, SerialPort], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``termios.error`` is no ``OSError``, and left ``clearPort``'s neighbours as it was."""
+
+    def gone(*_: object) -> None:
+        raise termios.error(5, "Input/output error")
+
+    _, port = pair
+    device = port._line
+    monkeypatch.setattr(type(device), "in_waiting", property(gone))
+    monkeypatch.setattr(type(device), "reset_input_buffer", gone)
+    monkeypatch.setattr(type(device), "close", gone)
+    with pytest.raises(PortError, match="the port is gone"):
+        port.getBytesAvailable()
+    with pytest.raises(PortError, match="the port is gone"):
+        port.clearPort()
+    with pytest.raises(PortError, match="the port is gone"):
+        port.drain_until_quiet(0.01)
+    port.closePort()

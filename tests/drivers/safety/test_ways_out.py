@@ -87,7 +87,9 @@ def test_a_killed_program_leaves_servos_that_stop_within_the_watchdogs_time(
     assert servos.torque() == [1] * 3  # they hold, and take no goal
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP]
+)
 def test_a_signal_switches_torque_off(servos: Servos, number: signal.Signals) -> None:
     servos.child.send_signal(number)
     servos.serve_until(lambda: servos.child.poll() is not None)

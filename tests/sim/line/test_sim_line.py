@@ -220,3 +220,11 @@ def test_two_runs_are_the_same_bit_for_bit() -> None:
         return seen
 
     assert run() == run()
+
+
+def test_draining_a_line_that_never_falls_quiet_ends() -> None:
+    line = a_line()
+    for k in range(1, 2000):
+        line._rx_queue.add(line.clock.now_s() + 0.003 * k, b"\x55")
+    assert 0 < line.drain_until_quiet(0.004) < 100
+    assert line.clock.now_s() < 0.2
