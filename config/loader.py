@@ -2,6 +2,7 @@
 
 import hashlib
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -67,6 +68,25 @@ def checked(model: type[M], data: dict[str, Any], source: str) -> M:
         return model.model_validate(data)
     except ValidationError as error:
         raise ConfigError([_line(source, dict(fault)) for fault in error.errors()]) from None
+
+
+def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
+    """Return ``config`` with the values of dotted ``keys`` replaced, as strict as a file.
+
+    Raises:
+        ConfigError: unknown keys and values out of range, all of them, one line each.
+
+    """
+    data = config.model_dump()
+    for key, value in keys.items():
+        *tables, last = key.split(".")
+        table = data
+        for name in tables:
+            if not isinstance(table.get(name), dict):
+                raise ConfigError(f"{source}: {key}: {name} is no table of it")
+            table = table[name]
+        table[last] = value
+    return checked(type(config), data, source)
 
 
 def load_robot(name_or_path: str, beside: Path | None = None) -> RobotConfig:

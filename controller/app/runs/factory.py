@@ -1,9 +1,9 @@
 """The one factory of runs: from a configuration, or a command's options, to a ``PreparedRun``."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.gait import GaitSetConfig
@@ -14,6 +14,7 @@ from snakewalk.config.loader import (
     load_run,
     load_world,
     shipped,
+    with_keys,
 )
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
@@ -28,6 +29,8 @@ from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.drivers.bus.budget import chain_budget
+
+C = TypeVar("C", RunConfig, RobotConfig, WorldConfig)
 
 GAIT_PITCH_CURRENT_A = 1.5
 """Goal current of the pitch joints in a motion that lifts: soft ones would not carry the links."""
@@ -56,19 +59,29 @@ def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Prepa
     return WalkRun(run, robot, world)
 
 
-def prepare_walk(name: str, **changes: object) -> WalkRun:
+def prepare_walk(
+    name: str, *, keys: Mapping[str, object] | None = None, **changes: object
+) -> WalkRun:
     """Load a run with its robot and world; ``changes`` replace fields of the run where not None.
+
+    ``keys`` replace single values of the three files: ``run.seed``, ``robot.link_mass_kg``,
+    ``world.ground.slope_rad``.
 
     Raises:
         ConfigError: every fault of a file at once.
         InputError: what the configuration asks cannot be made, or does not fit the wire.
 
     """
+    keys = {} if keys is None else keys
+    for key in keys:
+        if key.partition(".")[0] not in {"run", "robot", "world"}:
+            raise InputError(f"{key}: a key begins with run., robot. or world.")
     run = load_run(name)
     beside = Path(name).parent if name.endswith(".toml") else None
     options = {key: value for key, value in changes.items() if value is not None}
     options.setdefault("track", track_beside(run.track, beside))
     run = checked(RunConfig, run.model_dump() | options, "command line")
+    run = _with_keys_of("run", run, keys)
     if run.motion == "gait":
         raise InputError(f"run {run.name}: a gait is run by: snakewalk gait run NAME")
     if run.motion == "playback":
@@ -77,9 +90,14 @@ def prepare_walk(name: str, **changes: object) -> WalkRun:
         raise InputError(f"run {run.name}: planned by: snakewalk plan --with repertoire")
     if run.motion == "source":
         raise InputError(f"run {run.name}: a source of your own is run by prepare_source")
-    robot = load_robot(run.robot, beside)
+    robot = _with_keys_of("robot", load_robot(run.robot, beside), keys)
     _check_wire(run, robot)
-    return WalkRun(run, robot, load_world(run.world, beside))
+    return WalkRun(run, robot, _with_keys_of("world", load_world(run.world, beside), keys))
+
+
+def _with_keys_of(file: str, config: C, keys: Mapping[str, object]) -> C:
+    own = {k.removeprefix(f"{file}."): v for k, v in keys.items() if k.startswith(f"{file}.")}
+    return with_keys(config, own, f"{file} {config.name}") if own else config
 
 
 def prepare_gait(

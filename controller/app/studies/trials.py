@@ -1,6 +1,8 @@
-"""Runs over many seeds, motions, robots and steepnesses, on a process pool."""
+"""Runs over many seeds, motions, robots, grounds and frictions, on a process pool."""
 
+import json
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -10,6 +12,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.loader import digest
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.app.runs.walk_run import WalkRun
@@ -17,6 +20,8 @@ from snakewalk.controller.app.studies.pool import each
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
 from snakewalk.controller.terrain.summary import path_relief
+
+Value = str | int | float | bool
 
 _START_DRAWS = 1000
 
@@ -30,6 +35,8 @@ class Case:
     robot: str | None = None
     relief: float = 1.0
     """Factor on the heights of the ground."""
+    keys: tuple[tuple[str, Value], ...] = ()
+    """Values of the run's, robot's and world's files that are replaced; ``_deg`` for ``_rad``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +91,8 @@ def prepare_case(case: Case, seed: int, spread_m: float, changes: Mapping[str, o
 
     """
     robot = {"robot": case.robot} if case.robot is not None else {}
-    found = prepare_walk(case.run, motion=case.motion, seed=seed, **(dict(changes) | robot))
+    options = dict(changes) | robot | {"motion": case.motion, "seed": seed}
+    found = prepare_walk(case.run, keys=dict(map(_in_rad, case.keys)), **options)
     if case.relief != 1.0:
         found = replace(found, world=found.world.with_relief(case.relief))
     if spread_m == 0.0:
@@ -100,6 +108,47 @@ def prepare_case(case: Case, seed: int, spread_m: float, changes: Mapping[str, o
         f"run {found.run.name}: no safe ground within {spread_m:g} m of the start "
         f"({start_m[0]:.2f}, {start_m[1]:.2f}); move the start or give --start-spread 0"
     )
+
+
+def _in_rad(key_value: tuple[str, Value]) -> tuple[str, Value]:
+    """Files have radians; people think of slopes in degrees."""
+    key, value = key_value
+    if not key.endswith("_deg") or isinstance(value, str | bool):
+        return key, value
+    return f"{key.removesuffix('_deg')}_rad", math.radians(value)
+
+
+def parse_over(text: str) -> tuple[str, tuple[Value, ...]]:
+    """Read ``world.ground.slope_deg=5,10,15``: a key and the values it takes in turn.
+
+    Raises:
+        InputError: there is no key, or no value.
+
+    """
+    key, equals, values = (part.strip() for part in text.partition("="))
+    words = [word.strip() for word in values.split(",")]
+    if not (key and equals and all(words)):
+        raise InputError(f"--over {text}: must be KEY=VALUE,VALUE,...")
+    return key, tuple(dict.fromkeys(_value(word) for word in words))
+
+
+def _value(word: str) -> Value:
+    try:
+        value = json.loads(word)
+    except ValueError:
+        return word
+    return value if isinstance(value, int | float | bool) else word
+
+
+def config_digest(case: Case, changes: Mapping[str, object]) -> str:
+    """Tell the configuration of a case from every other: run, robot, world, but for seed and start.
+
+    Raises:
+        InputError: the case cannot be prepared.
+
+    """
+    found = prepare_case(case, 0, 0.0, changes)
+    return digest(found.run, found.robot, found.world)
 
 
 def is_fixed(case: Case, spread_m: float, changes: Mapping[str, object]) -> bool:
@@ -160,17 +209,16 @@ def _measured(trial: Trial, prepared: WalkRun) -> Trial:
 def plan_trials(
     cases: Sequence[Case], seeds: Sequence[int], spread_m: float, changes: Mapping[str, object]
 ) -> list[tuple[Case, int]]:
-    """List what is to be run: a case of which all seeds give the same run stands once.
+    """List what is to be run, seed by seed: what is stopped has nearly as many runs of each case.
+
+    A case of which all seeds give the same run stands once.
 
     Raises:
         InputError: a case cannot be prepared.
 
     """
-    return [
-        (case, seed)
-        for case in cases
-        for seed in (seeds[:1] if is_fixed(case, spread_m, changes) else seeds)
-    ]
+    fixed = {case: is_fixed(case, spread_m, changes) for case in cases}
+    return [(case, seed) for seed in seeds for case in cases if seed == seeds[0] or not fixed[case]]
 
 
 def trials(
@@ -198,6 +246,8 @@ class CaseSummary:
     robot: str
     motion: str
     relief: float
+    keys: dict[str, Value]
+    """What was replaced in the files."""
     runs: int
     slope_deg: float | None
     complete: str
@@ -220,8 +270,10 @@ class CaseSummary:
     roll_max_deg: float | None
     in_air: float | None
     alarms: int
+    causes: dict[str, int]
+    """Of failure, how many runs each, most first."""
     why: str
-    """Causes of failure, how many runs each."""
+    """The same in a line; what the software did not foresee in full."""
 
 
 def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
@@ -236,6 +288,7 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
                 robot=case.robot or "",
                 motion=case.motion,
                 relief=case.relief,
+                keys=dict(case.keys),
                 runs=len(some),
                 slope_deg=_mean([t.slope_median_deg for t in some], 1),
                 complete=f"{complete} of {len(some)}",
@@ -254,7 +307,8 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
                 roll_max_deg=_most([t.roll_max_deg for t in some], 0),
                 in_air=_mean([t.in_air for t in some], 2),
                 alarms=sum(t.alarms for t in some),
-                why=_causes([t for t in some if not t.complete]),
+                causes=_counts([t.cause for t in some if not t.complete]),
+                why=_why([t for t in some if not t.complete]),
             )
         )
     return rows
@@ -274,12 +328,14 @@ def wilson(successes: int, runs: int) -> tuple[float, float]:
     return round(max(middle - half, 0.0), 3), round(min(middle + half, 1.0), 3)
 
 
-def _causes(failed: Sequence[Trial]) -> str:
-    """Causes by how often they occur; what the software did not foresee, in full."""
+def _why(failed: Sequence[Trial]) -> str:
     words = [t.why if t.cause in {"safety", "refused", "error"} else t.cause for t in failed]
-    counts = {word: words.count(word) for word in sorted(set(words))}
-    most = sorted(counts.items(), key=lambda item: -item[1])
-    return "; ".join(f"{count} {word}" for word, count in most)
+    return "; ".join(f"{count} {word}" for word, count in _counts(words).items())
+
+
+def _counts(words: Sequence[str]) -> dict[str, int]:
+    """Words by how often they occur."""
+    return dict(sorted(sorted(Counter(words).items()), key=lambda item: -item[1]))
 
 
 def _number(value: object) -> float:

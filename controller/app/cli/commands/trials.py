@@ -1,7 +1,10 @@
 """``snakewalk trials``: runs over seeds, motions, robots and steepnesses."""
 
 import json
+from contextlib import nullcontext
 from dataclasses import asdict
+from itertools import product
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -9,6 +12,7 @@ from rich.table import Table
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, TrackFile, World, console
+from snakewalk.controller.app.result_files import check_picture
 
 _HEADS = {
     "run": "run",
@@ -52,44 +56,88 @@ def trials(
         list[float] | None,
         typer.Option(min=0.0, max=5.0, help="factor on the ground's heights; may be given again"),
     ] = None,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="values that a key of the run, robot or world takes, e.g. "
+            "world.ground.slope_deg=5,10,15; given again: every combination",
+            metavar="KEY=V1,V2",
+        ),
+    ] = None,
     world: World = None,
     track: TrackFile = None,
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="CSV of all runs; what it holds is not run again"),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(help="draw what was complete and why not (.png, .svg, .pdf)"),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Simulate runs over seeds, motions, robots and relief; tabulate what was reached and why not.
 
-    Each seed moves the start, so that its runs differ also where the motion takes no chances.
+    Each seed moves the start, so that its runs differ also where the motion takes no chances. A run
+    is the same for the same files: after an update of the program begin a new --out.
     """
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.studies import trials as study  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.app.studies.trials_table import TrialsTable  # noqa: PLC0415
 
+    check_picture(picture)
     require_extra("trials need", "mujoco")
     motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
+    overs = [study.parse_over(text) for text in over or ()]
+    keys, axes = [key for key, _ in overs], [values for _, values in overs]
     cases = [
-        study.Case(run, m, r, k)
+        study.Case(run, m, r, k, tuple(zip(keys, values, strict=True)))
         for run in (runs or [DEFAULT_RUN])
         for r in (robot if robot else (None,))
         for k in (relief if relief else (1.0,))
         for m in motions
+        for values in product(*axes)
     ]
     changes = {"world": world, "track": track}
     seen = range(first_seed, first_seed + seeds)
     planned = study.plan_trials(cases, seen, start_spread, changes)  # refuses bad input first
-    some = study.trials(planned, workers, spread_m=start_spread, changes=changes)
-    found = list(show_progress(some, "trials", len(planned), transient=False))
-    rows = [asdict(one) for one in study.table(found, cases)]
+    table = None
+    if out is not None:
+        configs = {case: study.config_digest(case, changes) for case in cases}
+        table = TrialsTable(out, configs, start_spread)
+    found = table.finished(planned) if table else []
+    done = {(trial.case, trial.seed) for trial in found}
+    missing = [item for item in planned if item not in done]
+    with table or nullcontext():
+        some = study.trials(missing, workers, spread_m=start_spread, changes=changes)
+        for trial in show_progress(
+            some, str(out or "trials"), len(planned), done=len(found), transient=False
+        ):
+            found.append(trial)
+            if table:
+                table.add(trial)
+    summaries = study.table(found, cases)
+    if picture is not None:
+        from snakewalk.controller.app.report.plots.trials import draw_trials  # noqa: PLC0415
+
+        draw_trials(summaries, picture)
+    rows = [asdict(one) for one in summaries]
     if as_json:
         settings = {"seeds": list(seen), "start_spread_m": start_spread}
         print(json.dumps(settings | {"table": rows, "trials": [asdict(t) for t in found]}))
         return
+    varied = [key for key, values in overs if len(values) > 1]
     shown = [key for key in _HEADS if any(row[key] not in {"", None} for row in rows)]
     if len({case.relief for case in cases}) == 1:
         shown.remove("relief")
     grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    for key in varied:
+        grid.add_column("\n".join(key.split(".")[-2:]), justify="right", no_wrap=True)
     for key in shown:
         text = key in _TEXT
         grid.add_column(_HEADS[key], justify="left" if text else "right", no_wrap=key != "why")
     for row in rows:
-        grid.add_row(*["" if row[key] is None else str(row[key]) for key in shown])
+        values = [row["keys"][key] for key in varied] + [row[key] for key in shown]
+        grid.add_row(*["" if value is None else str(value) for value in values])
     console.print(grid)

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.commands.trials import trials as command
 from snakewalk.controller.app.studies import trials as study
 from snakewalk.controller.app.studies.trials import Case, Trial, plan_trials, prepare_case, wilson
+from snakewalk.controller.app.studies.trials_table import TrialsTable
 
 FLAT, HILLS = Case("flat-square", "serpenoid"), Case("jacksboro-traverse", "walk")
 
@@ -109,3 +111,93 @@ def test_wilson_s_interval(successes: int, runs: int, interval: tuple[float, flo
     assert wilson(successes, runs) == pytest.approx(interval, abs=6e-4)
     low, high = wilson(runs - successes, runs)
     assert (1.0 - high, 1.0 - low) == pytest.approx(interval, abs=6e-4)
+
+
+def test_keys_replace_values_of_the_three_files() -> None:
+    keys = (
+        ("world.ground.slope_deg", 20),
+        ("world.friction.along", 0.3),
+        ("robot.joint_axes", "ypypypypypyp"),
+        ("run.physics_step_s", 0.002),
+    )
+    found = prepare_case(Case("ramp-10-up", "walk", keys=keys), 3, 0.0, {})
+    assert found.world.ground.slope_rad == pytest.approx(math.radians(20.0))
+    assert found.world.friction.along == 0.3
+    assert found.robot.joint_count == 12
+    assert (found.run.physics_step_s, found.run.seed) == (0.002, 3)
+    plain = prepare_case(Case("ramp-10-up", "walk"), 3, 0.0, {})
+    assert found.world.friction.across == plain.world.friction.across
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "fault"),
+    [
+        ("world.ground.slop_deg", 5, "world ramp-10: ground.ramp.slop_rad: unknown key"),
+        ("world.ground.slope_deg", -5, "greater than 0"),
+        ("world.ground.slope_rad", "steep", "valid number"),
+        ("world.name.first", 1, "name.first: name is no table"),
+        ("ground.slope_deg", 5, "begins with run., robot. or world."),
+        ("robot.servo.baud", 57600, "wire"),
+    ],
+)
+def test_a_wrong_key_is_refused_before_any_run(key: str, value: object, fault: str) -> None:
+    case = Case("ramp-10-up", "walk", keys=((key, value),))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=fault):
+        plan_trials([case], range(2), 0.04, {})
+
+
+def test_values_to_go_over_are_numbers_words_and_switches() -> None:
+    assert study.parse_over("a.b=5, 0.5,5") == ("a.b", (5, 0.5))
+    assert study.parse_over("a=yp,true,[1]") == ("a", ("yp", True, "[1]"))
+    for bad in ("a", "a=", "=1", "a=1,,2"):
+        with pytest.raises(InputError, match="KEY=VALUE"):
+            study.parse_over(bad)
+
+
+def test_trials_go_seed_by_seed() -> None:
+    walks = [Case("flat-square", "walk"), Case("flat-slalom", "walk")]
+    planned = plan_trials(walks, range(2), 0.04, {})
+    assert planned == [(walks[0], 0), (walks[1], 0), (walks[0], 1), (walks[1], 1)]
+
+
+STEEP = Case("ramp-10-up", "walk", keys=(("world.ground.slope_deg", 20),))
+
+
+def test_the_table_gives_back_what_it_was_given(tmp_path: Path) -> None:
+    path, configs = tmp_path / "t.csv", {STEEP: study.config_digest(STEEP, {})}
+    told = Trial(STEEP, 4, (0.1, -2.5), 3, True, 3, 1, duration_s=41.5, eta=0.1 + 0.2)
+    failed = Trial(STEEP, 5, cause="error", why='Fault: "a, b"\nand more')
+    with TrialsTable(path, configs, 0.04) as table:
+        table.add(told)
+        table.add(failed)
+    planned = [(STEEP, seed) for seed in range(4, 7)]
+    found = TrialsTable(path, configs, 0.04).finished(planned)
+    assert [repr(trial) for trial in found] == [repr(told), repr(failed)]  # nan is not nan
+    assert TrialsTable(path, configs, 0.05).finished(planned) == []  # another spread
+    flatter = replace(STEEP, keys=(("world.ground.slope_deg", 19),))
+    other = {flatter: study.config_digest(flatter, {})}
+    assert TrialsTable(path, other, 0.04).finished([(flatter, 4)]) == []
+    assert "world.ground.slope_deg=20" in path.read_text()
+
+
+def test_a_kept_table_is_not_run_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    run, out, picture = tmp_path / "near.toml", tmp_path / "t.csv", tmp_path / "t.png"
+    run.write_text('name = "near"\nwaypoints_m = [[0.4, 0.0]]\ntime_limit_s = 0.5\n')
+    over = ["world.friction.across=0.3,0.7", "world.friction.along=0.1"]
+    options = {"motion": ["serpenoid"], "workers": 1, "as_json": True, "out": out}
+    command([str(run)], seeds=1, over=over, picture=picture, **options)
+    rows = json.loads(capsys.readouterr().out)["table"]
+    assert [row["keys"]["world.friction.across"] for row in rows] == [0.3, 0.7]
+    assert [row["runs"] for row in rows] == [1, 1]
+    assert picture.stat().st_size > 0
+
+    def ran(planned: list[object], *_: object, **__: object) -> list[Trial]:
+        assert not planned
+        return []
+
+    monkeypatch.setattr(study, "trials", ran)
+    command([str(run)], seeds=1, over=over, **options)
+    assert json.loads(capsys.readouterr().out)["table"] == rows

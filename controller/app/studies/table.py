@@ -1,0 +1,82 @@
+"""A table of results as one CSV that survives a kill: a row is on the disk before the next."""
+
+import csv
+import io
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from snakewalk.config.errors import InputError
+
+
+def read_csv_table(path: Path, columns: Sequence[str], command: str) -> list[dict[str, str]]:
+    """Read the whole rows of a table that ``command`` wrote; a torn last line is dropped.
+
+    Raises:
+        InputError: the file is something else.
+
+    """
+    try:
+        text = path.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: {getattr(error, 'strerror', None) or 'is no text'}") from None
+    whole = text[: text.rfind("\n") + 1]
+    rows = csv.DictReader(io.StringIO(whole))
+    if not whole or tuple(rows.fieldnames or ()) != tuple(columns):
+        raise InputError(f"{path}: is no table of `snakewalk {command}` of this version")
+    return list(rows)
+
+
+class CsvTable:
+    """Appends rows; knows those that are there already by the columns of ``place``."""
+
+    def __init__(
+        self, path: Path, *, columns: Sequence[str], place: Sequence[str], command: str
+    ) -> None:
+        """Open or make the table.
+
+        Raises:
+            InputError: the file is something else.
+
+        """
+        self._path, self._columns, self._place = path, tuple(columns), tuple(place)
+        rows: list[dict[str, str]] = []
+        if path.exists() and path.stat().st_size:
+            rows = read_csv_table(path, columns, command)
+        self._held = {tuple(row[key] for key in self._place): row for row in rows}
+
+    def __enter__(self) -> Self:
+        """Cut off a torn last line and open for appending."""
+        if self._path.exists():
+            whole = self._path.read_bytes()
+            if not whole.endswith(b"\n"):
+                os.truncate(self._path, whole.rfind(b"\n") + 1)
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = self._path.open("a", newline="")
+        self._writer = csv.DictWriter(self._file, self._columns, restval="", lineterminator="\n")
+        if self._file.tell() == 0:
+            self._writer.writeheader()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close."""
+        self._file.close()
+
+    def held(self, place: tuple[str, ...]) -> dict[str, str] | None:
+        """Return the row of a place; None if the table does not hold it yet."""
+        return self._held.get(place)
+
+    def append(self, row: Mapping[str, object]) -> None:
+        """Append a row, and have it on the disk."""
+        text = {key: str(value) for key, value in row.items()}
+        self._writer.writerow(text)
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._held[tuple(text[key] for key in self._place)] = text
