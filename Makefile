@@ -11,7 +11,7 @@ CLIENTS := lerobot==0.4.4 deepdiff orderly-set cachebox tqdm deprecation
 # This one brings an old dynamixel_sdk along, so it gets a folder of its own, without that.
 ASIDE := dynamixel-controller==0.9.2
 
-.PHONY: setup run test lint types unit bench campaign clean
+.PHONY: setup run test lint types unit bench campaign failures clean
 
 setup: $(STAMP)
 
@@ -47,6 +47,30 @@ bench: setup
 
 campaign: setup
 	$(BIN)/python -m tests.campaign
+
+# make failures  where the walk still fails and why: maps over grounds, frictions and robots (hours; SEEDS=1
+# is a first look; docs/failures.md). A stopped one goes on where it was; FAILURES is where the tables are.
+SEEDS ?= 20
+FIRST_SEED ?= 1000
+FAILURES ?= runs/failures
+TRIALS := $(BIN)/snakewalk trials --motion walk --seeds $(SEEDS) --first-seed $(FIRST_SEED)
+ANYWHERE := --over world.planner.slope_limit_rad=1.4 --over world.planner.variance_limit_m2=1
+BODIES := --robot alternating16 --robot yaw16
+
+failures: setup
+	$(TRIALS) steps-4cm $(BODIES) $(ANYWHERE) --over world.ground.height_m=0.01,0.02,0.04,0.06 \
+	  -o $(FAILURES)/steps.csv --picture $(FAILURES)/steps.png
+	$(TRIALS) gaps-8cm $(BODIES) $(ANYWHERE) --over world.ground.width_m=0.04,0.08,0.12,0.16 \
+	  -o $(FAILURES)/gaps.csv --picture $(FAILURES)/gaps.png
+	$(TRIALS) ramp-10-up $(BODIES) --robot alternating12 --robot xl330-16 $(ANYWHERE) \
+	  --over world.ground.slope_deg=5,10,15,20 --over run.safety.voltage_min_v=4 \
+	  -o $(FAILURES)/ramp.csv --picture $(FAILURES)/ramp.png
+	$(TRIALS) random-10 $(ANYWHERE) --over world.ground.rms_slope_deg=5,10,15,20 \
+	  --over world.ground.correlation_m=0.15,0.3,0.6 \
+	  -o $(FAILURES)/random.csv --picture $(FAILURES)/random.png
+	$(TRIALS) flat-slalom ramp-10-up --robot alternating16 --over world.friction.along=0.1,0.2,0.4 \
+	  --over world.friction.across=0.2,0.4,0.8 \
+	  -o $(FAILURES)/friction.csv --picture $(FAILURES)/friction.png
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info
