@@ -8,10 +8,11 @@ the surface is raised first, so they are exact.
 
 from dataclasses import dataclass
 from math import asin, atan2, cos, hypot, pi, sin
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.ndimage import grey_closing
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
@@ -40,6 +41,20 @@ class GroundedSkeleton:
     def steepest_rad(self) -> float:
         """Largest inclination; the printed method assumes less than 25 degrees."""
         return float(np.abs(self.pitch_rad).max())
+
+
+def bridged(ground: HeightField, radius_m: float) -> HeightField:
+    """Return the ground that a ball of ``radius_m`` can touch from above.
+
+    Links lie over what is narrower than they are long: a trench, the corner below a step. (A grey
+    closing with a ball; Serra 1982.)
+    """
+    reach = int(radius_m / ground.spacing_m)
+    across = np.arange(-reach, reach + 1) * ground.spacing_m
+    square = radius_m**2 - across[:, None] ** 2 - across**2
+    ball: Any = np.sqrt(np.maximum(square, 0.0)) - radius_m  # scipy's stubs know whole numbers only
+    z_m = grey_closing(ground.z_m, footprint=square >= 0.0, structure=ball, mode="nearest")
+    return HeightField(z_m, ground.spacing_m, ground.x0_m, ground.y0_m)
 
 
 def half_heights_m(robot: RobotConfig, segments: int) -> Floats:

@@ -32,7 +32,11 @@ class TerrainPlanner:
         self.graph = None if self.relief is None else SafeGraph(self.relief)
 
     def __call__(
-        self, points_m: ArrayLike, heading_rad: float | None = None, turn_radius_m: float = 0.5
+        self,
+        points_m: ArrayLike,
+        heading_rad: float | None = None,
+        turn_radius_m: float = 0.5,
+        avoid_m: ArrayLike = (),
     ) -> SplinePath:
         """Plan a path from where the body is, on good ground or bad, through (n, 2) waypoints.
 
@@ -44,19 +48,22 @@ class TerrainPlanner:
             points_m: the first is where the head is.
             heading_rad: direction of the body there; None for any.
             turn_radius_m: least radius with which the body turns.
+            avoid_m: (k, 2) places where the body could not go on; paths keep off them by a
+                footprint where another way exists.
 
         Raises:
             InputError: a waypoint is off the world or on unsafe ground, or no safe way leads to it.
 
         """
         points = np.asarray(points_m, float)
-        if self.relief is None or self.graph is None:
+        graph = self.graph and self.graph.avoiding(np.asarray(avoid_m, float))
+        if self.relief is None or graph is None:
             path = SplinePath(points)
         else:
             faults = [f for k in range(1, len(points)) for f in _fault(self, k, points[k])]
             if faults:
                 raise InputError(faults)
-            path = self._spline(self._polygon(points, self.graph), points, self.relief)
+            path = self._spline(self._polygon(points, graph), points, self.relief)
         if heading_rad is None:
             return path
         until_m = path.first_pass(points[1])

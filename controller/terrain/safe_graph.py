@@ -1,5 +1,8 @@
 """The graph of safe nodes, and the cheapest paths through it ([PT] 2.6.1, [KP] 4.3)."""
 
+from copy import copy
+from typing import Self
+
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
@@ -14,6 +17,8 @@ RISK_LIMIT = 0.9
 # Half of the sixteen neighbours; the other half are the same edges in the other direction.
 _STEPS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (2, -1), (1, -2))
 _SAMPLE_M = 0.05
+_AVOID = 30.0
+"""Metres of level path that a metre through an avoided place costs more."""
 
 
 class SafeGraph:
@@ -49,8 +54,32 @@ class SafeGraph:
         """(n, 2) safe nodes."""
         self.safe_share = float(safe.mean()) if safe.size else 0.0
         """Safe nodes over all nodes inside the margin."""
+        self._avoid_m = np.empty((0, 2))
         self._edges = self._joined(index)
         self._trees: dict[int, tuple[Floats, Indices]] = {}
+
+    def avoiding(self, places_m: Floats) -> Self:
+        """Return this graph with a cost on what lies within a footprint of places (k, 2)."""
+        if len(places_m) == 0:
+            return self
+        found = copy(self)
+        found._avoid_m, found._trees = np.asarray(places_m, float), {}
+        edges = self._edges.tocoo()
+        from_m, to_m = self.nodes_m[edges.col], self.nodes_m[edges.row]
+        length = np.hypot(*(to_m - from_m).T)
+        more = self.length_weight * length * found._avoided(0.5 * (from_m + to_m))
+        found._edges = csr_array(
+            coo_array((edges.data + more, (edges.row, edges.col)), shape=edges.shape)
+        )
+        return found
+
+    def _avoided(self, points_m: Floats) -> Floats:
+        """Metres (...) that a metre of path at points (..., 2) costs more for avoided places."""
+        total = np.zeros(points_m.shape[:-1])
+        for place in self._avoid_m:
+            far = np.hypot(*np.moveaxis(points_m - place, -1, 0))
+            total += _AVOID * np.maximum(1.0 - far / self._relief.config.footprint_m, 0.0) ** 2
+        return total
 
     def nearest(self, point_m: Floats, among: Bools | None = None) -> int | None:
         """Return the safe node nearest to a point; None if there is none."""
@@ -97,7 +126,7 @@ class SafeGraph:
         config = self._relief.config
         up, side = self.footprint.slopes(points_m, direction) / np.tan(config.climb_limit_rad)
         level = 1.0 + config.clearance_weight * self.footprint.nearness(points_m)
-        level = level + config.side_weight * side**4
+        level = level + config.side_weight * side**4 + self._avoided(points_m)
         variance = self._relief.variance_m2(*np.moveaxis(points_m, -1, 0)) / config.node_spacing_m
         there, back = (
             variance

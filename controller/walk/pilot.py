@@ -18,6 +18,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.kinematics.roll_compensation import RollCompensation
 from snakewalk.controller.kinematics.rotations import offset_rad
 from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.controller.mechanics.rollout import PATH_STEP_M, PathTable
@@ -56,8 +57,22 @@ _SHORTEST_STEP_S = 1e-5
 
 # Body lengths of track before another path may be planned: turning back takes about as much.
 _REPLAN_AFTER_BODIES = 2.0
-Planner = Callable[[Floats, float | None], SplinePath]
-"""Plans a path through (n, 2) points in order, from a heading where one is given."""
+# A body that gains less than this on its path over so much track stands still.
+_STALL_BODIES = 0.25
+_STALL_AFTER_BODIES = 5.0
+
+
+class PathPlanner(Protocol):
+    """Plans paths."""
+
+    def __call__(
+        self, points_m: Floats, heading_rad: float | None, *, avoid_m: Floats
+    ) -> SplinePath:
+        """Plan through (n, 2) points in order, from a heading where one is given.
+
+        The path keeps off places ``avoid_m`` (k, 2) where another way exists.
+        """
+        ...
 
 
 class ShapeChooser(Protocol):
@@ -119,9 +134,10 @@ class Pilot:
         time_law: TimeLaw,
         *,
         pace: Pace,
-        plan: Planner,
+        plan: PathPlanner,
         pitch_fitter: PitchFitter | None = None,
         pitch_lead_s: float = 0.0,
+        roll: RollCompensation | None = None,
         fall_back: Callable[[bool], None] | None = None,
         start_m: Floats,
         waypoints_m: Sequence[tuple[float, float]],
@@ -141,10 +157,15 @@ class Pilot:
         self._pitch_fitter = pitch_fitter
         self._fall_back = fall_back or (lambda lost: None)
         self._pitch_rad: Floats | None = None
+        self._roll = roll
         self._waypoints_m = np.asarray(waypoints_m, float)
         self._goals_m: list[list[float]] = self._waypoints_m.tolist()  # to numbers once, for speed
         self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
         self._length_m = length_m
+        self._along_m = np.zeros(2)
+        """Of the body's centre on the path, and of its head."""
+        self._gained_m = self._gained_at = 0.0
+        self._stalls_m: list[Floats] = []
         self._plan_path(np.asarray(start_m, float), 0)
         self._links = len(self._goal_rad) + 1
         self._pitch_lead_s = pitch_lead_s
@@ -239,7 +260,8 @@ class Pilot:
         if self.complete:
             self._time_law.stop()
         self._time_law.advance(dt_s)
-        return self._on_ground(self._time_law.goal_rad(), dt_s, view)
+        goal_rad = self._on_ground(self._time_law.goal_rad(), dt_s, view)
+        return goal_rad if self._roll is None else self._roll(goal_rad, view, dt_s)
 
     def _on_ground(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:
         """Add to yaw goals (J,) the pitch that fits the body to the ground under it.
@@ -285,13 +307,26 @@ class Pilot:
         if math.hypot(x_m - centre_m[0], y_m - centre_m[1]) <= self._radius_m:
             self.reached += 1
             self._fall_back(False)
-        elif self._feedback and self.head >= self._replan_after and self._is_off_path(centre_m):
+        elif self._feedback and self.head >= self._replan_after:
+            stalled = self._is_stalled()
+            if not stalled and not self._is_off_path(centre_m):
+                return
+            if stalled:
+                self._stalls_m.append(head_m.copy())
             self.missed += 1
             self._fall_back(self.reached == self._missed_before)
             self._missed_before = self.reached
             self._replan_after = self.head + _REPLAN_AFTER_BODIES * self._chooser.track.points
             with suppress(InputError):  # no safe path leads back from here: the old one stays
                 self._plan_path(head_m, self.reached, heading_rad)
+
+    def _is_stalled(self) -> bool:
+        """Whether the shape has travelled far, and the body not."""
+        along_m = float(self._along_m[0])
+        if along_m > self._gained_m + _STALL_BODIES * self._length_m:
+            self._gained_m, self._gained_at = along_m, self.head
+        track = (self.head - self._gained_at) / self._chooser.track.points
+        return track > _STALL_AFTER_BODIES
 
     def _is_off_path(self, centre_m: Floats) -> bool:
         """Whether the next waypoint was passed by, or the body is half its length off the path."""
@@ -308,10 +343,14 @@ class Pilot:
 
     def _plan_path(self, from_m: Floats, first: int, heading_rad: float | None = None) -> None:
         """Plan from a point, with the body's heading, through the waypoints from ``first`` on."""
-        self.path = self._plan(np.vstack([from_m, self._waypoints_m[first:]]), heading_rad)
+        points_m = np.vstack([from_m, self._waypoints_m[first:]])
+        self.path = self._plan(
+            points_m, heading_rad, avoid_m=np.array(self._stalls_m).reshape(-1, 2)
+        )
+        self._gained_m, self._gained_at = 0.0, self.head
         whole = np.arange(0.0, self.path.length_m, PATH_STEP_M)
         self._table = PathTable.of(self.path.position(np.append(whole, self.path.length_m)))
-        self._along_m = np.zeros(2)  # of the body's centre, and of its head
+        self._along_m = np.zeros(2)
         self._passed_m = [0.0] * len(self._waypoints_m)
         at = 0.0
         for k in range(first, len(self._waypoints_m)):

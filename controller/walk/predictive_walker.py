@@ -29,6 +29,8 @@ CLIMBING = (
 )
 """Carriers of states uphill. On paper a slope of 15 degrees leaves the first 0.27 of the progress
 without slip, one of 18 degrees the second 0.17, and a fifth of a state takes 0.02 of that."""
+SERPENOIDS = (SerpenoidParameters(), *CLIMBING)
+"""What it falls back on."""
 _JOIN = 0.1
 """Of a body: in this a state that repeats itself goes from its head's angle to its tail's."""
 _REST = 20
@@ -110,16 +112,13 @@ class PredictiveWalker:
         self._near = 0
         self._tried: list[_Tried] = []
         self._thinking: Iterator[bool] | None = None
-        self._plain: SerpenoidParameters | None = None
+        self._lost = False
 
     def fall_back(self, lost: bool) -> None:
         """Set whether to go on as a serpenoid: at the very last, steered the same way."""
-        if lost and self._plain is None:
-            self._plain = SerpenoidParameters()
-            self._base_rad, self._at = phase_at_end(self.track, self._plain)
-            self._thinking = None
-        elif not lost and self._plain is not None:
-            self._plain, self._until, self._thinking = None, 0, None
+        if lost != self._lost:
+            self._lost, self._thinking = lost, None
+            self._until = self._at
 
     def think(self, look: Callable[[], PathPose]) -> bool:
         """Spend a cycle on the next decision; only the first call looks where the body is.
@@ -145,7 +144,8 @@ class PredictiveWalker:
         best = self._best()
         option, keep = best.option, self._keep
         if self._is_new:
-            self._star.take(option.state)
+            if option.state != SERPENOID:
+                self._star.take(option.state)
             self._at, self._option = 0, option
             self._until = self._walked
         self.track.append(best.piece_rad[:keep])
@@ -159,7 +159,7 @@ class PredictiveWalker:
     @property
     def _is_new(self) -> bool:
         """Whether the next piece begins another state."""
-        return self._plain is None and self._at >= self._until
+        return self._at >= self._until
 
     def _best(self) -> _Tried:
         """Cheapest piece whose body may be made; the cheapest if none may."""
@@ -174,7 +174,11 @@ class PredictiveWalker:
         """Judge options and bends, a batch at a time, the most likely ones first."""
         first = np.append(np.column_stack([_SCREEN, np.zeros(3)]), [self._bends], axis=0)
         yield from self._screen(pose, self._options(pose), first)
-        if self._is_new and self._best_so_far().progress < self._walk.climb_progress:
+        if (
+            self._is_new
+            and not self._lost
+            and self._best_so_far().progress < self._walk.climb_progress
+        ):
             for carrier in CLIMBING:
                 yield from self._screen(pose, self._options(pose, carrier), first)
         option = self._best_so_far().option
@@ -216,13 +220,12 @@ class PredictiveWalker:
     def _options(self, pose: PathPose, carrier: SerpenoidParameters | None = None) -> list[_Option]:
         """What may come next: the rest of the state, or the smoothest of the first states of W."""
         points, walk = self.track.points, self._walk
-        if self._plain is not None:
-            wave = self._plain.wave_rad(self._at + np.arange(points), points)
-            self._near = 1
-            return [_Option(SERPENOID, self._base_rad, wave)]
         if self._option is not None and not self._is_new:
             going_on = self._option.wave_rad[self._at :]
             return [_Option(self._option.state, self._base_rad, going_on)]
+        if self._lost:
+            self._near = 1
+            return [self._serpenoid(each) for each in SERPENOIDS]
         share, at = (1.0, 0) if carrier is None else (walk.climb_share, self._phase(carrier))
         carried = np.zeros(self._walked + points + 1)
         if carrier is not None:
@@ -239,6 +242,13 @@ class PredictiveWalker:
             _Option(int(states[k]), float(placed[states[k]]), waves[k], carrier, at)
             for k in np.argsort(rough, kind="stable")[: walk.candidates]
         ]
+
+    def _serpenoid(self, carrier: SerpenoidParameters) -> _Option:
+        """A plain serpenoid for a state's length; it goes on, or begins as the track bends."""
+        points, at = self.track.points, self._phase(carrier)
+        waves = carrier.wave_rad(at - 1 + np.arange(self._walked + points + 1), points)
+        base = self.track.last_rad - waves[0]
+        return _Option(SERPENOID, float(base), waves[1:], carrier, at)
 
     def _phase(self, carrier: SerpenoidParameters) -> int:
         """Sample of a carrier that comes next: it goes on, or begins as the track bends."""

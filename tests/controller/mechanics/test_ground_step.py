@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.mechanics import ground_step
-from snakewalk.controller.mechanics.ground_step import GroundStep, Known
+from snakewalk.controller.mechanics.ground_step import GroundStep, Known, bridged
 
 R = 0.012
 S = (np.arange(100) + 0.5) / 100
@@ -152,3 +152,42 @@ def test_printed_lifting_after_the_crossing_changes_segment_lengths() -> None:
     drift = np.linalg.norm(np.diff(printed, axis=0), axis=1) / R - 1.0
     assert np.abs(drift).min() > 0.09
     np.testing.assert_allclose(np.linalg.norm(np.diff(ours, axis=0), axis=1), R, rtol=1e-12)
+
+
+def trench(width_m: float) -> HeightField:
+    """Half a metre deep, across x = 0."""
+    x = np.arange(-100, 101) * 0.005
+    return HeightField(
+        np.tile(np.where(np.abs(x) < width_m / 2, -0.5, 0.0), (201, 1)), 0.005, -0.5, -0.5
+    )
+
+
+@pytest.mark.parametrize("radius_m", [0.07, 0.2])
+def test_a_bridged_trench_is_as_deep_as_the_ball_sinks_in(radius_m: float) -> None:
+    found = bridged(trench(0.08), radius_m)
+    edge_m = 0.04  # the last samples on the level, to which the ball comes down
+    sinks_m = radius_m - np.sqrt(radius_m**2 - edge_m**2)
+    assert -found.elevation_m(0.0, 0.0) == pytest.approx(sinks_m, abs=0.001)
+    np.testing.assert_allclose(found.elevation_m(np.array([-0.3, 0.3]), np.zeros(2)), 0.0)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000), st.floats(0.05, 0.3))
+def test_bridging_never_digs_and_bridges_nothing_twice(seed: int, radius_m: float) -> None:
+    ground = rough(seed, 0.05)
+    once = bridged(ground, radius_m)
+    assert (once.z_m >= ground.z_m - 1e-12).all()
+    np.testing.assert_allclose(bridged(once, radius_m).z_m, once.z_m, atol=1e-12)
+
+
+def test_bridging_leaves_slopes_and_crests_as_they_are() -> None:
+    plane = slope(0.3)
+    inner = slice(1, -1)  # beyond its border a field goes on level
+    np.testing.assert_allclose(bridged(plane, 2.0).z_m[inner, inner], plane.z_m[inner, inner])
+    roof = HeightField(
+        -np.abs(trench(0.0).z_m * 0.0 + np.linspace(-0.3, 0.3, 201)), 0.005, 0.0, 0.0
+    )
+    inner = slice(41, -41)
+    np.testing.assert_allclose(
+        bridged(roof, 0.2).z_m[inner, inner], roof.z_m[inner, inner], atol=1e-9
+    )

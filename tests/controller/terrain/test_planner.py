@@ -145,6 +145,17 @@ def test_it_is_deterministic_and_forgets_nothing() -> None:
     np.testing.assert_array_equal(looked_at(TerrainPlanner(ground, CONFIG)(points)), first)
 
 
+def test_a_path_keeps_a_footprint_off_a_place_to_avoid_where_it_can() -> None:
+    planner = TerrainPlanner(field(lambda x, y: 0.0 * x), CONFIG)
+    ends, place = [(-1.5, 0.0), (1.5, 0.0)], np.array([0.0, 0.0])
+    plain, around = looked_at(planner(ends)), looked_at(planner(ends, avoid_m=[place]))
+    assert np.hypot(*(plain - place).T).min() < 0.02
+    assert np.hypot(*(around - place).T).min() > 0.7 * CONFIG.footprint_m
+    np.testing.assert_array_equal(looked_at(planner(ends)), plain)
+    through = looked_at(planner([*ends, (0.0, 0.0)], avoid_m=[place]))  # there is no other way
+    assert np.hypot(*(through - place).T).min() < 0.02
+
+
 def test_no_safe_ground_at_all_is_said() -> None:
     planner = TerrainPlanner(field(lambda x, y: x), CONFIG)
     with pytest.raises(InputError, match="no safe ground at all"):

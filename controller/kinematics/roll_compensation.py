@@ -1,0 +1,57 @@
+"""Roll compensation: joint goals that bend a rolled body in the plane that was meant.
+
+A body that has rolled by an angle bends its yaw joints out of the ground's plane, and on its back
+to the wrong side. Its bends, turned back by that angle, lie in the plane again: what yaw joints
+lack, the pitch joints beside them make. A remainder of the roll is left in, so that the weight of
+the tilted shape turns the body home.
+"""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.kinematics.rotations import wrap
+
+_LEFT_IN_RAD = 1.0
+"""Roll that is not compensated: the weight takes care of it (ours)."""
+_RATE_RAD_S = 2.0
+"""Fastest change of the compensation: joints of 0.7 rad then move at 1.4 rad/s (ours)."""
+
+
+class RollCompensation:
+    """Turns goals of one robot by the roll of its body."""
+
+    def __init__(self, robot: RobotConfig) -> None:
+        """``robot`` has yaw and pitch joints; one without either cannot be compensated."""
+        self._yaw = np.array(robot.yaw_joints, dtype=np.intp)
+        self._pitch = np.array(robot.pitch_joints, dtype=np.intp)
+        self._limit_rad = np.array(robot.limit_rad)
+        self._measured_rad = 0.0
+        self._roll_rad = 0.0
+
+    def __call__(self, goal_rad: Floats, view: BodyView, dt_s: float) -> Floats:
+        """Return goals (J,) whose bends lie as ``goal_rad`` would on a body that has not rolled."""
+        # counted on over half a turn: a body on its back is turned home one way, not to and fro
+        self._measured_rad += float(wrap(body_roll_rad(view) - self._measured_rad))
+        measured = self._measured_rad
+        wanted = measured - min(max(measured, -_LEFT_IN_RAD), _LEFT_IN_RAD)
+        most = _RATE_RAD_S * dt_s
+        self._roll_rad += min(max(wanted - self._roll_rad, -most), most)
+        if self._roll_rad == 0.0:
+            return goal_rad
+        joints = np.arange(len(goal_rad))
+        level = np.interp(joints, self._yaw, goal_rad[self._yaw])
+        rise = np.interp(joints, self._pitch, goal_rad[self._pitch])
+        c, s = np.cos(self._roll_rad), np.sin(self._roll_rad)
+        out = np.empty_like(goal_rad)
+        out[self._yaw] = (c * level + s * rise)[self._yaw]
+        out[self._pitch] = (c * rise - s * level)[self._pitch]
+        return np.clip(out, -self._limit_rad, self._limit_rad)
+
+
+def body_roll_rad(view: BodyView) -> float:
+    """Mean roll of the links about their own axes, from -pi to pi; positive with the left up."""
+    up = view.rotation[:, 2, 1:]
+    size = np.hypot(up[:, 0], up[:, 1])
+    return float(np.arctan2((up[:, 0] / size).sum(), (up[:, 1] / size).sum()))
