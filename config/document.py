@@ -88,7 +88,9 @@ def _tables(title: str, model: type[BaseModel]) -> list[str]:
 
 
 def _title(title: str, name: str, model: type[BaseModel], choices: int) -> str:
-    place = f"{title.partition(': ')[0]}: `[{name}]`"
+    top, _, outer = title.partition(": ")
+    table = f"{outer.strip('[]`')}.{name}" if outer.startswith("`[") else name
+    place = f"{top}: `[{table}]`"
     if choices == 1:
         return place
     return f'{place} with `kind = "{_text(model.model_fields["kind"].default)}"`'

@@ -9,6 +9,7 @@ from snakewalk.config.camera import CameraConfig, PoseName
 from snakewalk.config.gait import GaitConfig
 from snakewalk.config.playback import PlaybackConfig
 from snakewalk.config.robot import ServoConfig
+from snakewalk.config.synthesis import SynthesisConfig
 
 MotionName = Literal[
     "walk", "walk-printed", "walk-blind", "serpenoid", "gait", "playback", "repertoire", "source"
@@ -123,6 +124,7 @@ class RunConfig(Strict):
         None, description="what measures the head; default: the simulator, on servos the joints"
     )
     camera: CameraConfig = CameraConfig()
+    synthesis: SynthesisConfig = SynthesisConfig()
 
     @model_validator(mode="after")
     def _motion_has_its_table(self) -> Self:

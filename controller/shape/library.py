@@ -7,7 +7,14 @@ import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.shape.states import energy_kept, random_states, to_angles, to_states
+from snakewalk.config.synthesis import WavesConfig
+from snakewalk.controller.shape.states import (
+    energy_kept,
+    limit_to_waves,
+    random_states,
+    to_angles,
+    to_states,
+)
 
 ShapeFilter = Callable[[Floats], Bools]
 """Shapes (S, N) to a mask (S,) of those that cannot be used."""
@@ -43,24 +50,34 @@ def build_library(
     random_count: int,
     curvature: float,
     rng: np.random.Generator,
+    waves: WavesConfig | None = None,
 ) -> StateLibrary:
     """Turn tangent angles (T, N) into states, add ``random_count`` random ones, filter all.
+
+    Where kinds of waves are wanted ([PT] 2.6.6), the library holds random states of these only, in
+    the wanted parts.
 
     Raises:
         InputError: too few random states pass: the robot cannot make these motions.
 
     """
+    points = track_rad.shape[-1]
     states = curvature * to_states(track_rad, coefficients)
     rejected = dict.fromkeys(filters, 0)
-    recorded = _passing(to_angles(states, track_rad.shape[-1]), filters, rejected)
-    made: list[Floats] = []
-    for _ in range(_ROUNDS):
-        missing = random_count - sum(map(len, made))
-        if missing <= 0:
-            break
-        drawn = to_angles(random_states(states, max(missing, 20), rng), track_rad.shape[-1])
-        made.append(_passing(drawn, filters, rejected)[:missing])
-    fresh = np.concatenate([np.empty((0, track_rad.shape[-1])), *made])
+    recorded, made = np.empty((0, points)), [np.empty((0, points))]
+    for wanted, band in _counts(random_count, waves):
+        got = 0
+        for _ in range(_ROUNDS):
+            if got >= wanted:
+                break
+            drawn = random_states(states, max(wanted - got, 20), rng)
+            if waves is not None and band is not None:
+                drawn = limit_to_waves(drawn, *band, waves.energy_share)
+            made.append(_passing(to_angles(drawn, points), filters, rejected)[: wanted - got])
+            got += len(made[-1])
+        if band is None:
+            recorded = _passing(to_angles(states, points), filters, rejected)
+    fresh = np.concatenate(made)
     if len(fresh) < random_count or len(recorded) + len(fresh) < 2:
         reasons = ", ".join(f"{name}: {count}" for name, count in rejected.items())
         raise InputError(
@@ -70,6 +87,17 @@ def build_library(
         )
     kept = float(energy_kept(track_rad, coefficients).mean())
     return StateLibrary(np.concatenate([recorded, fresh]), len(recorded), rejected, kept)
+
+
+def _counts(
+    random_count: int, waves: WavesConfig | None
+) -> list[tuple[int, tuple[int, int] | None]]:
+    """How many random states of which coefficients; None: as recorded."""
+    parts = {} if waves is None else waves.parts
+    if not parts:
+        return [(random_count, None)]
+    ends = np.rint(random_count * np.cumsum([0.0, *parts.values()])).astype(int)
+    return list(zip(np.diff(ends).tolist(), parts, strict=True))
 
 
 def _passing(shapes: Floats, filters: dict[str, ShapeFilter], rejected: dict[str, int]) -> Floats:

@@ -98,3 +98,26 @@ def random_states(states: Complexes, count: int, rng: np.random.Generator) -> Co
     limits = state_range(states)
     modulus = limits.low + rng.random((count, states.shape[-1])) * (limits.high - limits.low)
     return np.asarray(modulus * np.exp(2j * np.pi * rng.random((count, states.shape[-1]))))
+
+
+def limit_to_waves(states: Complexes, first: int, last: int, share: float) -> Complexes:
+    """States (..., n) whose coefficients ``first`` to ``last`` hold a share of their energy.
+
+    [PT] 2.6.6 sets thresholds on the energy of the coefficients (Fig. 13). The other coefficients
+    are scaled down to the threshold, all to the energy that the state had: K stays the same, which
+    is what drives the speed law.
+
+    Raises:
+        ValueError: the states have no such coefficients.
+
+    """
+    if not 1 <= first <= last <= states.shape[-1]:
+        raise ValueError(f"coefficients {first}-{last} of {states.shape[-1]}")
+    inside = np.zeros(states.shape[-1], dtype=bool)
+    inside[first - 1 : last] = True
+    energy = np.abs(states) ** 2
+    kept, rest = energy[..., inside].sum(axis=-1), energy[..., ~inside].sum(axis=-1)
+    most = kept * (1.0 - share) / share  # energy outside that the share leaves room for
+    down = np.sqrt(np.minimum(1.0, most / np.where(rest > 0.0, rest, 1.0)))
+    up = np.sqrt((kept + rest) / np.where(kept > 0.0, kept + down**2 * rest, 1.0))
+    return np.asarray(states * up[..., None] * np.where(inside, 1.0, down[..., None]))

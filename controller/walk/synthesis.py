@@ -11,10 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Complexes, Floats
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics import smoothstep
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
+from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.angle_track import AngleTrack
 
 Schedule = float | Callable[[int], float | Floats]
@@ -23,7 +24,7 @@ Schedule = float | Callable[[int], float | Floats]
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
-    """How the angles move along the body.
+    """How the angles move along the body, and how the ends of it are held.
 
     Raises:
         ValueError: a constant sliding outside 0..1.
@@ -34,28 +35,23 @@ class Behaviour:
     """w_d in 0..1: share of the pulse that is lost. At 1 the shape is frozen and glides."""
     pulse_m_s: Schedule = 0.0
     """g of Eq. 13, added to the speed of the body."""
+    head_held: Schedule = 0.0
+    """0..1: how far the head and neck point where the whole body heads (ours)."""
+    calm_tail: Schedule = 0.0
+    """0..1: how far the bends of the tail are flattened (ours)."""
 
     def __post_init__(self) -> None:
         if isinstance(self.sliding, float | int) and not 0.0 <= self.sliding <= 1.0:
             raise ValueError(f"sliding {self.sliding}: expected 0 to 1")
 
 
+NECK, HIPS = 0.2, 0.6
+"""Where along the body a held head ends, and a calm tail begins (ours)."""
+
+
 def at_frame(schedule: Schedule, frame: int) -> Floats:
     """Value of a schedule at a frame, () or (N,)."""
     return np.asarray(schedule(frame) if callable(schedule) else schedule, dtype=float)
-
-
-def waves_mask(states: Complexes, waves: slice, share: float) -> NDArray[np.bool_]:
-    """Choose states (S, n) by their waves, as Fig. 13 does: which of them are curved so.
-
-    Args:
-        states: coefficients 1..n; scaling them by a factor scales every bend (curvature).
-        waves: which coefficients, 0 for the lowest frequency.
-        share: least share of the state's energy that these must hold.
-
-    """
-    energy = np.abs(states) ** 2
-    return np.asarray(energy[:, waves].sum(axis=1) >= share * energy.sum(axis=1))
 
 
 def varied_pulse(
@@ -86,8 +82,10 @@ def varied_pulse(
     return np.repeat(values, np.diff(np.linspace(0, points, parts + 1).astype(int)), axis=1)
 
 
-Grow = Callable[[AngleTrack], object]
-"""Appends the next state to the track, for example by ``Walker.decide``."""
+Grow = Callable[[AngleTrack, Floats], object]
+"""Takes the track and the body's points (N + 1, 2) and appends the next state to the track."""
+Until = Callable[[int, Floats], bool]
+"""Takes a frame and its points; true ends the motion with this frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +97,7 @@ class Locomotion:
     points_m: Floats
     """(T, N + 1, 2) points; point 0 is the head's tip."""
     speed_m_s: Floats
-    """(T,) speed of the head along its tangent."""
+    """(T,) speed of the first point that follows the track (n_0): along its tangent."""
     place: Floats
     """(T, N) sample of the track that each point shows."""
 
@@ -113,20 +111,24 @@ def synthesise(
     grow: Grow | None = None,
     behaviour: Behaviour | None = None,
     head_m: tuple[float, float] = (0.0, 0.0),
+    heading_rad: float = 0.0,
     speed_m_s: float = 0.0,
+    until: Until | None = None,
 ) -> Locomotion:
     """Run ``frames`` frames, the first of which is the body that the track starts with.
 
     Args:
         track: holds at least the first body; it is extended by ``grow`` when it runs out.
         law: the speed, from the bends and the turning of the frame before.
-        frames: T.
+        frames: T, or the most of them.
         dt_s: time between frames.
         segment_m: r, the body's length over N.
         grow: appends to the track.
-        behaviour: sliding and pulse speed; default neither.
+        behaviour: sliding, pulse speed and held ends; default none of it.
         head_m: where the head's tip starts.
+        heading_rad: rotation from the track's angles to the world.
         speed_m_s: v of the first frame.
+        until: ends the motion early.
 
     Raises:
         ValueError: the track ran out and nothing makes it longer; or the time step is unstable.
@@ -136,44 +138,196 @@ def synthesise(
     n = np.arange(track.points, dtype=float)
     ahead = np.full(track.points, float(track.points))  # place + n + 1: constant if nothing slides
     angles, place = np.empty((frames, len(n))), np.empty((frames, len(n)))
-    speed = np.empty(frames)
-    place[0], angles[0], speed[0] = ahead - n - 1, track.body_rad(track.points), speed_m_s
-    turn = 0.0
+    points, speed = np.empty((frames, len(n) + 1, 2)), np.empty(frames)
+    place[0], speed[0] = ahead - n - 1, speed_m_s
+    angles[0], _ = _posture(track.body_rad(track.points) + heading_rad, how, 0)
+    points[0] = _chain(angles[0], segment_m) + head_m
+    turn, last = 0.0, frames - 1
     for t in range(1, frames):
         before = angles[t - 1]
+        if until is not None and until(t - 1, points[t - 1]):
+            last = t - 1
+            break
         speed[t] = law.step_m_s(float(speed[t - 1]), float(before.std()), turn, dt_s)
         pulse = np.maximum(speed[t] + at_frame(how.pulse_m_s, t), 0.0) * dt_s / segment_m
         shift = np.broadcast_to(pulse * (1.0 - at_frame(how.sliding, t)), n.shape)
         # a point shows what the point ``shift`` before it showed: places are looked up, not angles
         ahead = np.interp(n - shift, n, ahead) + shift
         place[t] = ahead - n - 1
-        _serve(track, float(place[t].max()), grow)
-        angles[t] = track.at_rad(place[t])
+        _serve(track, float(place[t].max()), grow, points[t - 1])
+        angles[t], leader = _posture(track.at_rad(place[t]) + heading_rad, how, t)
         turn = float(angles[t].mean() - before.mean()) / dt_s
-    return Locomotion(angles, _points(angles, speed, dt_s, segment_m, head_m), speed, place)
+        shape, step = _chain(angles[t], segment_m), speed[t] * dt_s
+        along = step * np.array([np.cos(angles[t, leader]), np.sin(angles[t, leader])])
+        points[t] = shape + (points[t - 1, leader] + along - shape[leader])
+    made = slice(0, last + 1)
+    return Locomotion(angles[made], points[made], speed[made], place[made])
 
 
-def _serve(track: AngleTrack, place: float, grow: Grow | None) -> None:
+def _posture(angles_rad: Floats, how: Behaviour, frame: int) -> tuple[Floats, int]:
+    """Angles with the ends held, and n_0: the first point that follows the track unheld.
+
+    [PT] 2.6.3 lets n_0 change over time. Behind a held head the neck leads, so that the body still
+    passes where the neck passed.
+    """
+    held, calm = float(at_frame(how.head_held, frame)), float(at_frame(how.calm_tail, frame))
+    if held == 0.0 and calm == 0.0:
+        return angles_rad, 0
+    s = np.linspace(0.0, 1.0, len(angles_rad))
+    head = 1.0 - smoothstep.cubic(np.clip(s / NECK, 0.0, 1.0))
+    tail = smoothstep.cubic(np.clip((s - HIPS) / (1.0 - HIPS), 0.0, 1.0))
+    mean = angles_rad.mean()
+    kept = (1.0 - held * head) * (1.0 - calm * tail)
+    leader = int(np.argmax(head == 0.0)) if held > 0.0 else 0
+    return mean + kept * (angles_rad - mean), leader
+
+
+def _serve(track: AngleTrack, place: float, grow: Grow | None, points_m: Floats) -> None:
     while place > track.end - 1:
         had = track.end
         if grow is not None:
-            grow(track)
+            grow(track, points_m)
         if track.end == had:
             raise ValueError(f"the track ends at sample {had - 1} and the head is at {place:.1f}")
 
 
-def _points(
-    angles_rad: Floats,
-    speed_m_s: Floats,
-    dt_s: float,
-    segment_m: float,
-    head_m: tuple[float, float],
-) -> Floats:
-    """(T, N + 1, 2): ``P(0)`` is the head, ``P(n) = P(n - 1) - r [cos Theta, sin Theta]``."""
-    direction = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1)
-    points = np.zeros((*angles_rad.shape[:1], angles_rad.shape[1] + 1, 2))
-    points[:, 1:] = -segment_m * np.cumsum(direction, axis=1)
-    moved = direction[:, 0] * (speed_m_s * dt_s)[:, None]
-    moved[0] = head_m
-    points += np.cumsum(moved, axis=0)[:, None]
+def _chain(angles_rad: Floats, segment_m: float) -> Floats:
+    """(N + 1, 2): ``P(0)`` is the origin, ``P(n) = P(n - 1) - r [cos Theta, sin Theta]``."""
+    points = np.zeros((len(angles_rad) + 1, 2))
+    np.cumsum(-segment_m * np.cos(angles_rad), out=points[1:, 0])
+    np.cumsum(-segment_m * np.sin(angles_rad), out=points[1:, 1])
     return points
+
+
+Replan = Callable[[Floats, float], SplinePath]
+"""Takes points (W + 1, 2), from the head through the waypoints left, and the body's heading."""
+
+
+class Targets:
+    """The targets T_n of a motion, in order ([PT] 2.6, Algorithm 2).
+
+    They are the waypoints, and points of the planned path evenly between them. Corrections: the
+    loop ends when the last of L targets is reached, where the text prints ``until n < N``; and a
+    target between waypoints counts as reached, too, when the body has passed it by within twice the
+    radius, or reached the next one: a body does not turn back for it.
+    """
+
+    def __init__(
+        self,
+        path: SplinePath,
+        waypoints_m: Floats,
+        radius_m: float,
+        spacing_m: float,
+        carrot_m: float = 0.6,
+        replan: Replan | None = None,
+    ) -> None:
+        self.radius_m, self._carrot_m, self._spacing_m = radius_m, carrot_m, spacing_m
+        self._waypoints_m, self._replan = waypoints_m, replan
+        self.points_m = np.empty((0, 2))
+        """(L, 2); after a miss, reached ones and those of the new path."""
+        self.required = np.empty(0, dtype=bool)
+        """(L,) whether each is a waypoint."""
+        self._marks_m: list[float] = []
+        self._extend(path, waypoints_m)
+        self.index = 0
+        """n, from 0; L when all are reached."""
+        self.missed = 0
+        """How often a waypoint was passed by, and a new path planned to it."""
+        self.current: list[int] = []
+        """n at each frame."""
+        self.distance_m: list[float] = []
+        """D_n at each frame, to the target in force after it."""
+
+    def _extend(self, path: SplinePath, waypoints_m: Floats) -> None:
+        """Go on along a path through waypoints (W, 2)."""
+        self.path, self._head_s_m, at_s_m = path, 0.0, 0.0
+        for waypoint in waypoints_m:
+            to_s_m = max(path.first_pass(waypoint, at_s_m), at_s_m)
+            pieces = max(1, int(np.ceil((to_s_m - at_s_m) / self._spacing_m - 1e-9)))
+            s_m = np.linspace(at_s_m, to_s_m, pieces + 1)[1:]
+            self.points_m = np.vstack([self.points_m, path.position(s_m[:-1]), waypoint])
+            self._marks_m += s_m.tolist()
+            self.required = np.append(self.required, [False] * (pieces - 1) + [True])
+            at_s_m = to_s_m
+
+    @property
+    def count(self) -> int:
+        """L."""
+        return len(self.points_m)
+
+    def observe(self, points_m: Floats) -> bool:
+        """Advance n by the body's points (N + 1, 2), as often as needed; whether all are reached.
+
+        D_n is measured from the mass centre.
+        """
+        centre = points_m.mean(axis=0)
+        while self.index < self.count and self._reached(centre):
+            self.index += 1
+        self.current.append(self.index)
+        self.distance_m.append(float(np.hypot(*(self.points_m[self._at] - centre))))
+        return self.index == self.count
+
+    def printed_aim_rad(self, points_m: Floats) -> float:
+        """D_o of [PT] 2.6.2: direction from the mass centre to the target in force."""
+        return _direction_rad(self.points_m[self._at] - points_m.mean(axis=0))
+
+    def aim_rad(self, points_m: Floats, heading_rad: float) -> float:
+        """Direction from the head, where the next state begins, to a point ahead on the path.
+
+        Where the head is a body's length beyond a waypoint that it has not reached, a new path is
+        planned, which turns back from the body's mean heading. Printed is the direction from the
+        mass centre, which lies half a body behind: that snake wanders (docs/synthesis.md).
+        """
+        head = points_m[0]
+        length_m = float(np.hypot(*np.diff(points_m, axis=0).T).sum())
+        s_m = self._along_m(head)
+        waypoint = self._at + int(np.argmax(self.required[self._at :]))
+        if s_m > self._marks_m[waypoint] + length_m and self._replan is not None:
+            self.missed += 1
+            left = self._waypoints_m[int(self.required[: self.index].sum()) :]
+            self.points_m, self.required = self.points_m[: self.index], self.required[: self.index]
+            self._marks_m = self._marks_m[: self.index]
+            self._extend(self._replan(np.vstack([head, left]), heading_rad), left)
+            s_m = 0.0
+        self._head_s_m = min(s_m, self.path.length_m)
+        return _direction_rad(self._on_path(s_m + self._carrot_m) - head)
+
+    def _along_m(self, point_m: Floats) -> float:
+        """Arc length of a point's projection; beyond the end along the path's last direction."""
+        end_m = self.path.length_m
+        s_m = self.path.nearest(point_m, self._head_s_m)
+        if s_m < end_m - 1e-6:
+            return s_m
+        beyond = (point_m - self.path.position(end_m)) @ self._end_direction
+        return end_m + max(float(beyond), 0.0)
+
+    def _on_path(self, s_m: float) -> Floats:
+        """Point (2,) at an arc length, beyond the end straight on."""
+        beyond_m = max(s_m - self.path.length_m, 0.0)
+        return np.asarray(self.path.position(s_m) + beyond_m * self._end_direction)
+
+    @property
+    def _end_direction(self) -> Floats:
+        end_rad = self.path.heading_rad(self.path.length_m)
+        return np.array([np.cos(end_rad), np.sin(end_rad)])
+
+    @property
+    def _at(self) -> int:
+        return min(self.index, self.count - 1)
+
+    def _reached(self, centre_m: Floats) -> bool:
+        k = self.index
+        off = centre_m - self.points_m[k]
+        distance = float(np.hypot(*off))
+        if distance < self.radius_m:
+            return True
+        if self.required[k]:
+            return False
+        heading_rad = self.path.heading_rad(self._marks_m[k])
+        ahead_m = float(np.cos(heading_rad) * off[0] + np.sin(heading_rad) * off[1])
+        following_m = float(np.hypot(*(centre_m - self.points_m[k + 1])))
+        return (ahead_m > 0.0 and distance < 2.0 * self.radius_m) or following_m < self.radius_m
+
+
+def _direction_rad(step_m: Floats) -> float:
+    return float(np.arctan2(step_m[1], step_m[0]))

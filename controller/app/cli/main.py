@@ -27,6 +27,7 @@ from snakewalk.controller.app.cli.commands.report import report
 from snakewalk.controller.app.cli.commands.run import run
 from snakewalk.controller.app.cli.commands.scan import scan
 from snakewalk.controller.app.cli.commands.sweep import sweep
+from snakewalk.controller.app.cli.commands.synthesise import synthesise as synthesise_walk
 from snakewalk.controller.app.cli.commands.track import track
 from snakewalk.controller.app.cli.commands.trials import trials
 from snakewalk.controller.app.cli.commands.tune import tune
@@ -77,6 +78,11 @@ app.command(epilog=_examples("tune sidewinding --for speed --out mine.toml", "ga
 app.command(
     epilog=_examples("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json")
 )(trials)
+
+app.command(
+    "synthesise",
+    epilog=_examples("synthesise -o motion", "synthesise my-run.toml --seed 3 --json"),
+)(synthesise_walk)
 
 app.command(epilog=_examples("track", "track MIDLINES.csv --rate 60 --picture track.png"))(track)
 

@@ -11,14 +11,21 @@ from snakewalk.config.run import WalkConfig
 from snakewalk.controller.capture.readers.generated import embedded
 from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
-from snakewalk.controller.shape.states import to_states
+from snakewalk.controller.shape.states import (
+    limit_to_waves,
+    random_states,
+    to_angles,
+    to_states,
+)
+from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.synthesis import (
+    NECK,
     Behaviour,
     Locomotion,
+    Targets,
     synthesise,
     varied_pulse,
-    waves_mask,
 )
 from snakewalk.controller.walk.walker import Walker
 
@@ -36,7 +43,7 @@ def fresh() -> AngleTrack:
     return AngleTrack(wave(np.arange(N))[::-1])
 
 
-def grow(track: AngleTrack) -> None:
+def grow(track: AngleTrack, _: object = None) -> None:
     track.append(wave(track.end + np.arange(50)))
 
 
@@ -136,18 +143,111 @@ def test_clamping_instead_of_growing_straightens_the_body() -> None:
 def test_a_walk_of_states_feeds_it_and_the_ground_carries_it() -> None:
     shapes = embedded("worm-like").angles_rad
     walker = Walker(shapes - shapes.mean(axis=1, keepdims=True), WalkConfig())
-    run = synthesise(walker.track, LAW, 80, DT, R, lambda _: walker.decide(0.0, 0.0))
+    run = synthesise(walker.track, LAW, 80, DT, R, lambda *_: walker.decide(0.0, 0.0))
     placed = GroundStep(None).place(run.angles_rad, run.points_m[:, -1], R, 0.03)
     np.testing.assert_allclose(placed.points_m[..., :2], run.points_m, atol=1e-9)
 
 
-def test_states_are_chosen_by_their_waves() -> None:
-    s = (np.arange(N) + 0.5) / N
-    states = to_states(np.stack([np.sin(2 * np.pi * k * s) for k in (0.8, 3.9)]))
-    np.testing.assert_array_equal(waves_mask(states, slice(0, 2), 0.7), [True, False])
-    np.testing.assert_array_equal(waves_mask(states, slice(3, 7), 0.7), [False, True])
+@pytest.mark.parametrize(("first", "last", "waves"), [(1, 2, 1.2), (3, 4, 2.7), (5, 7, 4.5)])
+def test_states_of_one_kind_of_waves_keep_their_bends(first: int, last: int, waves: float) -> None:
+    """[PT] Fig. 13: the states of a recording with long waves, made medium and short."""
+    drawn = random_states(
+        to_states(embedded("worm-like").angles_rad), 200, np.random.default_rng(0)
+    )
+    made = limit_to_waves(drawn, first, last, 0.9)
+    energy = np.abs(made) ** 2
+    np.testing.assert_array_less(
+        0.9 - 1e-9, energy[:, first - 1 : last].sum(axis=1) / energy.sum(axis=1)
+    )
+    np.testing.assert_allclose(energy.sum(axis=1), (np.abs(drawn) ** 2).sum(axis=1))
+    angles = to_angles(made)
+    signs = np.sign(angles[:, 1:]) != np.sign(angles[:, :-1])
+    assert np.median(signs.sum(axis=1)) / 2 == pytest.approx(waves, abs=0.6)
+    same = limit_to_waves(made, first, last, 0.8)
+    np.testing.assert_allclose(same, made)  # where the threshold is kept nothing changes
+
+
+def test_sliding_out_of_range_is_an_error() -> None:
     with pytest.raises(ValueError, match=r"sliding 1\.5"):
         Behaviour(sliding=1.5)
+    with pytest.raises(ValueError, match="coefficients 5-7 of 4"):
+        limit_to_waves(np.ones((1, 4), dtype=complex), 5, 7, 0.9)
+
+
+def test_a_held_head_swings_less_and_the_neck_leads() -> None:
+    free, held = go(200), go(200, head_held=1.0)
+    swing = [np.std(run.angles_rad[:, 0] - run.angles_rad.mean(axis=1)) for run in (free, held)]
+    assert swing[1] < 0.05 < 0.3 < swing[0]
+    # the first point that nothing holds moves along its tangent, so all behind it follow its way
+    leader = int(np.ceil(NECK * (N - 1)))
+    step = np.diff(held.points_m[:, leader], axis=0)
+    along = held.angles_rad[1:, leader]
+    np.testing.assert_allclose(
+        step, (held.speed_m_s[1:] * DT)[:, None] * np.column_stack([np.cos(along), np.sin(along)]),
+        atol=1e-12,
+    )  # fmt: skip
+    way = np.concatenate([held.points_m[0, : leader - 1 : -1], held.points_m[:, leader]])
+    fine = np.concatenate([np.linspace(a, b, 8) for a, b in pairwise(way)])
+    off = np.linalg.norm(held.points_m[150, leader:][:, None] - fine, axis=2).min(axis=1)
+    assert off.max() < 0.25 * R
+
+
+def test_a_calm_tail_is_straighter_and_the_front_is_as_it_was() -> None:
+    calm = go(120, calm_tail=lambda frame: min(frame / 50, 1.0)).angles_rad
+    off = np.abs(calm - calm.mean(axis=1, keepdims=True))
+    assert off[60:, -1].max() < 0.15
+    assert off[60:, :60].max() > 0.5
+
+
+# -- targets ---------------------------------------------------------------------------------------
+
+
+def body_at(x: float, y: float, heading: float = 0.0) -> np.ndarray:
+    """A straight body of 1.2 m whose mass centre is at x, y."""
+    back = np.linspace(0.6, -0.6, N + 1)[:, None]
+    return np.array([x, y]) + back * [np.cos(heading), np.sin(heading)]
+
+
+def test_targets_are_reached_in_order_and_the_last_ends_it() -> None:
+    path = SplinePath([(0, 0), (2, 0), (4, 0)])
+    targets = Targets(path, np.array([[2.0, 0.0], [4.0, 0.0]]), 0.3, 0.5)
+    np.testing.assert_allclose(targets.points_m[:, 0], np.arange(0.5, 4.1, 0.5), atol=0.02)
+    assert targets.required.tolist() == [False, False, False, True] * 2
+    assert not targets.observe(body_at(0.0, 0.0))
+    assert targets.distance_m == [pytest.approx(0.5, abs=0.02)]
+    assert not targets.observe(
+        body_at(0.95, 0.35)
+    )  # the first lies behind, within twice the radius
+    assert targets.index == 1
+    assert not targets.observe(body_at(1.45, 0.1))
+    assert not targets.observe(body_at(2.6, 0.45))  # a waypoint must be reached
+    assert targets.index == 3
+    for x in (2.0, 2.5, 3.0, 3.5):
+        assert not targets.observe(body_at(x, 0.0))
+    assert targets.index == 7
+    # printed is `until n < N`: with the last target still to reach, it would already have stopped
+    assert targets.observe(body_at(3.9, 0.0))
+
+
+def test_a_waypoint_passed_by_is_planned_to_again() -> None:
+    path = SplinePath([(0, 0), (2, 0)])
+    again: list[np.ndarray] = []
+
+    def replan(points: np.ndarray, heading: float) -> SplinePath:
+        again.append(points)
+        assert heading == 0.5
+        return SplinePath(points)
+
+    targets = Targets(path, np.array([[2.0, 0.0]]), 0.3, 0.5, 0.6, replan)
+    assert targets.aim_rad(body_at(-0.6, 0.0), 0.5) == pytest.approx(0.0, abs=1e-6)
+    for x in (0.0, 1.0, 2.0):  # its head goes on straight, up to a body length beyond the end
+        assert abs(targets.aim_rad(body_at(x, 0.6), 0.5)) < np.pi / 2
+    assert not again
+    targets.aim_rad(body_at(2.7, 0.6), 0.5)
+    assert targets.missed == 1
+    np.testing.assert_allclose(again[0], [[3.3, 0.6], [2.0, 0.0]])
+    assert targets.required[-1]
+    assert abs(targets.aim_rad(body_at(2.7, 0.6), 0.5)) > np.pi / 2  # back
 
 
 # -- the printed text ------------------------------------------------------------------------------
@@ -178,7 +278,7 @@ def test_printed_lookup_of_fractions_blurs_the_body_and_ours_does_not() -> None:
         401,
         DT,
         R,
-        lambda t: t.append(wave(2.5 * (t.end + np.arange(50)))),
+        lambda t, _: t.append(wave(2.5 * (t.end + np.arange(50)))),
         speed_m_s=0.5 * R / DT,
     )
     np.testing.assert_allclose(run.angles_rad[-1], wave(2.5 * (299 - np.arange(N))), atol=1e-9)

@@ -39,7 +39,7 @@ def path_figure(record: RunRecord) -> Figure | None:
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     if record.header.ground is not None:
-        _ground(axes, record.header.ground)
+        draw_ground(axes, record.header.ground)
     _plan(axes, record)
     _bodies(axes, record)
     axes.plot(*pose.centre_m[:, :2].T, color=BLUE, linewidth=2.0, label="centre of mass")
@@ -60,7 +60,8 @@ def _extent(record: RunRecord) -> tuple[Floats, Floats]:
     return points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M
 
 
-def _ground(axes: Axes, ground: HeightField) -> None:
+def draw_ground(axes: Axes, ground: HeightField) -> None:
+    """Draw hills as colours, shade and contour lines."""
     w, h = ground.size_m
     extent = (ground.x0_m, ground.x0_m + w, ground.y0_m, ground.y0_m + h)
     colour = GROUND((ground.z_m - ground.z_m.min()) / max(float(np.ptp(ground.z_m)), 1e-9))

@@ -1,0 +1,138 @@
+"""How a motion is synthesised without a robot ([PT] 2.6): rate, speed law, behaviour over time."""
+
+from itertools import pairwise
+from typing import Annotated, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import AfterValidator, Field, model_validator
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.base import Strict
+
+Curve = float | tuple[tuple[float, float], ...]
+"""A constant, or knots of time in seconds and value: linear between them, level beyond."""
+Along = tuple[float, ...]
+"""Factors at even places from head to tail, linear between them; one holds for the whole body."""
+
+
+def _values(curve: Curve) -> tuple[float, ...]:
+    return (float(curve),) if isinstance(curve, float | int) else tuple(v for _, v in curve)
+
+
+def _knots(curve: Curve) -> Curve:
+    if not isinstance(curve, float | int):
+        times = [t for t, _ in curve]
+        if not times or any(b <= a for a, b in pairwise(times)):
+            raise ValueError("knots [time_s, value], one or more, with times that increase")
+    return curve
+
+
+def _within(low: float, high: float) -> AfterValidator:
+    def check(curve: Curve) -> Curve:
+        if not all(low <= value <= high for value in _values(curve)):
+            raise ValueError(f"values from {low:g} to {high:g}")
+        return curve
+
+    return AfterValidator(check)
+
+
+def _some(along: Along) -> Along:
+    if not along:
+        raise ValueError("one factor or more, from head to tail")
+    return along
+
+
+_Knots = AfterValidator(_knots)
+_Along = AfterValidator(_some)
+_Share = Annotated[Curve, _Knots, _within(0.0, 1.0)]
+
+
+def curve_at(curve: Curve, time_s: ArrayLike) -> Floats:
+    """Value of a curve at times (...)."""
+    if isinstance(curve, float | int):
+        return np.full(np.shape(time_s), float(curve))
+    times, values = zip(*curve, strict=True)
+    return np.asarray(np.interp(np.asarray(time_s, float), times, values))
+
+
+def along_body(factors: Along, points: int) -> Floats:
+    """(points,) factors from head to tail."""
+    return np.interp(np.linspace(0.0, 1.0, points), np.linspace(0.0, 1.0, len(factors)), factors)
+
+
+class WavesConfig(Strict):
+    """Which waves the states of a synthesis have ([PT] 2.6.6, Fig. 13): parts of the library.
+
+    All 0: the states are those of the recording, and random ones like them.
+    """
+
+    long: float = Field(0.0, ge=0.0, description="part with coefficients 1-2: Fig. 13 (a)")
+    medium: float = Field(0.0, ge=0.0, description="part with coefficients 3-4: (b)")
+    short: float = Field(0.0, ge=0.0, description="part with coefficients 5-7: (c)")
+    energy_share: float = Field(
+        0.9, gt=0.0, le=1.0, description="least share of a state's energy in its coefficients"
+    )
+
+    @property
+    def parts(self) -> dict[tuple[int, int], float]:
+        """First and last coefficient of each kind that is wanted, and its share of the library."""
+        bands = {(1, 2): self.long, (3, 4): self.medium, (5, 7): self.short}
+        total = sum(bands.values())
+        return {band: part / total for band, part in bands.items() if part > 0.0}
+
+
+class SynthesisConfig(Strict):
+    """`snakewalk synthesise`: a motion on paper ([PT] 2.6). A curve is a number or [[s, value]...].
+
+    The constants of the speed law are those of [PT] 2.6.3, in a unit of length that is declared.
+    """
+
+    rate_hz: float = Field(25.0, ge=5.0, le=1000.0, description="frames a second")
+    coefficients: int = Field(7, ge=1, le=20, description="of a state")
+    for_robot: bool = Field(
+        True,
+        description="states that the robot can make and that push; else all but self-contact",
+    )
+    target_spacing_m: float = Field(
+        0.6, gt=0.05, description="between targets on the path, beside the waypoints"
+    )
+    length_unit_m: float = Field(0.1, gt=0.0, description="in which the four constants are")
+    viscous: float = Field(1.0, gt=0.0, description="c1")
+    coulomb: float = Field(0.5, ge=0.0, description="c2")
+    bend: float = Field(6.0, ge=0.0, description="c3, per radian of the bends' deviation K")
+    turn: float = Field(1.0, ge=0.0, lt=2.0, description="c4, per rad/s of turning")
+    sliding: _Share = Field(0.0, description="w_d: share of the pulse lost; at 1 the body glides")
+    sliding_along: Annotated[Along, _Along] = Field(
+        (1.0,), description="factors of w_d, head to tail"
+    )
+    pulse_m_s: Annotated[Curve, _Knots, _within(-10.0, 10.0)] = Field(
+        0.0, description="g: pulse beside the body's speed"
+    )
+    pulse_along: Annotated[Along, _Along] = Field((1.0,), description="factors of g, head to tail")
+    pulse_spread_m_s: float = Field(
+        0.0, ge=0.0, le=10.0, description="bound of a random g, constant on parts of the body"
+    )
+    pulse_parts: int = Field(5, ge=1, le=100, description="of the body, for the random g")
+    pulse_step_m_s: float = Field(
+        0.005, gt=0.0, description="bound of its change from part to part and frame to frame"
+    )
+    waves: WavesConfig = WavesConfig()
+    head_held: _Share = Field(0.0, description="how far the head points where the body heads")
+    calm_tail: _Share = Field(0.0, description="how far the tail's bends are flattened")
+    tongue_speed: Annotated[Curve, _Knots, _within(0.4, 2.5)] = Field(
+        1.0, description="b_st: how fast the tongue flicks"
+    )
+
+    @model_validator(mode="after")
+    def _waves_have_coefficients(self) -> Self:
+        last = max((last for _, last in self.waves.parts), default=0)
+        if last > self.coefficients:
+            raise ValueError(
+                f"waves: the wanted states need {last} coefficients, not {self.coefficients}"
+            )
+        if not all(0.0 <= f <= 1.0 for f in self.sliding_along):
+            raise ValueError("sliding_along: factors from 0 to 1")
+        if self.viscous / self.rate_hz >= 2.0:
+            raise ValueError(f"viscous: below {2.0 * self.rate_hz:g} at this rate, or it diverges")
+        return self

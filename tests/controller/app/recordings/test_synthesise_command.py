@@ -1,0 +1,118 @@
+"""``snakewalk synthesise``: a motion over hills on paper, and the recording that it writes."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snakewalk.config.ground import build_ground
+from snakewalk.config.loader import load_world
+from snakewalk.controller.app.recordings.snake_synthesis import SnakeSynthesis, SynthesisedWalk
+from snakewalk.controller.app.runs.factory import prepare_playback, prepare_walk
+from snakewalk.controller.capture.mesh.body_model import read_silhouettes
+from snakewalk.controller.capture.readers.load import load_track
+from tests.helpers.in_process import snakewalk
+
+BEHAVIOUR = """
+name = "mine"
+robot = "alternating16"
+world = "jacksboro-gentle"
+start_m = [-1.2, 0.9]
+waypoints_m = [[0.5, 0.7]]
+
+[synthesis]
+sliding = [[0.0, 0.0], [2.0, 0.3]]
+sliding_along = [0.5, 1.0]
+pulse_spread_m_s = 0.02
+head_held = 0.8
+calm_tail = [[0.0, 0.0], [1.0, 0.5]]
+tongue_speed = 2.0
+
+[synthesis.waves]
+long = 0.5
+medium = 0.5
+"""
+
+
+@pytest.fixture(scope="module")
+def traverse() -> SynthesisedWalk:
+    return SnakeSynthesis(prepare_walk("jacksboro-traverse")).synthesise()
+
+
+def test_all_waypoints_are_reached_on_the_ground(traverse: SynthesisedWalk) -> None:
+    facts = traverse.facts()
+    assert facts["waypoints_reached"] == facts["waypoints"] == 4
+    points = traverse.skeleton.points_m
+    step = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    np.testing.assert_allclose(step, step[0, 0], rtol=1e-9)  # no segment changes its length
+    ground = build_ground(load_world("jacksboro-gentle"))
+    assert ground is not None
+    over = points[..., 2] - ground.elevation_m(points[..., 0], points[..., 1])
+    np.testing.assert_allclose(over, np.broadcast_to(traverse.half_height_m, over.shape), atol=1e-9)
+    assert 1.0 < np.degrees(traverse.skeleton.steepest_rad) < 40.0
+    states = [state for _, state in traverse.states]
+    assert len(set(states)) == len(states)  # a library of 630: none is taken twice in eight
+
+
+def test_the_body_passes_where_its_head_passed(traverse: SynthesisedWalk) -> None:
+    """The plan's tail at the end lies on the way of the head: nothing slides by default."""
+    plan = traverse.plan.points_m
+    way, tail = plan[:, 0], plan[-1, -1]
+    assert np.hypot(*(way - tail).T).min() < 0.012
+
+
+def test_the_same_seed_gives_the_same_motion_and_another_another() -> None:
+    one, same, other = (
+        SnakeSynthesis(prepare_walk("flat-slalom", seed=seed)).synthesise(60).plan.points_m
+        for seed in (5, 5, 6)
+    )
+    np.testing.assert_array_equal(one, same)
+    assert np.abs(one - other).max() > 0.01
+
+
+def test_aimed_as_printed_the_snake_leaves_its_path() -> None:
+    """The mass centre lies half a body behind the place where the next state begins."""
+    worst = []
+    for motion in ("walk", "walk-printed"):
+        made = SnakeSynthesis(prepare_walk("flat-slalom", motion=motion)).synthesise(850)
+        centre = made.plan.points_m[::5].mean(axis=1)
+        way = made.path.position(np.linspace(0.0, made.path.length_m, 300))
+        gap = np.linalg.norm(centre[:, None] - way, axis=2).min(axis=1)
+        worst.append(float(gap.mean()))
+    assert worst[0] < 0.7 * worst[1]
+
+
+def test_the_command_writes_a_recording_that_other_commands_take(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(BEHAVIOUR)
+    words = ["synthesise", str(tmp_path / "mine.toml"), "-o", str(tmp_path / "out"), "--json"]
+    done = snakewalk(*words, "--frames", "120")
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert facts["frames"] == 120
+    assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
+    again = snakewalk(*words)
+    assert again.returncode == 2
+    assert "out.npz: exists" in again.stderr
+    assert "out.png: exists" in again.stderr
+
+    file = tmp_path / "out.npz"
+    track = load_track(str(file))
+    assert track.frames == 120
+    assert track.rate_hz == 25.0
+    assert track.length_m == pytest.approx(1.19, abs=0.03)  # in plan, on slopes
+    assert read_silhouettes(file).radius.shape == (120, 101)
+    with np.load(file) as held:
+        assert held["height_m"].shape == (120, 101)
+        assert held["tongue"].shape == held["state"].shape == (120,)
+        assert 0.0 <= held["tongue"].min() < held["tongue"].max() <= 1.0
+    assert prepare_playback(str(file)).joint_track[1].shape[1] == 16
+
+
+def test_what_is_not_a_walk_is_refused(tmp_path: Path) -> None:
+    done = snakewalk(
+        "synthesise", "flat-square", "--motion", "serpenoid", "-o", str(tmp_path / "x")
+    )
+    assert done.returncode == 2
+    assert "--motion serpenoid: walk or walk-printed" in done.stderr
+    assert not list(tmp_path.iterdir())
