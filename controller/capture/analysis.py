@@ -10,8 +10,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.pulse_speed import NEIGHBOURS, PulseSpeed, measure_pulse_speed
 from snakewalk.controller.capture.track import Track
 from snakewalk.controller.capture.undulation import (
+    Advance,
     Undulation,
-    along_speed,
+    advance_of,
     even_points,
     measure_undulation,
 )
@@ -31,9 +32,8 @@ class Analysis:
     wave: Wave
     pulse: PulseSpeed
     undulation: Undulation
-    advance: Floats | None
-    """(S, N) speed of each point along the body's tangent, points a frame, at ``pulse.frame``; None
-    where the recording does not hold places."""
+    advance: Advance | None
+    """Speed of each segment at ``pulse.frame``; None where the recording does not hold places."""
     energy: Floats
     """(T,) share of each shape's energy in seven coefficients, [PT] 2.5."""
     states: StateRange
@@ -50,24 +50,26 @@ class Analysis:
 
         1: every point passes where the head passed. 0: the wave runs on the spot.
         """
-        if self.advance is None:
-            return None
-        both = np.isfinite(self.pulse.points_per_frame)
-        weight = self.pulse.slope[both] ** 2
-        moved = float((weight * self.pulse.points_per_frame[both]).sum())
-        if abs(moved) < 1e-9:
-            return None
-        return float((weight * self.advance[both]).sum()) / moved
+        return None if self.advance is None else self._over_pulse(self.advance.along)
 
     @property
     def sliding(self) -> float | None:
-        """w_d of [PT] 2.6.4 as the synthesis takes it: the share of the advance not shifted.
+        """w_d of [PT] 2.6.4 as the synthesis takes it: the share of the head's speed not shifted.
 
-        0: no sliding. Up to 1: the body glides on in its shape. Below 0: the body advances less
-        than its wave runs back, so it slips.
+        0: no sliding. Up to 1: the body glides on in its shape. Below 0: the head advances less
+        than the wave runs back, so the body slips.
         """
-        travel = self.travel
-        return None if travel is None or abs(travel) < 1e-3 else 1.0 - 1.0 / travel
+        if self.advance is None:
+            return None
+        ratio = self._over_pulse(self.advance.head_speed(self.pulse.points_per_frame))
+        return None if ratio is None or abs(ratio) < 1e-3 else 1.0 - 1.0 / ratio
+
+    def _over_pulse(self, speed: Floats) -> float | None:
+        """Ratio of a speed (S, N) to the pulse speed, weighted by how well a shift is seen."""
+        both = np.isfinite(self.pulse.points_per_frame)
+        weight = self.pulse.slope[both] ** 2
+        moved = float((weight * self.pulse.points_per_frame[both]).sum())
+        return None if abs(moved) < 1e-9 else float((weight * speed[both]).sum()) / moved
 
     def facts(self) -> dict[str, Any]:
         """Plain numbers, for the table and JSON."""
@@ -139,7 +141,7 @@ def analyse(track: Track) -> Analysis:
         wave=wave,
         pulse=pulse,
         undulation=measure_undulation(track, wave.frequency_hz),
-        advance=None if body is None else along_speed(body, number, step)[0],
+        advance=None if body is None else advance_of(body, number, step),
         energy=energy_kept(track.angles_rad, COEFFICIENTS),
         states=state_range(to_states(track.angles_rad, COEFFICIENTS)),
     )

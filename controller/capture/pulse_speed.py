@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.arrays import Bools, Floats, Ints
 
 NEIGHBOURS = 9
 """Points that decide together, [PT] 2.4."""
 LEAST_SLOPE = 0.2
 """Of the recording's usual slope along the body: a flatter neighbourhood shows no shift."""
 _EDGE = 1e-9
+_SLACK = 0.5  # points that the pulse may differ between neighbours
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +92,7 @@ def measure_pulse_speed(
     ahead, behind = n - NEIGHBOURS // 2 - 1 - shift, points - 2 - NEIGHBOURS // 2 - n + shift
     inside = (ahead > _EDGE) & (behind > _EDGE) & (np.abs(shift) < most - 0.5)
     known = inside & (slope > LEAST_SLOPE * usual) & np.isfinite(best)
+    _forget_beyond(known, shift, most)
     return PulseSpeed(
         points_per_frame=np.where(known, shift, np.nan) / step,
         slope=slope,
@@ -98,6 +100,22 @@ def measure_pulse_speed(
         frame=later,
         step=step,
     )
+
+
+def _forget_beyond(known: Bools, shift: Floats, most: int) -> None:
+    """Clear what fits by chance where the neighbours' shift comes from beyond the head or the tail.
+
+    There the true shift is out of reach, and the best of the others may be a minimum of its own.
+    The neighbours are the known ones among ``most + NEIGHBOURS`` points on the side of the middle.
+    """
+    for one, far in ((known, shift), (known[:, ::-1], -shift[:, ::-1])):  # from the tail: mirrored
+        for n in range(min(most + NEIGHBOURS, one.shape[1] // 2), -1, -1):
+            beside = slice(n + 1, n + 1 + most + NEIGHBOURS)
+            near = one[:, beside]
+            order = np.sort(np.where(near, far[:, beside], np.inf), axis=1)
+            middle = np.maximum(near.sum(axis=1) - 1, 0) // 2  # the lower one of two
+            usual = np.where(near.any(axis=1), order[np.arange(len(order)), middle], 0.0)
+            one[:, n] &= n - NEIGHBOURS // 2 - 1 - usual > -_SLACK
 
 
 def _pairs(number: Ints, step: int) -> tuple[Ints, Ints]:

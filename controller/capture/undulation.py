@@ -58,17 +58,38 @@ def measure_undulation(track: Track, frequency_hz: float) -> Undulation:
     return Undulation(np.sqrt(2.0) * swing.std(axis=0), np.sqrt(2.0) * side.std(axis=0))
 
 
-def along_speed(body: Floats, number: Ints, step: int) -> tuple[Floats, Ints]:
-    """Speed of each point along the body's own tangent there, and at which frames.
+@dataclass(frozen=True, slots=True)
+class Advance:
+    """How fast each segment goes, points of N a frame; at the pairs of ``measure_pulse_speed``."""
+
+    along: Floats
+    """(S, N) along the body's own tangent there, forwards positive."""
+    headward: Floats
+    """(S, N) in the direction of the head."""
+    cosine: Floats
+    """(S, N) of the angle between the tangent there and the head's."""
+
+    def head_speed(self, pulse: Floats) -> Floats:
+        """Speed of the head along its tangent (S, N), as each segment tells it.
+
+        With the skeleton of [PT] 2.6.4 a segment goes at the pulse speed along its own tangent,
+        and all of them at what the head is faster than the pulse in the direction of the head. So
+        the speed along the tangent of a segment is less than the head's by the angle between them.
+
+        Args:
+            pulse: (S, N) pulse speed, points a frame.
+
+        """
+        return np.asarray(self.headward + pulse * (1.0 - self.cosine))
+
+
+def advance_of(body: Floats, number: Ints, step: int) -> Advance:
+    """Speed of each segment, between frames that are ``step`` apart.
 
     Args:
         body: (T, N + 1, 2) points in body lengths, at equal arcs.
         number: (T,) frame numbers.
         step: frames between those compared.
-
-    Returns:
-        (S, N) points of N a frame, forwards positive, of the middle of each segment; (S,) indices
-        of the later frames, as ``measure_pulse_speed`` has them.
 
     """
     segments = body.shape[1] - 1
@@ -79,8 +100,13 @@ def along_speed(body: Floats, number: Ints, step: int) -> tuple[Floats, Ints]:
     forward = body[:, :-1] - body[:, 1:]
     mean = forward[later] + forward[earlier]
     mean = mean / np.maximum(np.hypot(mean[..., 0], mean[..., 1]), 1e-12)[..., None]
-    moved = ((middle[later] - middle[earlier]) * mean).sum(axis=-1)
-    return np.asarray(moved * segments / step), later
+    gone = (middle[later] - middle[earlier]) * (segments / step)
+    head = mean[:, :1]
+    return Advance(
+        np.asarray((gone * mean).sum(axis=-1)),
+        np.asarray((gone * head).sum(axis=-1)),
+        np.asarray((mean * head).sum(axis=-1)),
+    )
 
 
 def _slow(values: Floats, cycle: float) -> Floats:

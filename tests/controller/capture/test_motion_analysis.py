@@ -80,6 +80,18 @@ def test_what_cannot_be_known_is_not_told() -> None:
         measure_pulse_speed(angles, np.arange(60), most=60)
 
 
+@pytest.mark.parametrize(("waves", "u"), [(1.0, 7.4), (2.5, 7.4), (2.5, -7.4), (1.0, 9.3)])
+def test_what_came_from_beyond_an_end_is_never_a_number(waves: float, u: float) -> None:
+    """A bend that looks alike before and after its top fits a shift that is far off."""
+    found = measure_pulse_speed(travelling(u, waves=waves), np.arange(60)).points_per_frame
+    known = np.isfinite(found)
+    np.testing.assert_allclose(found[known], u, atol=0.05)
+    assert known.mean() > 0.7
+    reach = int(np.floor(abs(u)) + 4)
+    beyond = found[:, :reach] if u > 0 else found[:, -reach:]
+    assert np.isnan(beyond).all()
+
+
 def test_turned_frames_are_turned_back() -> None:
     """Files of joint angles hold no heading: every frame is turned to mean zero."""
     angles = travelling(3.0, waves=1.3)
@@ -126,7 +138,7 @@ def test_travel_and_sliding_weight_of_a_slipping_wave(travel: float) -> None:
     assert found.sliding < 0.02  # it slips; nothing glides
 
 
-@pytest.mark.parametrize("sliding", [0.0, 0.3, 0.5])
+@pytest.mark.parametrize("sliding", [0.0, 0.2, 0.5, 0.8])
 def test_the_synthesis_sliding_weight_is_measured_again(sliding: float) -> None:
     """[PT] 2.6.4 forwards, 2.4 backwards: what w_d did is what is found."""
     oldest_first = 0.5 * np.sin(2 * np.pi * np.arange(600) / 60.0)
@@ -136,7 +148,7 @@ def test_the_synthesis_sliding_weight_is_measured_again(sliding: float) -> None:
     how = Behaviour(sliding=sliding)
     run = synthesise(track, law, 120, 0.04, 0.01, behaviour=how, speed_m_s=0.24)
     found = analyse(track_from_points("made", run.points_m[20:], 25.0))
-    assert found.sliding == pytest.approx(sliding, abs=0.05)
+    assert found.sliding == pytest.approx(sliding, abs=0.02)
 
 
 def test_nothing_to_analyse_is_one_line() -> None:
