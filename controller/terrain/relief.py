@@ -12,6 +12,7 @@ from scipy.signal import fftconvolve
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 
 class Relief:
@@ -66,17 +67,31 @@ def interpolated(ground: HeightField, field: Floats, x_m: ArrayLike, y_m: ArrayL
     Beyond the border the nearest value holds. The result has the points' shape, then the field's
     further axes.
     """
-    rows, columns = field.shape[:2]
-    u = np.clip((np.asarray(x_m, float) - ground.x0_m) / ground.spacing_m, 0.0, columns - 1.0)
-    v = np.clip((np.asarray(y_m, float) - ground.y0_m) / ground.spacing_m, 0.0, rows - 1.0)
-    i, j = np.minimum(u.astype(np.intp), columns - 2), np.minimum(v.astype(np.intp), rows - 2)
-    more = (1,) * (field.ndim - 2)
-    fu, fv = (u - i).reshape(u.shape + more), (v - j).reshape(v.shape + more)
-    flat, corner = field.reshape(rows * columns, *field.shape[2:]), j * columns + i
-    low = flat.take(corner, axis=0) * (1.0 - fu) + flat.take(corner + 1, axis=0) * fu
-    corner = corner + columns
-    high = flat.take(corner, axis=0) * (1.0 - fu) + flat.take(corner + 1, axis=0) * fu
-    return np.asarray(low * (1.0 - fv) + high * fv)
+    x, y = np.broadcast_arrays(np.asarray(x_m, float), np.asarray(y_m, float))
+    layers = np.ascontiguousarray(field.reshape(*field.shape[:2], -1))
+    values = np.empty((x.size, layers.shape[2]))
+    _interpolate(layers, ground.x0_m, ground.y0_m, ground.spacing_m, x.ravel(), y.ravel(), values)
+    return values.reshape((*x.shape, *field.shape[2:]))
+
+
+@compiled(
+    f"void({readonly_array(dimensions=3, layout='C')}, float64, float64, float64,"
+    f" {readonly_array(layout='C')}, {readonly_array(layout='C')}, float64[:, ::1])"
+)
+def _interpolate(
+    layers: Floats, x0: float, y0: float, spacing: float, x: Floats, y: Floats, values: Floats
+) -> None:
+    """Write bilinear values (n, k) of layers (rows, columns, k) at n points."""
+    rows, columns, count = layers.shape
+    for p in range(len(x)):
+        u = min(max((x[p] - x0) / spacing, 0.0), columns - 1.0)
+        v = min(max((y[p] - y0) / spacing, 0.0), rows - 1.0)
+        i, j = min(int(u), columns - 2), min(int(v), rows - 2)
+        fu, fv = u - i, v - j
+        for k in range(count):
+            low = layers[j, i, k] * (1.0 - fu) + layers[j, i + 1, k] * fu
+            high = layers[j + 1, i, k] * (1.0 - fu) + layers[j + 1, i + 1, k] * fu
+            values[p, k] = low * (1.0 - fv) + high * fv
 
 
 def elevation_variance_m2(ground: HeightField, radius_m: float) -> Floats:

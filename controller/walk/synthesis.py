@@ -9,6 +9,7 @@ added once; the head moves along the new ``Theta(1, t)``; a track that runs out 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import cos, hypot, sin, sqrt
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from snakewalk.controller.kinematics import smoothstep
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 Schedule = float | Callable[[int], float | Floats]
 """A constant, or a function of the frame that gives a scalar or a value per point (N,)."""
@@ -143,22 +145,22 @@ def synthesise(
     angles[0], _ = _posture(track.body_rad(track.points) + heading_rad, how, 0)
     points[0] = _chain(angles[0], segment_m) + head_m
     turn, last = 0.0, frames - 1
+    mean, bend = _moments(angles[0])
     for t in range(1, frames):
-        before = angles[t - 1]
         if until is not None and until(t - 1, points[t - 1]):
             last = t - 1
             break
-        speed[t] = law.step_m_s(float(speed[t - 1]), float(before.std()), turn, dt_s)
+        speed[t] = law.step_m_s(float(speed[t - 1]), bend, turn, dt_s)
         pulse = np.maximum(speed[t] + at_frame(how.pulse_m_s, t), 0.0) * dt_s / segment_m
         shift = np.broadcast_to(pulse * (1.0 - at_frame(how.sliding, t)), n.shape)
-        # a point shows what the point ``shift`` before it showed: places are looked up, not angles
-        ahead = np.interp(n - shift, n, ahead) + shift
-        place[t] = ahead - n - 1
+        ahead = _shifted(ahead, shift)
+        np.subtract(ahead, n + 1.0, out=place[t])
         _serve(track, float(place[t].max()), grow, points[t - 1])
         angles[t], leader = _posture(track.at_rad(place[t]) + heading_rad, how, t)
-        turn = float(angles[t].mean() - before.mean()) / dt_s
+        was, (mean, bend) = mean, _moments(angles[t])
+        turn = (mean - was) / dt_s
         shape, step = _chain(angles[t], segment_m), speed[t] * dt_s
-        along = step * np.array([np.cos(angles[t, leader]), np.sin(angles[t, leader])])
+        along = step * np.array([cos(angles[t, leader]), sin(angles[t, leader])])
         points[t] = shape + (points[t - 1, leader] + along - shape[leader])
     made = slice(0, last + 1)
     return Locomotion(angles[made], points[made], speed[made], place[made])
@@ -191,11 +193,42 @@ def _serve(track: AngleTrack, place: float, grow: Grow | None, points_m: Floats)
             raise ValueError(f"the track ends at sample {had - 1} and the head is at {place:.1f}")
 
 
+_VALUES = readonly_array()
+
+
+@compiled(f"float64[::1]({_VALUES}, {_VALUES})")
+def _shifted(ahead: Floats, shift: Floats) -> Floats:
+    """Places ahead (N,) after a shift: a point shows what the point ``shift`` before it showed.
+
+    Places are looked up, not angles; a constant stays one, bit for bit.
+    """
+    moved = np.empty(len(ahead))
+    for n in range(len(ahead)):
+        at = min(max(n - shift[n], 0.0), len(ahead) - 1.0)
+        k = min(int(at), len(ahead) - 2)
+        moved[n] = ahead[k] + (at - k) * (ahead[k + 1] - ahead[k]) + shift[n]
+    return moved
+
+
+@compiled(f"UniTuple(float64, 2)({_VALUES})")
+def _moments(angles_rad: Floats) -> tuple[float, float]:
+    """Mean, and standard deviation K, of (N,) angles."""
+    mean, square = 0.0, 0.0
+    for angle in angles_rad:
+        mean += angle
+    mean /= len(angles_rad)
+    for angle in angles_rad:
+        square += (angle - mean) ** 2
+    return mean, sqrt(square / len(angles_rad))
+
+
+@compiled(f"float64[:, ::1]({_VALUES}, float64)")
 def _chain(angles_rad: Floats, segment_m: float) -> Floats:
     """(N + 1, 2): ``P(0)`` is the origin, ``P(n) = P(n - 1) - r [cos Theta, sin Theta]``."""
     points = np.zeros((len(angles_rad) + 1, 2))
-    np.cumsum(-segment_m * np.cos(angles_rad), out=points[1:, 0])
-    np.cumsum(-segment_m * np.sin(angles_rad), out=points[1:, 1])
+    for n in range(len(angles_rad)):
+        points[n + 1, 0] = points[n, 0] - segment_m * cos(angles_rad[n])
+        points[n + 1, 1] = points[n, 1] - segment_m * sin(angles_rad[n])
     return points
 
 
@@ -228,6 +261,7 @@ class Targets:
         self.required = np.empty(0, dtype=bool)
         """(L,) whether each is a waypoint."""
         self._marks_m: list[float] = []
+        self._ahead: list[tuple[float, float]] = []
         self._extend(path, waypoints_m)
         self.index = 0
         """n, from 0; L when all are reached."""
@@ -247,6 +281,8 @@ class Targets:
             s_m = np.linspace(at_s_m, to_s_m, pieces + 1)[1:]
             self.points_m = np.vstack([self.points_m, path.position(s_m[:-1]), waypoint])
             self._marks_m += s_m.tolist()
+            headings_rad = [path.heading_rad(s) for s in s_m.tolist()]
+            self._ahead += [(cos(heading), sin(heading)) for heading in headings_rad]
             self.required = np.append(self.required, [False] * (pieces - 1) + [True])
             at_s_m = to_s_m
 
@@ -260,11 +296,11 @@ class Targets:
 
         D_n is measured from the mass centre.
         """
-        centre = points_m.mean(axis=0)
+        centre = points_m.sum(axis=0) / len(points_m)
         while self.index < self.count and self._reached(centre):
             self.index += 1
         self.current.append(self.index)
-        self.distance_m.append(float(np.hypot(*(self.points_m[self._at] - centre))))
+        self.distance_m.append(hypot(*(self.points_m[self._at] - centre)))
         return self.index == self.count
 
     def printed_aim_rad(self, points_m: Floats) -> float:
@@ -287,6 +323,7 @@ class Targets:
             left = self._waypoints_m[int(self.required[: self.index].sum()) :]
             self.points_m, self.required = self.points_m[: self.index], self.required[: self.index]
             self._marks_m = self._marks_m[: self.index]
+            self._ahead = self._ahead[: self.index]
             self._extend(self._replan(np.vstack([head, left]), heading_rad), left)
             s_m = 0.0
         self._head_s_m = min(s_m, self.path.length_m)
@@ -318,15 +355,16 @@ class Targets:
     def _reached(self, centre_m: Floats) -> bool:
         k = self.index
         off = centre_m - self.points_m[k]
-        distance = float(np.hypot(*off))
+        distance = hypot(off[0], off[1])
         if distance < self.radius_m:
             return True
         if self.required[k]:
             return False
-        heading_rad = self.path.heading_rad(self._marks_m[k])
-        ahead_m = float(np.cos(heading_rad) * off[0] + np.sin(heading_rad) * off[1])
-        following_m = float(np.hypot(*(centre_m - self.points_m[k + 1])))
-        return (ahead_m > 0.0 and distance < 2.0 * self.radius_m) or following_m < self.radius_m
+        x, y = self._ahead[k]
+        ahead_m = x * off[0] + y * off[1]
+        following_m = hypot(*(centre_m - self.points_m[k + 1]))
+        past = bool(ahead_m > 0.0 and distance < 2.0 * self.radius_m)
+        return past or following_m < self.radius_m
 
 
 def _direction_rad(step_m: Floats) -> float:
