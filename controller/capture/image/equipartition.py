@@ -20,6 +20,8 @@ _RATE = 0.95  # of the correction; 1 would be Newton's step for a straight curve
 _DESCENTS = 12
 _BISECTIONS = 80
 _SCAN = 96  # chords tried between the least and the greatest possible one
+_GRID = 400  # of the scan for three chords
+_NEWTON_STEPS = 40
 _BENT = 1.05  # arc over chord from which all solutions are searched
 
 
@@ -38,7 +40,8 @@ class Equipartition:
     chord: float
     """Distance of neighbouring points, in the curve's unit."""
     method: str
-    """How it was found: ``descent``, ``bisection``, ``bisector`` (2 chords), ``later crossing``."""
+    """How it was found: ``descent``, ``bisection``, ``bisector`` (2 chords), ``later crossing``,
+    ``two places`` (3 chords)."""
     solutions: int
     """Solutions found, of which this is the closest to the curve; 1 where no other was searched, as
     no chord leaves its arc by more than 5 %."""
@@ -81,10 +84,11 @@ class _Curve:
         return Equipartition(points, at, chord, method, 1, self.distance(points, at))
 
     def distance(self, points: Floats, at: Floats) -> float:
+        """Mean distance of the curve from the chord of each part of it, its ends included."""
         of = np.clip(np.searchsorted(at, self.arc, side="right") - 1, 0, self.segments - 1)
-        along = (points[of + 1] - points[of]) / np.hypot(*(points[of + 1] - points[of]).T)[:, None]
-        away = self.curve - points[of]
-        apart = np.abs(away[:, 0] * along[:, 1] - away[:, 1] * along[:, 0])
+        chord, away = points[of + 1] - points[of], self.curve - points[of]
+        share = (away * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), 1e-300)
+        apart = np.hypot(*(away - np.clip(share, 0.0, 1.0)[:, None] * chord).T)
         return float(np.trapezoid(apart, self.arc)) / self.length
 
 
@@ -186,12 +190,72 @@ def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
                 found.append(given.solution(chord, method, crossing))
         if method == "later crossing" and found and given.segments > 8:
             break
+    if given.segments == 3:
+        for third in _thirds(given):
+            if all(np.abs(third.at - other.at).max() > 1e-6 * given.length for other in found):
+                found.append(third)
     if not found:
         raise NoEquipartitionError(
             f"no {given.segments} equal chords on this curve of {len(given.curve)} points"
         )
     best = min(found, key=lambda one: one.distance)
     return Equipartition(best.points, best.at, best.chord, best.method, len(found), best.distance)
+
+
+def _thirds(given: _Curve) -> list[Equipartition]:
+    """Three chords wherever they are: places s < t where two differences of chords are zero.
+
+    The proof of existence ([PT] 2.3) allows any later crossing, and at a tangency a circle gains or
+    loses two of them, so that no count of crossings leads there. So the triangle of all s and t is
+    scanned for cells where both differences change sign, and each is solved by Newton's method.
+    """
+    length = given.length
+    grid = np.linspace(0.0, length, _GRID + 1)
+    ends = np.stack([np.interp(grid, given.arc, column) for column in given.curve.T], axis=-1)
+    first = ((ends - given.curve[0]) ** 2).sum(axis=1)[:, None]
+    last = ((ends - given.curve[-1]) ** 2).sum(axis=1)
+    middle = ((ends[:, None] - ends) ** 2).sum(axis=-1)
+    both = np.triu(np.ones((_GRID, _GRID), dtype=bool))
+    for gap in (first - last, first - middle):
+        corners = np.stack([gap[:-1, :-1], gap[1:, :-1], gap[:-1, 1:], gap[1:, 1:]])
+        both &= (corners.min(axis=0) <= 0.0) & (corners.max(axis=0) >= 0.0)
+    starts = np.argwhere(both)[:, None] + np.array([[0.5, 0.5], [0.1, 0.9], [0.9, 0.9], [0.1, 0.1]])
+    at = _newton(given, starts.reshape(-1, 2) * (length / _GRID))
+    found: list[Equipartition] = []
+    for s, t in at[np.argsort(at[:, 0])]:
+        places = np.array([0.0, s, t, length])
+        if found and np.abs(found[-1].at - places).max() < 1e-6 * length:
+            continue
+        points = np.stack([np.interp(places, given.arc, column) for column in given.curve.T], -1)
+        chord = float(np.hypot(*(points[1] - points[0])))
+        found.append(
+            Equipartition(points, places, chord, "two places", 1, given.distance(points, places))
+        )
+    return found
+
+
+def _newton(given: _Curve, at: Floats) -> Floats:
+    """Those of the starts (K, 2) from which Newton's method finds three equal chords."""
+    length, ends = given.length, given.curve[[0, -1]]
+    slope = np.diff(given.curve, axis=0) / np.diff(given.arc)[:, None]
+    for _ in range(_NEWTON_STEPS):
+        piece = np.clip(np.searchsorted(given.arc, at, side="right") - 1, 0, len(slope) - 1)
+        place = given.curve[piece] + (at - given.arc[piece])[..., None] * slope[piece]
+        a, b, c = place[:, 0] - ends[0], place[:, 1] - place[:, 0], ends[1] - place[:, 1]
+        u, v = slope[piece[:, 0]], slope[piece[:, 1]]
+        f = (a * a).sum(1) - (c * c).sum(1)
+        g = (a * a).sum(1) - (b * b).sum(1)
+        fs, ft = 2.0 * (a * u).sum(1), 2.0 * (c * v).sum(1)
+        gs, gt = 2.0 * ((a + b) * u).sum(1), -2.0 * (b * v).sum(1)
+        size = fs * gt - ft * gs
+        size = np.where(np.abs(size) > 1e-300, size, 1e-300)
+        step = np.stack([ft * g - gt * f, gs * f - fs * g], axis=1) / size[:, None]
+        if np.abs(step).max(initial=0.0) < 1e-14 * length:
+            break
+        at = np.clip(at + np.clip(step, -0.02 * length, 0.02 * length), 0.0, length)
+    chord = np.stack([np.hypot(*side.T) for side in (a, b, c)])
+    equal = np.ptp(chord, axis=0) <= TOLERANCE * length
+    return np.asarray(at[equal & (at[:, 0] < at[:, 1]) & (chord[0] > TOLERANCE * length)])
 
 
 def _crossings(segments: int, *, search: bool) -> Iterator[tuple[str, Ints]]:
