@@ -28,6 +28,7 @@ MODULES = tuple(
         "capture",
         "overhead",
         "repertoire",
+        "support",
     )
     if find_spec(f"benchmarks.{name}") is not None
 )

@@ -5,6 +5,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Strict
+from snakewalk.config.compliance import ComplianceConfig
 
 Parameters = dict[str, bool | int | float]
 
@@ -48,3 +49,6 @@ class GaitSetConfig(Strict):
     robot: str
     world: str | None = Field(None, description="default: the gait's own")
     parameters: Parameters = Field({}, description="by name; the rest keep their defaults")
+    compliance: ComplianceConfig | None = Field(
+        None, description="joint goals that yield to measured current; default: they do not"
+    )

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from snakewalk.config.base import Strict
 from snakewalk.config.camera import CameraConfig, PoseName
+from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.gait import GaitConfig
 from snakewalk.config.playback import PlaybackConfig
 from snakewalk.config.robot import ServoConfig
@@ -120,6 +121,9 @@ class RunConfig(Strict):
     safety: SafetyConfig = SafetyConfig()
     gait: GaitConfig | None = None
     playback: PlaybackConfig | None = None
+    compliance: ComplianceConfig | None = Field(
+        None, description="joint goals that yield to measured current; default: they do not"
+    )
     pose: PoseName | None = Field(
         None, description="what measures the head; default: the simulator, on servos the joints"
     )

@@ -190,6 +190,52 @@ class PipeObstacle(Strict):
     friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
 
 
+class PegsObstacle(Strict):
+    """A board of upright pegs to push off: rows across x, as far apart as pegs in a row."""
+
+    kind: Literal["pegs"] = "pegs"
+    radius_m: float = Field(0.03, gt=0.002, le=1.0, description="of a peg")
+    height_m: float = Field(0.15, gt=0.01, le=5.0, description="over z = 0")
+    spacing_m: float = Field(gt=0.0, le=10.0, description="from peg to peg in a row, along y")
+    rows: int = Field(ge=1, le=100, description="number of rows, along x")
+    row_pegs: int = Field(ge=1, le=100, description="pegs in a row")
+    pattern: Literal["square", "hexagonal"] = Field(
+        "hexagonal", description="hexagonal: every other row is shifted by half a spacing"
+    )
+    at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of the board's middle")
+    friction: float = Field(0.3, ge=0.0, le=5.0, description="the same in all directions")
+
+    @model_validator(mode="after")
+    def _pegs_are_apart(self) -> Self:
+        if self.spacing_m <= 2.0 * self.radius_m:
+            raise ValueError("spacing_m must be over twice radius_m, or the pegs are a wall")
+        return self
+
+    def places_m(self) -> tuple[tuple[float, float], ...]:
+        """X and y of each peg, row by row."""
+        hexagonal = self.pattern == "hexagonal"
+        apart_m = self.spacing_m * (math.sqrt(0.75) if hexagonal else 1.0)
+        found = []
+        for row in range(self.rows):
+            shift = (0.25 if row % 2 else -0.25) if hexagonal else 0.0
+            x_m = self.at_m[0] + (row - 0.5 * (self.rows - 1)) * apart_m
+            for peg in range(self.row_pegs):
+                along = peg - 0.5 * (self.row_pegs - 1) + shift
+                found.append((x_m, self.at_m[1] + along * self.spacing_m))
+        return tuple(found)
+
+
+class CorridorObstacle(Strict):
+    """Two upright walls along x with a way between them."""
+
+    kind: Literal["corridor"] = "corridor"
+    width_m: float = Field(gt=0.01, le=50.0, description="between the walls")
+    length_m: float = Field(4.0, gt=0.1, le=50.0)
+    height_m: float = Field(0.15, gt=0.01, le=5.0, description="over z = 0")
+    at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of its middle")
+    friction: float = Field(0.3, ge=0.0, le=5.0, description="the same in all directions")
+
+
 class PlannerConfig(Strict):
     """Where a path may go ([PT] 2.6.1)."""
 
@@ -231,7 +277,13 @@ class WorldConfig(Strict):
         FlatGround()
     )
     friction: FrictionConfig = FrictionConfig()
-    obstacle: Annotated[PoleObstacle | PipeObstacle, Field(discriminator="kind")] | None = None
+    obstacle: (
+        Annotated[
+            PoleObstacle | PipeObstacle | PegsObstacle | CorridorObstacle,
+            Field(discriminator="kind"),
+        ]
+        | None
+    ) = None
     planner: PlannerConfig = PlannerConfig()
 
     def with_relief(self, factor: float) -> Self:

@@ -1,4 +1,4 @@
-"""Contact of the body with the ground during a run: largest roll, share of links in the air."""
+"""Contact of the body with the ground: largest roll, links in the air, by pose and by current."""
 
 from dataclasses import dataclass
 
@@ -6,8 +6,13 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.mechanics.support import lifted, support_n
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.drivers.types import BodyPose
 
+EVERY = 5
+"""Cycles from one look at the currents to the next."""
 CLEAR_M = 0.005
 """A link this far above where it would rest is counted as in the air."""
 
@@ -37,6 +42,31 @@ def ground_contact(record: RunRecord, ground: HeightField | None) -> GroundConta
     gap = z - rest - record.header.robot.body_radius_m
     roll = np.abs(roll_rad(pose.rotation))
     return GroundContact(float(roll.max()), float((gap > CLEAR_M).mean()))
+
+
+def lifted_by_current(record: RunRecord) -> float:
+    """Return the mean share of links that the pitch joints' currents tell to be lifted.
+
+    It takes the pose only for the directions of the joints, and knows no ground. NaN without pitch
+    joints, torque constant or poses. ``docs/compliance.md`` has how well it tells.
+    """
+    header, pose, cycle = record.header, record.pose, record.cycle
+    robot, k_t = header.robot, header.torque_constant_n_m_a
+    known = np.isfinite(pose.head_m).all(axis=1) & np.isfinite(pose.rotation).all(axis=(1, 2))
+    rows = np.flatnonzero(known)[::EVERY]
+    if not robot.pitch_joints or not np.isfinite(k_t) or not len(rows):
+        return float("nan")
+    at = np.searchsorted(cycle.time_s, pose.time_s[rows])
+    inside = at < len(cycle.time_s)
+    rows, at = rows[inside], at[inside]
+    read = np.isfinite(cycle.current_a[at]).all(axis=1)
+    shares = []
+    for row, k in zip(rows[read], at[read], strict=True):
+        head = BodyPose(float(pose.time_s[row]), pose.head_m[row], pose.rotation[row])
+        body = body_in_world(robot, head, cycle.measured_rad[k])
+        bears_n = support_n(robot, body, k_t * cycle.current_a[k])
+        shares.append(float(lifted(robot, bears_n).mean()))
+    return float(np.mean(shares)) if shares else float("nan")
 
 
 def roll_rad(rotation: Floats) -> Floats:

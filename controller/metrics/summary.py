@@ -14,6 +14,7 @@ from snakewalk.controller.metrics.effort import (
     energy_track,
     weight_n,
 )
+from snakewalk.controller.metrics.ground_contact import lifted_by_current
 from snakewalk.controller.metrics.path_error import (
     length_m,
     path_error_m,
@@ -96,6 +97,10 @@ class RunSummary:
     """Delay of the measured behind the sent angles."""
     failed_reads: int
     """Joint states that a cycle failed to read."""
+    yield_max_rad: float | None
+    """Largest angle by which compliance moved a goal; None if nothing yields."""
+    lifted_by_current: float | None
+    """Mean share of links that the currents of the pitch joints tell to be lifted."""
     clamps: int
     vetoes: int
     trip: str | None
@@ -177,6 +182,8 @@ def summary(record: RunRecord) -> RunSummary:
         tracking_max_rad=_digits(_peak(np.abs(tracking))),
         lag_s=_digits(lag_s(cycle, record.period_s)),
         failed_reads=int(np.count_nonzero(~cycle.valid)),
+        yield_max_rad=_digits(_peak(np.abs(cycle.yield_rad))),
+        lifted_by_current=_digits(lifted_by_current(record)),
         clamps=cycle.verdict.count("clamp"),
         vetoes=cycle.verdict.count("veto"),
         trip=tripped,

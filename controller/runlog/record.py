@@ -87,9 +87,11 @@ class CycleTable:
     time_s: Floats
     """(T,)"""
     asked_rad: Floats
-    """(T, J) what the motion wanted."""
+    """(T, J) what the motion wanted, after compliance."""
     sent_rad: Floats
     """(T, J) what safety let through."""
+    yield_rad: Floats
+    """(T, J) by which compliance moved what was asked; NaN where nothing yields."""
     measured_rad: Floats
     """(T, J)"""
     velocity_rad_s: Floats

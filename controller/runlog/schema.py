@@ -44,6 +44,7 @@ TOPICS: Final[dict[str, Json]] = {
         "time_s": _TIME,
         "asked_rad": _list("(J,) what the motion wanted, exact"),
         "sent_rad": _list("(J,) what safety let through, exact"),
+        "yield_rad": {"type": ["array", "null"], "description": "(J,) by compliance, in asked_rad"},
         "measured_rad": _list("(J,)"),
         "velocity_rad_s": _list("(J,)"),
         "current_a": _list("(J,)"),

@@ -95,6 +95,7 @@ def _cycle(rows: Sequence[Row], joints: int) -> CycleTable:
         time_s=_floats(rows, "time_s"),
         asked_rad=per_joint("asked_rad"),
         sent_rad=per_joint("sent_rad"),
+        yield_rad=_array([r.get("yield_rad") or [None] * joints for r in rows]).reshape(-1, joints),
         measured_rad=per_joint("measured_rad"),
         velocity_rad_s=per_joint("velocity_rad_s"),
         current_a=per_joint("current_a"),

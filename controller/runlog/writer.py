@@ -11,6 +11,7 @@ import numpy as np
 from mcap.writer import Writer
 from numpy.typing import ArrayLike
 
+from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import digest
 from snakewalk.config.robot import RobotConfig
@@ -137,6 +138,7 @@ class RunLog:
         lateness_s: float,
         wire_busy_s: float = float("nan"),
         energy: MotorEnergy = UNKNOWN_ENERGY,
+        yield_rad: Floats | None = None,
         verdict: VerdictKind = "pass",
         reason: str = "",
         joints: Sequence[int] = (),
@@ -151,6 +153,7 @@ class RunLog:
         row = (
             f'{{"time_s":{text(time_s)},"asked_rad":{asked_text},'
             f'"sent_rad":{asked_text if same else exact_text(sent)},'
+            f'"yield_rad":{"null" if yield_rad is None else rounded_texts([yield_rad])[0]},'
             f'"measured_rad":{position},"velocity_rad_s":{velocity},"current_a":{current},'
             f'"age_s":{age},"valid":{flags_text(state.valid.tobytes(), state.valid.dtype.char)},'
             f'"error":{flags_text(state.error.tobytes(), state.error.dtype.char)},'

@@ -12,6 +12,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.kinematics.smoothstep import QUINTIC_BEND_MAX, QUINTIC_SLOPE_MAX, quintic
+from snakewalk.controller.motion.compliance import Compliance
 from snakewalk.controller.motion.path_progress import path_progress
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.record import MotorEnergy
@@ -110,6 +111,7 @@ class Drive:
         self._gain = gain
         self._slip_monitor = SlipMonitor(robot.length_m, gain, run.safety.advance_fraction)
         self._derating = Derating(run.safety, robot, self._on_derating)
+        self._compliance = None if run.compliance is None else Compliance(run.compliance, robot)
         self._on_progress, self._on_event = on_progress, on_event
         self._wire_busy_s = wire_busy_s
         self._wire_s = wire_busy_s()
@@ -151,6 +153,8 @@ class Drive:
                     goal = ramp.at(clock.now_s() - start_s)
                 else:
                     goal = self._steer(period_s * self._derating.update(state, period_s), view)
+                    if self._compliance is not None:
+                        goal = self._compliance.step(goal, state, period_s)
                 self._send(tick, state, pose, view, goal)
                 if self._link.tripped or motion.done:
                     break
@@ -217,6 +221,7 @@ class Drive:
             lateness_s=tick.lateness_s,
             wire_busy_s=self._wire_s - before_s,
             energy=self._energy(),
+            yield_rad=None if self._compliance is None else self._compliance.yield_rad,
             verdict="veto" if self._link.tripped else "clamp" if clamped else "pass",
             reason=self._link.tripped or "",
             joints=clamped,

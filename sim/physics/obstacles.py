@@ -1,4 +1,4 @@
-"""A pole to hold and a pipe to press against: their geometry, and how a coiled body is put there.
+"""Pole, pipe, pegs and walls: their geometry, and how a coiled body is put at the first two.
 
 Bodies touch them with MuJoCo's own cone (``condim`` 3), since an isotropic friction knows no
 direction along a body. The floor keeps the anisotropic friction of ``sim.physics.friction``.
@@ -6,6 +6,7 @@ direction along a body. The floor keeps the anisotropic friction of ``sim.physic
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -14,7 +15,13 @@ from scipy.optimize import least_squares
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import PipeObstacle, PoleObstacle, WorldConfig
+from snakewalk.config.world import (
+    CorridorObstacle,
+    PegsObstacle,
+    PipeObstacle,
+    PoleObstacle,
+    WorldConfig,
+)
 from snakewalk.sim.physics.mechanics import Mechanics
 
 STAVE_COUNT = 24
@@ -26,6 +33,29 @@ TAIL_UP_M = 0.01
 """Of the lowest link above the floor at the start."""
 COIL_MIN_RAD = 2.0
 """A body that goes less far round its own axis is no coil."""
+WALL_M = 0.04
+"""Thickness of a wall."""
+START_DEPTH_M = 0.005
+"""How deep in an obstacle a body may start: contacts are soft, and it is pushed out at once."""
+OBSTACLE = "obstacle"
+"""Begins the names of its geoms."""
+WOOD, GLASS = "0.55 0.42 0.30 1", "0.55 0.68 0.78 0.22"
+
+Obstacle = PoleObstacle | PipeObstacle | PegsObstacle | CorridorObstacle
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """One geom of an obstacle."""
+
+    kind: Literal["cylinder", "box"]
+    half_m: tuple[float, ...]
+    """Radius and half length, or half edges."""
+    centre_m: Floats
+    """(3,)"""
+    axes: Floats
+    """(3, 3) columns."""
+    colour: str
 
 
 def obstacle_mjcf(world: WorldConfig) -> tuple[str, str]:
@@ -34,31 +64,69 @@ def obstacle_mjcf(world: WorldConfig) -> tuple[str, str]:
     if thing is None:
         return "", ""
     common = f'contype="1" conaffinity="2" condim="3" priority="1" friction="{thing.friction!r}"'
-    turn = np.eye(3) if thing.upright else np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]])
-    middle = _middle_m(thing)
-    if isinstance(thing, PoleObstacle):
-        staves = [(np.zeros(3), 0.0, f"{thing.radius_m!r} {thing.length_m / 2!r}")]
-        kind, colour = "cylinder", "0.55 0.42 0.30 1"
-    else:
-        kind, colour = "box", "0.55 0.68 0.78 0.22"
-        half = (thing.radius_m + STAVE_M) * math.tan(math.pi / STAVE_COUNT)
-        out = thing.radius_m + STAVE_M / 2
-        size = f"{STAVE_M / 2!r} {half!r} {thing.length_m / 2!r}"
-        staves = [
-            (out * np.array([math.cos(a), math.sin(a), 0.0]), a, size)
-            for a in 2.0 * math.pi * np.arange(STAVE_COUNT) / STAVE_COUNT
-        ]
     text = ""
-    for k, (place, angle, size) in enumerate(staves):
-        c, s = math.cos(angle), math.sin(angle)
-        axes = turn @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        xyxes = " ".join(repr(float(v)) for v in (*axes[:, 0], *axes[:, 1]))
-        pos = " ".join(repr(float(v)) for v in middle + turn @ place)
+    for k, part in enumerate(_parts(thing)):
+        size = " ".join(repr(float(v)) for v in part.half_m)
+        xyxes = " ".join(repr(float(v)) for v in (*part.axes[:, 0], *part.axes[:, 1]))
+        pos = " ".join(repr(float(v)) for v in part.centre_m)
         text += (
-            f'<geom name="obstacle{k}" type="{kind}" size="{size}" pos="{pos}" xyaxes="{xyxes}" '
-            f'rgba="{colour}" {common}/>'
+            f'<geom name="{OBSTACLE}{k}" type="{part.kind}" size="{size}" pos="{pos}" '
+            f'xyaxes="{xyxes}" rgba="{part.colour}" {common}/>'
         )
     return ' cone="elliptic" impratio="10"', text
+
+
+def _parts(thing: Obstacle) -> list[Solid]:
+    upright = np.eye(3)
+    if isinstance(thing, PegsObstacle):
+        # as deep below z = 0 as high above it, so that pegs stand in hollows, too
+        size = (thing.radius_m, thing.height_m)
+        return [
+            Solid("cylinder", size, np.array([x, y, 0.0]), upright, WOOD)
+            for x, y in thing.places_m()
+        ]
+    if isinstance(thing, CorridorObstacle):
+        x, y = thing.at_m
+        off_m = 0.5 * (thing.width_m + WALL_M)
+        edges = (0.5 * thing.length_m, 0.5 * WALL_M, thing.height_m)
+        return [
+            Solid("box", edges, np.array([x, y + side * off_m, 0.0]), upright, WOOD)
+            for side in (1.0, -1.0)
+        ]
+    middle = _middle_m(thing)
+    turn = upright if thing.upright else np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]])
+    if isinstance(thing, PoleObstacle):
+        return [Solid("cylinder", (thing.radius_m, thing.length_m / 2), middle, turn, WOOD)]
+    half = (thing.radius_m + STAVE_M) * math.tan(math.pi / STAVE_COUNT)
+    out = thing.radius_m + STAVE_M / 2
+    stave = (STAVE_M / 2, half, thing.length_m / 2)
+    parts = []
+    for angle in 2.0 * math.pi * np.arange(STAVE_COUNT) / STAVE_COUNT:
+        c, s = math.cos(angle), math.sin(angle)
+        place = out * np.array([c, s, 0.0])
+        axes = turn @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        parts.append(Solid("box", stave, middle + turn @ place, axes, GLASS))
+    return parts
+
+
+def start_fault(m: Mechanics, world: WorldConfig) -> str | None:
+    """Why a body that has been placed cannot start: it is in a peg or wall; None if it can.
+
+    A coil that is put at a pole or in a pipe touches it on purpose.
+    """
+    contact = m.data.contact
+    if not isinstance(world.obstacle, PegsObstacle | CorridorObstacle):
+        return None
+    for pair, depth_m in zip(contact.geom, -contact.dist, strict=True):
+        things = [k for k in pair if m.model.geom(k).name.startswith(OBSTACLE)]
+        if depth_m > START_DEPTH_M and things:
+            link = int(m.model.geom_bodyid[pair].max()) - 1
+            x, y, _ = m.model.geom(things[0]).pos
+            return (
+                f"link {link} would start {depth_m * 1e3:.0f} mm inside the obstacle at "
+                f"({x:.2f}, {y:.2f}): move start_m, turn start_heading_rad, or move the obstacle"
+            )
+    return None
 
 
 def _middle_m(thing: PoleObstacle | PipeObstacle) -> Floats:
@@ -73,14 +141,14 @@ def place_at_obstacle(
     """Place a coiled body round the world's pole, or any body in its pipe, head up, at rest.
 
     The coil is opened, or drawn together, until it just touches: the servos close it. Returns
-    False, and does nothing, where there is no obstacle, or a pole and no coil.
+    False, and does nothing, where there is neither pole nor pipe, or a pole and no coil.
 
     Raises:
         ValueError: ``joint_rad`` is not (J,).
 
     """
     thing, q = world.obstacle, np.asarray(joint_rad, dtype=float)
-    if thing is None:
+    if not isinstance(thing, PoleObstacle | PipeObstacle):
         return False
     if q.shape != (m.joint_count,):
         raise ValueError(f"joint_rad has shape {q.shape}; the robot has {m.joint_count} joints")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
@@ -15,7 +16,7 @@ from snakewalk.drivers.compiling import compiled
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.body import build_model
 from snakewalk.sim.physics.mechanics import Mechanics, PhysicsError
-from snakewalk.sim.physics.obstacles import place_at_obstacle
+from snakewalk.sim.physics.obstacles import place_at_obstacle, start_fault
 from snakewalk.sim.physics.placing import float_at, place
 from snakewalk.sim.physics.stepper import CompiledSteps
 from snakewalk.sim.plant import ServoDrive
@@ -80,7 +81,7 @@ class MujocoPlant:
         self._position_rad: Floats = self._data.qpos[7:]
         self._velocity_rad_s: Floats = self._data.qvel[6:]
         self._count = 0
-        self.reset((0.0, 0.0), 0.0, np.zeros(robot.joint_count))
+        self._place_body((0.0, 0.0), 0.0, np.zeros(robot.joint_count))
         self.steps: Steps = CompiledSteps(self.mechanics)
         """The loop that advances the body."""
 
@@ -134,8 +135,17 @@ class MujocoPlant:
 
         Raises:
             ValueError: ``joint_rad`` is not (J,).
+            InputError: the body would start inside a peg or a wall.
 
         """
+        self._place_body(start_m, heading_rad, joint_rad)
+        fault = start_fault(self.mechanics, self.world)
+        if fault is not None:
+            raise InputError(f"world {self.world.name}: {fault}")
+
+    def _place_body(
+        self, start_m: tuple[float, float], heading_rad: float, joint_rad: ArrayLike
+    ) -> None:
         m = self.mechanics
         if not place_at_obstacle(
             m, self.robot, self.world, heading_rad, joint_rad

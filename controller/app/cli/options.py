@@ -27,6 +27,14 @@ Port = Annotated[
 RunPort = Annotated[str | None, typer.Option(help="serial port; without it, the simulator")]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
 RunFolder = Annotated[Path | None, typer.Option(file_okay=False, help="folder for log and summary")]
+Compliant = Annotated[
+    bool | None,
+    typer.Option(
+        "--compliance/--no-compliance",
+        help="joints yield to measured current, or not; default: as the run says",
+        show_default=False,
+    ),
+]
 Force = Annotated[bool, typer.Option("--force", help="overwrite files")]
 Robot = Annotated[str | None, typer.Option(help="shipped robot, or a TOML file")]
 World = Annotated[str | None, typer.Option(help="shipped world, or a TOML file")]

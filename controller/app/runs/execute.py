@@ -4,11 +4,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
 from snakewalk.controller.app.report.artifacts import write_summary
 from snakewalk.controller.app.runs.backend import metal, simulated
 from snakewalk.controller.app.runs.pose_provider import PoseProvider, pose_faults, pose_provider
 from snakewalk.controller.app.runs.prepared_run import PreparedRun
 from snakewalk.controller.metrics.summary import RunSummary, summary
+from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord, Winding
@@ -54,6 +58,7 @@ def execute(
 
     """
     pose_faults(prepared.run, prepared.robot, prepared.world, metal=port is not None)
+    check_compliance(prepared.run, prepared.robot)
     plan = prepared.check_plan()
     initial_pose = prepared.initial_pose() if port is None else None
     if initial_pose is not None:
@@ -112,6 +117,42 @@ def execute(
     record = read_log(log_path)
     numbers = write_summary(summary(record), folder)
     return Finished(outcome, log_path, record, numbers, pose, source)
+
+
+def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
+    """Refuse a compliance that safety would clamp, or that would chatter against a blocked shaft.
+
+    Raises:
+        InputError: one line for each fault.
+
+    """
+    config = run.compliance
+    if config is None:
+        return
+    faults, allowed = [], run.safety.goal_rate_rad_s - robot.joint_speed_limit_rad_s
+    if config.yield_rate_rad_s > allowed:
+        faults.append(
+            f"run {run.name}: compliance.yield_rate_rad_s {config.yield_rate_rad_s:g}: together "
+            f"with the robot's joint_speed_limit_rad_s {robot.joint_speed_limit_rad_s:g} it is "
+            f"over safety.goal_rate_rad_s {run.safety.goal_rate_rad_s:g}; at most {allowed:g}"
+        )
+    chatter = chatters(config, _current_gain_a_rad(robot), 1.0 / run.cycle_hz)
+    if chatter is not None:
+        faults.append(f"run {run.name}: {chatter}")
+    if faults:
+        raise InputError(faults)
+
+
+def _current_gain_a_rad(robot: RobotConfig) -> float:
+    """Current of the stiffer joints per radian of lead; 0 where the motor is not known."""
+    from snakewalk.sim.servo.motor import MOTORS, p_gain_per_rad  # noqa: PLC0415  figures only
+
+    servo = robot.servo
+    motor = MOTORS.get(servo.model)
+    if motor is None:
+        return 0.0
+    gain = float(p_gain_per_rad(max(servo.position_p_gain, servo.pitch_p_gain), motor))
+    return gain * servo.supply_v / motor.resistance_ohm
 
 
 def _motor(model: str) -> tuple[float, Winding | None]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.gait import GaitSetConfig
 from snakewalk.config.loader import (
@@ -155,6 +156,7 @@ def prepare_gait(
                 ],
                 "by": by,
             },
+            "compliance": known.compliance if known is not None else None,
         },
         "command line",
     )
@@ -162,6 +164,19 @@ def prepare_gait(
     soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
     body = _with_gains(body, pitch=pitch, soft=soft)
     return GaitRun(run, body, load_world(run.world), make_operator)
+
+
+def is_gait(name: str) -> bool:
+    """Whether this is the name of a gait or of a shipped set of its parameters."""
+    return name in GAITS or name in shipped("gaits")
+
+
+def with_compliance(run: RunConfig, on: bool | None) -> RunConfig:
+    """Let joints yield, by the run's own table if it has one, or not; None: as the run says."""
+    if on is None:
+        return run
+    table = (run.compliance or ComplianceConfig()) if on else None
+    return run.model_copy(update={"compliance": table})
 
 
 def prepare_playback(
@@ -241,7 +256,7 @@ def _gait_by_name(
     """Make a gait by its name or by that of a set of parameters, and return the set."""
     if name in GAITS:
         return make_gait(name, parameters), None
-    if name not in shipped("gaits") and not name.endswith(".toml"):
+    if not is_gait(name) and not name.endswith(".toml"):
         raise InputError(
             f"{name}: no such gait; there are {', '.join(GAITS)}; "
             f"sets of parameters: {', '.join(shipped('gaits'))}; your own ends in .toml"

@@ -1,4 +1,4 @@
-"""Runs over many seeds, motions, robots, grounds and frictions, on a process pool."""
+"""Runs and gaits over many seeds, motions, robots, grounds and frictions, on a process pool."""
 
 import json
 import math
@@ -14,15 +14,23 @@ import numpy as np
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import digest
 from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_walk
+from snakewalk.controller.app.runs.factory import (
+    is_gait,
+    prepare_gait,
+    prepare_walk,
+    with_compliance,
+)
+from snakewalk.controller.app.runs.gait_run import GaitRun
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.app.studies.pool import each
+from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
 from snakewalk.controller.terrain.summary import path_relief
 
 Value = str | int | float | bool
 
+GAIT_SECONDS = 20.0
 _START_DRAWS = 1000
 
 
@@ -37,6 +45,13 @@ class Case:
     """Factor on the heights of the ground."""
     keys: tuple[tuple[str, Value], ...] = ()
     """Values of the run's, robot's and world's files that are replaced; ``_deg`` for ``_rad``."""
+    compliance: bool | None = None
+    """Whether joints yield to measured current."""
+
+    @property
+    def is_gait(self) -> bool:
+        """Whether ``run`` names a gait, or a set of its parameters."""
+        return is_gait(self.run)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +79,8 @@ class Trial:
     """Electrical."""
     lead_max_rad: float = math.nan
     """Largest difference between an asked and a measured joint angle."""
+    speed_m_s: float = math.nan
+    """Of a gait over the ground, net, at full rate."""
     current_max_a: float = math.nan
     roll_max_deg: float = math.nan
     in_air: float = math.nan
@@ -81,24 +98,25 @@ class Trial:
         return self.complete and self.missed == 0
 
 
-def prepare_case(case: Case, seed: int, spread_m: float, changes: Mapping[str, object]) -> WalkRun:
+def prepare_case(
+    case: Case, seed: int, spread_m: float, changes: Mapping[str, object]
+) -> WalkRun | GaitRun:
     """Prepare one trial's run; its start is moved by a normal deviate, drawn from the seed.
 
-    A start on unsafe ground is drawn again, so that the moved start does not fail by itself.
+    A walk's start on unsafe ground is drawn again, so that the moved start does not fail by itself.
 
     Raises:
         InputError: the run cannot be prepared, or there is no safe ground about its start.
 
     """
-    robot = {"robot": case.robot} if case.robot is not None else {}
-    options = dict(changes) | robot | {"motion": case.motion, "seed": seed}
-    found = prepare_walk(case.run, keys=dict(map(_in_rad, case.keys)), **options)
+    found = _prepared(case, seed, changes)
+    found = replace(found, run=with_compliance(found.run, case.compliance))
     if case.relief != 1.0:
         found = replace(found, world=found.world.with_relief(case.relief))
     if spread_m == 0.0:
         return found
-    relief, start_m = found.planner.relief, np.array(found.run.start_m)
-    rng = np.random.default_rng(seed)
+    relief = found.planner.relief if isinstance(found, WalkRun) else None
+    start_m, rng = np.array(found.run.start_m), np.random.default_rng(seed)
     for _ in range(_START_DRAWS):
         x_m, y_m = start_m + spread_m * rng.standard_normal(2)
         if relief is None or relief.safe(x_m, y_m):
@@ -107,6 +125,25 @@ def prepare_case(case: Case, seed: int, spread_m: float, changes: Mapping[str, o
     raise InputError(
         f"run {found.run.name}: no safe ground within {spread_m:g} m of the start "
         f"({start_m[0]:.2f}, {start_m[1]:.2f}); move the start or give --start-spread 0"
+    )
+
+
+def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> WalkRun | GaitRun:
+    robot = {"robot": case.robot} if case.robot is not None else {}
+    options = dict(changes) | robot
+    seconds = options.pop("seconds", None)
+    if not case.is_gait:
+        options |= {"motion": case.motion, "seed": seed}
+        return prepare_walk(case.run, keys=dict(map(_in_rad, case.keys)), **options)
+    if case.keys:
+        raise InputError(f"{case.run}: --over replaces keys of walks, and this is a gait")
+    world = options.get("world")
+    return prepare_gait(
+        case.run,
+        robot=case.robot,
+        world=None if world is None else str(world),
+        seconds=float(str(seconds)) if seconds is not None else GAIT_SECONDS,
+        seed=seed,
     )
 
 
@@ -154,10 +191,11 @@ def config_digest(case: Case, changes: Mapping[str, object]) -> str:
 def is_fixed(case: Case, spread_m: float, changes: Mapping[str, object]) -> bool:
     """Whether all seeds give the same run, so that it counts once.
 
-    The seed draws the start, the walk's shapes and a camera's noise, and nothing of a serpenoid.
+    The seed draws the start, the walk's shapes and a camera's noise, and nothing of a serpenoid or
+    of a gait.
     """
     run = prepare_case(case, 0, 0.0, changes).run
-    return spread_m == 0.0 and run.motion == "serpenoid" and run.pose != "camera"
+    return spread_m == 0.0 and run.motion in {"serpenoid", "gait"} and run.pose != "camera"
 
 
 def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, object]) -> Trial:
@@ -165,13 +203,12 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
     trial = Trial(case, seed)
     try:
         prepared = prepare_case(case, seed, spread_m, changes)
-        slope_rad = path_relief(prepared.planner, prepared.path).median_footprint_slope_rad
         trial = replace(
-            trial,
-            start_m=prepared.run.start_m,
-            waypoints=len(prepared.run.waypoints_m),
-            slope_median_deg=float(np.degrees(slope_rad)),
+            trial, start_m=prepared.run.start_m, waypoints=len(prepared.run.waypoints_m)
         )
+        if isinstance(prepared, WalkRun):
+            slope_rad = path_relief(prepared.planner, prepared.path).median_footprint_slope_rad
+            trial = replace(trial, slope_median_deg=float(np.degrees(slope_rad)))
         return _measured(trial, prepared)
     except InputError as error:
         return replace(trial, cause="refused", why=f"refused: {error.faults[0]}")
@@ -179,7 +216,7 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
         return replace(trial, cause="error", why=f"{type(error).__name__}: {error}")
 
 
-def _measured(trial: Trial, prepared: WalkRun) -> Trial:
+def _measured(trial: Trial, prepared: WalkRun | GaitRun) -> Trial:
     with TemporaryDirectory() as folder:
         finished = execute(prepared, Path(folder))
         stood = ground_contact(finished.record, prepared.ground)
@@ -192,6 +229,7 @@ def _measured(trial: Trial, prepared: WalkRun) -> Trial:
         reached=outcome.reached,
         missed=outcome.missed,
         duration_s=outcome.duration_s,
+        speed_m_s=gait_displacement(finished.record).speed_m_s if trial.case.is_gait else math.nan,
         path_error_m=_number(numbers.path_error_mean_m),
         path_error_max_m=_number(numbers.path_error_max_m),
         eta=_number(numbers.eta),
@@ -274,6 +312,14 @@ class CaseSummary:
     """Of failure, how many runs each, most first."""
     why: str
     """The same in a line; what the software did not foresee in full."""
+    compliance: str = ""
+    """``on`` or ``off`` where it was chosen."""
+    speed_m_s: float | None = None
+    """Of gaits, net, mean of the runs."""
+    speed_sd_m_s: float | None = None
+    """Standard deviation of that speed from run to run."""
+    rolled: int = 0
+    """Runs in which the head link was over 90 degrees on its side at some time."""
 
 
 def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
@@ -309,6 +355,10 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
                 alarms=sum(t.alarms for t in some),
                 causes=_counts([t.cause for t in some if not t.complete]),
                 why=_why([t for t in some if not t.complete]),
+                compliance={None: "", True: "on", False: "off"}[case.compliance],
+                speed_m_s=_mean([t.speed_m_s for t in some], 4),
+                speed_sd_m_s=_deviation([t.speed_m_s for t in some], 4),
+                rolled=sum(t.roll_max_deg > 90.0 for t in some),
             )
         )
     return rows
@@ -345,6 +395,11 @@ def _number(value: object) -> float:
 def _mean(values: list[float] | list[int], digits: int) -> float | None:
     known = [v for v in values if np.isfinite(v)]
     return round(float(np.mean(known)), digits) if known else None
+
+
+def _deviation(values: list[float], digits: int) -> float | None:
+    known = [v for v in values if np.isfinite(v)]
+    return round(float(np.std(known, ddof=1)), digits) if len(known) > 1 else None
 
 
 def _most(values: list[float], digits: int) -> float | None:

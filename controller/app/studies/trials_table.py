@@ -46,6 +46,7 @@ class TrialsTable(CsvTable):
         case, measured = asdict(trial.case), asdict(trial)
         case["keys"] = " ".join(f"{key}={value}" for key, value in trial.case.keys)
         case["robot"] = trial.case.robot or ""
+        case["compliance"] = {None: "", True: "on", False: "off"}[trial.case.compliance]
         measured["start_m"] = " ".join(map(str, trial.start_m or ()))
         place = dict(zip(_PLACE, self._where(trial.case, trial.seed), strict=True))
         self.append(case | place | {key: measured[key] for key in _MEASURED})

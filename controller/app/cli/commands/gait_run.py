@@ -4,6 +4,7 @@ import math
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.commands.gait import Name, Param, parameters
 from snakewalk.controller.app.cli.options import (
+    Compliant,
     Film,
     Json,
     Robot,
@@ -49,6 +51,7 @@ def run_gait(
         Path | None, typer.Option(help="the same from a gamepad, e.g. /dev/input/js0")
     ] = None,
     port: RunPort = None,
+    compliance: Compliant = None,
     film: Film = True,
     out: RunFolder = None,
     seed: Annotated[int, typer.Option(min=0, help="of every random choice")] = 0,
@@ -57,7 +60,7 @@ def run_gait(
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
     from snakewalk.controller.app.progress import TimeBar  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.app.runs.factory import prepare_gait  # noqa: PLC0415
+    from snakewalk.controller.app.runs.factory import prepare_gait, with_compliance  # noqa: PLC0415
     from snakewalk.controller.metrics.displacement import gait_displacement  # noqa: PLC0415
 
     if by not in {"blend", "cpg"}:
@@ -76,6 +79,7 @@ def run_gait(
             then=[_change(text) for text in then or []],
             by="cpg" if by == "cpg" else "blend",
         )
+        prepared = replace(prepared, run=with_compliance(prepared.run, compliance))
         run = prepared.run
         folder = out if out is not None else Path("runs") / f"gait-{run.name}-{prepared.robot.name}"
         bar = stack.enter_context(TimeBar(run.name, seconds))

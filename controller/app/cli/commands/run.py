@@ -1,6 +1,7 @@
 """``snakewalk run``: the main job, on servos or in the simulator."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +9,7 @@ import typer
 
 from snakewalk.controller.app.cli.options import (
     DEFAULT_RUN,
+    Compliant,
     Film,
     Json,
     Motion,
@@ -35,17 +37,19 @@ def run(
         str | None, typer.Option(help="what measures the head: simulator, camera or joints")
     ] = None,
     out: RunFolder = None,
+    compliance: Compliant = None,
     film: Film = True,
     as_json: Json = False,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
     from snakewalk.controller.app.progress import PathBar  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.app.runs.factory import prepare_walk  # noqa: PLC0415
+    from snakewalk.controller.app.runs.factory import prepare_walk, with_compliance  # noqa: PLC0415
 
     prepared = prepare_walk(
         run, seed=seed, motion=motion, robot=robot, world=world, track=track, pose=pose
     )
+    prepared = replace(prepared, run=with_compliance(prepared.run, compliance))
     changed = [Path(each).stem for each in (robot, world, track) if each is not None]
     parts = [prepared.run.name, *changed, prepared.run.motion, f"seed{prepared.run.seed}"]
     if prepared.run.pose is not None:

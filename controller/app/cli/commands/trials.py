@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, TrackFile, World, console
 from snakewalk.controller.app.result_files import check_picture
@@ -18,12 +19,15 @@ _HEADS = {
     "run": "run",
     "robot": "robot",
     "motion": "motion",
+    "compliance": "com-\npliance",
     "relief": "relief",
     "slope_deg": "slope\ndeg",
     "complete": "com-\nplete",
     "first_pass": "first\npass",
     "passed_by": "mis-\nses",
     "duration_s": "time\ns",
+    "speed_m_s": "speed\nm/s",
+    "speed_sd_m_s": "sd",
     "path_error_m": "error\nm",
     "path_error_max_m": "worst\nm",
     "eta": "eta",
@@ -33,13 +37,15 @@ _HEADS = {
     "why": "why",
 }
 """Columns of the table: the units stand under the names, so that the table stays narrow."""
-_TEXT = {"run", "robot", "motion", "why"}
+_TEXT = {"run", "robot", "motion", "compliance", "why"}
 
 
 def trials(
     runs: Annotated[
         list[str] | None,
-        typer.Argument(help=f"shipped runs, or RUN.toml [default: {DEFAULT_RUN}]", metavar="RUN"),
+        typer.Argument(
+            help=f"shipped runs, RUN.toml, or gaits [default: {DEFAULT_RUN}]", metavar="RUN"
+        ),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a row")] = 20,
     first_seed: Annotated[int, typer.Option(min=0, help="the others follow it")] = 0,
@@ -64,6 +70,11 @@ def trials(
             metavar="KEY=V1,V2",
         ),
     ] = None,
+    compliance: Annotated[
+        list[str] | None,
+        typer.Option(help="on, off: joints yield to current; may be given again"),
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=5.0, help="of a gait")] = 20.0,
     world: World = None,
     track: TrackFile = None,
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
@@ -77,12 +88,13 @@ def trials(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate runs over seeds, motions, robots and relief; tabulate what was reached and why not.
+    """Simulate runs or gaits over seeds; tabulate what was reached, and why not.
 
     Each seed moves the start, so that its runs differ also where the motion takes no chances. A run
     is the same for the same files: after an update of the program begin a new --out.
     """
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
+    from snakewalk.controller.app.runs.factory import is_gait  # noqa: PLC0415
     from snakewalk.controller.app.studies import trials as study  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.studies.trials_table import TrialsTable  # noqa: PLC0415
 
@@ -91,15 +103,19 @@ def trials(
     motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
     overs = [study.parse_over(text) for text in over or ()]
     keys, axes = [key for key, _ in overs], [values for _, values in overs]
+    for word in compliance or ():
+        if word not in {"on", "off"}:
+            raise InputError(f"--compliance {word}: expected on or off")
     cases = [
-        study.Case(run, m, r, k, tuple(zip(keys, values, strict=True)))
+        study.Case(run, m, r, k, tuple(zip(keys, values, strict=True)), c)
         for run in (runs or [DEFAULT_RUN])
         for r in (robot if robot else (None,))
         for k in (relief if relief else (1.0,))
-        for m in motions
+        for m in (["gait"] if is_gait(run) else motions)
+        for c in ([word == "on" for word in compliance] if compliance else (None,))
         for values in product(*axes)
     ]
-    changes = {"world": world, "track": track}
+    changes = {"world": world, "track": track, "seconds": seconds}
     seen = range(first_seed, first_seed + seeds)
     planned = study.plan_trials(cases, seen, start_spread, changes)  # refuses bad input first
     table = None

@@ -1,0 +1,52 @@
+"""Support: what of the weight the ground bears under each link, told by the torque of the joints.
+
+Quasi-static, with vertical support forces: the part of the body behind a pitch joint is in balance
+under its weight, the support under it and the joint's torque. So the torques are linear in the
+support; the whole body's balance of force and of moments adds three equations. There are fewer
+equations than links; but the ground only pushes, and least squares that keep to that (C. L. Lawson,
+R. J. Hanson, Solving Least Squares Problems, 1974, by scipy) find the few links that bear.
+"""
+
+import numpy as np
+from scipy.optimize import nnls
+
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.constants import GRAVITY_M_S2
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.kinematics.links import BodyView, chain_axes, chain_points_m
+
+TORQUE_NOISE_N_M = 0.005
+"""Error of a torque against which an even load weighs: two units of Present Current (ours)."""
+LIFTED_SHARE = 0.1
+"""A link that bears less than this share of its weight is taken to be lifted (ours)."""
+
+
+def support_n(robot: RobotConfig, body: BodyView, torque_n_m: Floats) -> Floats:
+    """Vertical force (L,) of the ground on each link, 0 or more.
+
+    Args:
+        robot: links and joints.
+        body: where the links are.
+        torque_n_m: (J,) of the servos on the joints; only those of pitch joints are used.
+
+    """
+    links = robot.joint_count + 1
+    weight_n = robot.link_mass_kg * GRAVITY_M_S2
+    joints_m, axes = chain_points_m(robot, body)[1:-1], chain_axes(robot, body)
+    pitch = np.array(robot.pitch_joints, dtype=int)
+    # lever (P, L): moment about a joint's axis of an upward unit force on a link behind it
+    arm_m = body.link_m[None] - joints_m[pitch, None]
+    lever_m = axes[pitch, None, 0] * arm_m[..., 1] - axes[pitch, None, 1] * arm_m[..., 0]
+    lever_m = np.where(np.arange(links) > pitch[:, None], lever_m, 0.0)
+    middle_m = body.link_m - body.centre_m
+    whole = np.stack([np.full(links, robot.link_length_m), middle_m[:, 0], middle_m[:, 1]])
+    even = np.eye(links) * (TORQUE_NOISE_N_M / weight_n)
+    rows = np.concatenate([lever_m, whole, even])
+    target = rows.sum(axis=1) * weight_n
+    target[: len(pitch)] -= torque_n_m[pitch]
+    return np.asarray(nnls(rows, target)[0])
+
+
+def lifted(robot: RobotConfig, bears_n: Floats) -> Bools:
+    """Whether each link is lifted, by what the ground bears of it; any shape."""
+    return np.asarray(bears_n < LIFTED_SHARE * robot.link_mass_kg * GRAVITY_M_S2)
