@@ -1,4 +1,4 @@
-"""Recorded poses as a film: a chase camera, the ground, the waypoints, the planned path."""
+"""Recorded poses as a film: a chase camera, ground, waypoints, paths and the head's trail."""
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
@@ -18,6 +18,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.looks import dressed_model, mark_reached
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import add_shade
+from snakewalk.sim.rendering.trail import make_trail
 
 if TYPE_CHECKING:
     import av
@@ -40,7 +41,7 @@ def render_film(
     size: tuple[int, int] = (960, 540),
     waypoints_m: Sequence[tuple[float, float]] = (),
     waypoint_radius_m: float = 0.3,
-    path_m: Floats | None = None,
+    paths: Sequence[tuple[float, Floats]] = (),
     title: str = "",
     fine: bool = False,
     on_frame: Callable[[int, int], None] | None = None,
@@ -59,7 +60,7 @@ def render_film(
         size: even width and height, pixels.
         waypoints_m: drawn as rings that turn green when the body's centre is inside, in order.
         waypoint_radius_m: of these rings.
-        path_m: (P, 2) planned path, drawn as dots.
+        paths: each the time from when on it is in force and (P, 2) points; drawn as dots.
         title: shown in the caption.
         fine: smooth edges, at three times the cost.
         on_frame: told (frames done, of) after each.
@@ -81,10 +82,11 @@ def render_film(
     if faults:
         raise InputError(faults)
     shots = poses_at(times, poses, np.arange(times[0], times[-1], speed_up / fps))
-    model = dressed_model(robot, world, ground, waypoints_m, waypoint_radius_m, path_m, fine=fine)
+    model = dressed_model(robot, world, ground, waypoints_m, waypoint_radius_m, fine=fine)
     data = mujoco.MjData(model)
     camera = _camera(model, data, shots, fps, robot.length_m)
-    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + robot.joint_count + 11)
+    trail = make_trail(paths, times, poses, ground)
+    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + robot.joint_count + 11 + trail.most)
     scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
     scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
     view, option = mujoco.MjvCamera(), mujoco.MjvOption()
@@ -103,7 +105,8 @@ def render_film(
                 model, data, option, None, view, mujoco.mjtCatBit.mjCAT_ALL, scene
             )
             add_shade(scene, np.array(data.xipos[1:]), np.array(data.xmat[1:, ::3]), robot, ground)
-            now = times[0] + k * speed_up / fps
+            now = float(times[0]) + k * speed_up / fps
+            trail.add(scene, now)
             film.add(screen.draw(scene, f"{title}  {now:6.1f} s   {speed_up:g}x".strip()))
             if on_frame is not None:
                 on_frame(k + 1, len(shots))

@@ -21,7 +21,6 @@ PUPIL: Rgba = (0.02, 0.02, 0.02, 1)
 TONGUE: Rgba = (0.75, 0.10, 0.15, 1)
 AHEAD: Rgba = (0.93, 0.33, 0.12, 1)
 REACHED: Rgba = (0.10, 0.62, 0.38, 1)
-PATH: Rgba = (0.98, 0.98, 0.95, 1)
 RING_PARTS = 32
 LOWLAND, HIGHLAND = np.array([96.0, 112, 70]), np.array([214.0, 192, 152])
 SHALLOW = [0.30, 0.56, 0.66], [0.26, 0.51, 0.62]
@@ -40,11 +39,10 @@ def dressed_model(
     ground: HeightField | None,
     waypoints_m: Sequence[tuple[float, float]] = (),
     waypoint_radius_m: float = 0.3,
-    path_m: Floats | None = None,
     *,
     fine: bool = False,
 ) -> mujoco.MjModel:
-    """Build the model with skin, floor, sky, waypoints (poles and rings) and path (P, 2).
+    """Build the model with skin, floor, sky, and waypoints (poles and rings).
 
     ``fine`` smooths edges: three times the work of a software renderer.
     """
@@ -65,9 +63,6 @@ def dressed_model(
             _add(
                 spec.worldbody, _CAPSULE, (0.007, 0, 0), (), AHEAD, (*one, *other)
             ).name = f"waypoint{k}ring{part}"
-    for x, y in _dots(path_m):
-        z = 0.0 if ground is None else float(ground.elevation_m(x, y))
-        _add(spec.worldbody, _SPHERE, (0.012, 0, 0), (float(x), float(y), z + 0.004), PATH)
     model = finish(spec.compile(), ground)
     if ground is not None:
         _paint(model, ground)
@@ -233,12 +228,3 @@ def _thickness_m(robot: RobotConfig) -> Floats:
     thick = 0.80 + 0.20 * np.sin(np.pi * np.minimum(along / 0.55, 1.0) / 2)
     thick *= 1.0 - 0.55 * np.maximum(0.0, (along - 0.55) / 0.45) ** 1.5
     return np.asarray(robot.body_radius_m * thick)
-
-
-def _dots(path_m: Floats | None, spacing_m: float = 0.12) -> Floats:
-    """Points of the path at equal arc length (D, 2)."""
-    if path_m is None or len(path_m) < 2:
-        return np.zeros((0, 2))
-    arc = np.concatenate([[0.0], np.linalg.norm(np.diff(path_m[:, :2], axis=0), axis=1).cumsum()])
-    at = np.arange(0.0, arc[-1], max(spacing_m, arc[-1] / 400))
-    return np.column_stack([np.interp(at, arc, path_m[:, k]) for k in range(2)])

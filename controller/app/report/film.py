@@ -61,7 +61,7 @@ def film_run(
         size=FINE_SIZE if fine else SIZE,
         waypoints_m=[(float(x), float(y)) for x, y in plan.waypoints_m],
         waypoint_radius_m=plan.waypoint_radius_m,
-        path_m=plan.path_m[:, :2],
+        paths=record.paths,
         title=header.run.name,
         fine=fine,
         on_frame=on_progress,
