@@ -41,6 +41,7 @@ def render_film(
     size: tuple[int, int] = (960, 540),
     waypoints_m: Sequence[tuple[float, float]] = (),
     waypoint_radius_m: float = 0.3,
+    reached_s: Sequence[float] = (),
     paths: Sequence[tuple[float, Floats]] = (),
     title: str = "",
     fine: bool = False,
@@ -58,8 +59,9 @@ def render_film(
         fps: frames a second of film.
         speed_up: seconds of run a second of film.
         size: even width and height, pixels.
-        waypoints_m: drawn as rings that turn green when the body's centre is inside, in order.
+        waypoints_m: drawn as rings.
         waypoint_radius_m: of these rings.
+        reached_s: when the first, second, ... of them turn green.
         paths: each the time from when on it is in force and (P, 2) points; drawn as dots.
         title: shown in the caption.
         fine: smooth edges, at three times the cost.
@@ -93,19 +95,20 @@ def render_film(
     reached = 0
     with Offscreen(model, *size) as screen, _Film(path, fps, size) as film:
         for k, shot in enumerate(shots):
+            now = float(times[0]) + k * speed_up / fps
+            while reached < len(reached_s) and reached_s[reached] <= now:
+                mark_reached(model, reached)
+                reached += 1
             data.qpos[:] = shot
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
             mujoco.mj_camlight(model, data)
-            centre_m = data.xipos[1:, :2].mean(axis=0)
-            reached = _mark_waypoints(model, centre_m, waypoints_m, waypoint_radius_m, reached)
             view.lookat[:], view.azimuth = camera[k, :3], camera[k, 3]
             view.distance, view.elevation = camera[k, 4], -33.0
             mujoco.mjv_updateScene(
                 model, data, option, None, view, mujoco.mjtCatBit.mjCAT_ALL, scene
             )
             add_shade(scene, np.array(data.xipos[1:]), np.array(data.xmat[1:, ::3]), robot, ground)
-            now = float(times[0]) + k * speed_up / fps
             trail.add(scene, now)
             film.add(screen.draw(scene, f"{title}  {now:6.1f} s   {speed_up:g}x".strip()))
             if on_frame is not None:
@@ -140,22 +143,6 @@ def _camera(
     stray = np.abs(centre - smooth).max()
     distance = np.full(len(shots), 1.55 * length_m + stray)
     return np.column_stack([smooth, azimuth, distance])
-
-
-def _mark_waypoints(
-    model: mujoco.MjModel,
-    centre_m: Floats,
-    waypoints_m: Sequence[tuple[float, float]],
-    radius_m: float,
-    reached: int,
-) -> int:
-    """Turn the next waypoint green if the body's centre is there; returns how many are."""
-    if reached < len(waypoints_m):
-        x, y = waypoints_m[reached]
-        if np.hypot(centre_m[0] - x, centre_m[1] - y) <= radius_m:
-            mark_reached(model, reached)
-            return reached + 1
-    return reached
 
 
 class _Film:

@@ -12,6 +12,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
+from snakewalk.controller.metrics.path_error import waypoint_times_s
 from snakewalk.controller.runlog.record import Header, RunRecord
 
 FPS, FINE_FPS = 15, 25
@@ -61,6 +62,7 @@ def film_run(
         size=FINE_SIZE if fine else SIZE,
         waypoints_m=[(float(x), float(y)) for x, y in plan.waypoints_m],
         waypoint_radius_m=plan.waypoint_radius_m,
+        reached_s=[float(t) for t in waypoint_times_s(record.pose, plan)],
         paths=record.paths,
         title=header.run.name,
         fine=fine,

@@ -58,6 +58,47 @@ def test_a_film_is_never_longer_than_half_a_minute() -> None:
         assert speed_up(run_s) == round(speed_up(run_s))
 
 
+def test_a_waypoint_is_green_from_when_the_log_has_it_reached(
+    record: RunRecord, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A body that cuts a ring's edge between two frames left it red, and all that follow."""
+    pytest.importorskip("mujoco")
+    pytest.importorskip("av")
+    from snakewalk.sim.rendering import film
+
+    marked: list[tuple[int, int]] = []
+    frames = [0]
+    monkeypatch.setattr(film, "mark_reached", lambda _, k: marked.append((k, frames[0])))
+    monkeypatch.setattr(film, "Offscreen", _Blank)
+    time_s, qpos = body_qpos(record)
+
+    def on_frame(done: int, _: int) -> None:
+        frames[0] = done
+
+    film.render_film(
+        record.header.robot, record.header.world, None, time_s[:100], qpos[:100],
+        tmp_path / "film.mp4", fps=10, size=(32, 32), waypoints_m=[(5.0, 5.0), (6.0, 6.0)],
+        reached_s=[0.31, 0.32], on_frame=on_frame,
+    )  # fmt: skip
+    assert marked == [(0, 4), (1, 4)]
+
+
+class _Blank:
+    """In place of a frame buffer: what is drawn is black."""
+
+    def __init__(self, _: object, width: int, height: int) -> None:
+        self._black = np.zeros((height, width, 3), np.uint8)
+
+    def __enter__(self) -> "_Blank":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def draw(self, *_: object) -> np.ndarray:
+        return self._black
+
+
 def test_film_and_page_come_from_the_log_alone(make: Make, tmp_path: Path) -> None:
     av = pytest.importorskip("av")
     log = make(tmp_path / "run.mcap", seconds=1.5, ground="hills")
