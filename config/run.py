@@ -1,5 +1,6 @@
 """What a run is: robot, world, recording, waypoints, motion and safety, by name or by path."""
 
+import math
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -9,12 +10,16 @@ from snakewalk.config.camera import CameraConfig, PoseName
 from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.gait import GaitConfig
 from snakewalk.config.playback import PlaybackConfig
-from snakewalk.config.robot import ServoConfig
+from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.synthesis import SynthesisConfig
 
 MotionName = Literal[
     "walk", "walk-printed", "walk-blind", "serpenoid", "gait", "playback", "repertoire", "source"
 ]
+
+_FULL_OUTPUT_RAD = 885 * 128 * 2.0 * math.pi / 4096
+"""Position error at which a P gain of 1 gives full output: PWM 885 is 100 %, the gain is the
+register over 128, an error is counted in 4096ths of a turn (e-manual, X series)."""
 
 
 class StatesConfig(Strict):
@@ -67,6 +72,13 @@ class SafetyConfig(Strict):
 
     goal_rate_rad_s: float = Field(4.0, gt=0.0)
     goal_lead_rad: float = Field(0.8, gt=0.0, description="goal minus measured")
+    following_limit_rad: float = Field(
+        0.4,
+        gt=0.0,
+        description="a joint that is farther from its goal does not follow; wider "
+        "where a low P gain needs it, and within 0.9 of goal_lead_rad",
+    )
+    following_time_s: float = Field(0.5, ge=0.0, description="how long it may be exceeded")
     current_limit_a: float = Field(2.0, gt=0.0)
     current_time_s: float = Field(0.5, ge=0.0, description="how long it may be exceeded")
     temperature_limit_c: float = Field(70.0, gt=0.0)
@@ -83,6 +95,21 @@ class SafetyConfig(Strict):
         "stop", description="after a vanished port or a rebooted servo: torque off, ask, or go on"
     )
     recovery_time_s: float = Field(10.0, gt=0.0, description="how long it is waited for")
+
+    def following_limits_rad(self, robot: RobotConfig) -> tuple[float, ...]:
+        """How far each joint may be from its goal, rad, head first.
+
+        A yaw joint may lag by the error at which its P gain gives full output, which is all that
+        an honest lag can need; twice of it is the limit, but at least ``following_limit_rad``. A
+        pitch joint has ``following_limit_rad``: its current tells whether the ground holds it off.
+        """
+        full_rad = _FULL_OUTPUT_RAD / max(robot.servo.position_p_gain, 1)
+        yaw_rad = max(self.following_limit_rad, 2.0 * full_rad)
+        most_rad = 0.9 * self.goal_lead_rad
+        return tuple(
+            min(yaw_rad if axis == "y" else self.following_limit_rad, most_rad)
+            for axis in robot.joint_axes
+        )
 
     def voltage_limits_v(self, servo: ServoConfig) -> tuple[float, float]:
         """Least and greatest supply of servos of this kind: the run's, else the robot's."""

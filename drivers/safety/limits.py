@@ -1,5 +1,6 @@
 """Limits of what may pass to the servos, of one robot in one run."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,12 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.types import LIMIT_SLACK_RAD
+
+STEP_SLACK_RAD, STEP_RATE = 0.2, 2.0
+"""Slack of a measured step, and its speed as a share of the goals' rate (ours): 0.36 rad in 20 ms;
+a link that falls off an edge was measured at 0.12."""
+EFFORT_SHARE = 0.5
+"""Of the pitch joints' current (ours); held off by the ground they were measured at over 0.8."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,11 +37,22 @@ class SafetyLimits:
     voltage_min_v: float
     voltage_max_v: float
     stale_limit_s: float
+    following_limit_rad: Floats
+    """(J,) how far a joint may be from its goal."""
+    following_effort_a: Floats
+    """(J,) a joint that pushes towards its goal with this current is held off; infinite where the
+    current is not limited."""
+    following_time_s: float
+    """How long a joint may not follow."""
+    step_slack_rad: float = STEP_SLACK_RAD
+    step_rate_rad_s: float = math.inf
+    """How far a joint may be measured from its last angle: slack, and so much for each second."""
 
     @staticmethod
     def from_config(robot: RobotConfig, safety: SafetyConfig) -> "SafetyLimits":
         """Limits from the robot's and the run's configuration."""
         voltage_min_v, voltage_max_v = safety.voltage_limits_v(robot.servo)
+        effort_a = EFFORT_SHARE * robot.servo.pitch_current_limit_a
         return SafetyLimits(
             joint_names=tuple(map(robot.joint_name, range(robot.joint_count))),
             limit_rad=np.array(robot.limit_rad),
@@ -47,4 +65,10 @@ class SafetyLimits:
             voltage_min_v=voltage_min_v,
             voltage_max_v=voltage_max_v,
             stale_limit_s=safety.stale_limit_s,
+            following_limit_rad=np.array(safety.following_limits_rad(robot)),
+            following_effort_a=np.array(
+                [np.inf if axis == "y" else effort_a for axis in robot.joint_axes]
+            ),
+            following_time_s=safety.following_time_s,
+            step_rate_rad_s=STEP_RATE * safety.goal_rate_rad_s,
         )

@@ -8,7 +8,9 @@ from typing import Any
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError, SafetyTrippedError
 from snakewalk.drivers.link import JointLink
+from snakewalk.drivers.safety.following_error import FollowingError
 from snakewalk.drivers.safety.limits import SafetyLimits
+from snakewalk.drivers.safety.measured_step import believable
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.vet import SafetyMemory, Verdict, check_state, stale_fault, vet
 from snakewalk.drivers.types import JointCommand, JointState
@@ -49,6 +51,7 @@ class SafeLink:
         self._limits = limits
         self._clock = clock
         self._state: JointState | None = None
+        self._following = FollowingError(limits)
         self._memory: SafetyMemory | None = None
         self._stop_requested: str | None = None
         self._touched = False
@@ -97,6 +100,7 @@ class SafeLink:
         self._touched = True
         state = self._link.enable()
         self._state, self._memory = state, SafetyMemory.at_rest(state)
+        self._following.reset()
         self._check(state, self._memory)
         self._refuse_if_tripped()
         return state
@@ -120,10 +124,17 @@ class SafeLink:
         if self._memory is None:
             self._state = state
             return state
-        if self._recovery is not None and self.tripped is None:
+        doubt = None
+        if self._state is not None:
+            state, doubt = believable(state, self._state, self._limits)
+        if doubt is not None or (self._recovery is not None and self.tripped is None):
             stale = stale_fault(state, self._limits, self._clock.now_s())
-            if stale is not None:
+            if stale is not None and doubt is None:
                 return self._recover(stale, None)
+            if stale is not None:  # not to be recovered from: nobody knows which joint is which
+                self._state = state
+                self._trip(f"{stale}: {doubt}")
+                return state
         self._state = state
         self._check(state, self._memory)
         return state
@@ -160,12 +171,7 @@ class SafeLink:
             self._recover(str(fault), fault)
         else:  # if the program stood still in between, the next step counts from here
             memory = verdict.memory
-            self._memory = SafetyMemory(
-                self._clock.now_s(),
-                memory.goal_rad,
-                memory.over_current_since_s,
-                memory.checked_state,
-            )
+            self._memory = memory._replace(time_s=self._clock.now_s())
 
     def request_stop(self, reason: str) -> None:
         """Latch at the next read or write; may be called from another thread (a stop button)."""
@@ -197,12 +203,13 @@ class SafeLink:
             raise SafetyTrippedError(str(self.tripped)) from fault
         self.recoveries += 1
         self._state, self._memory = state, SafetyMemory.at_rest(state)
+        self._following.reset()
         self._check(state, self._memory)
         return state
 
     def _check(self, state: JointState, memory: SafetyMemory) -> None:
         fault, self._memory = check_state(state, memory, self._limits, self._clock.now_s())
-        fault = self._stop_requested or fault
+        fault = self._stop_requested or fault or self._following.update(state, memory.goal_rad)
         if fault is not None:
             self._trip(fault)
 

@@ -72,8 +72,8 @@ def vet(
 ) -> Verdict:
     """Vet a command against the newest state.
 
-    Where clamps disagree the joint limit wins over the lead, and the lead over the rate: a smaller
-    lead is a smaller torque.
+    Where clamps disagree the joint limit wins over the rate, and the rate over the lead: a goal
+    that jumps to where a joint is said to be would jump on a wrong answer, too.
     """
     veto, checked = check_state(state, last, limits, now_s)
     veto = veto or _command_fault(command, limits)
@@ -256,10 +256,11 @@ def _clamp(
     goal_rad: Floats,
     clamped: Bools,
 ) -> None:
-    """Clamp goals to rate, lead and limit, in this order; note which were changed."""
+    """Clamp goals to lead, rate and limit, in this order; note which were changed."""
     for k in range(len(requested_rad)):
-        goal = min(max(requested_rad[k], last_rad[k] - step_rad), last_rad[k] + step_rad)
-        goal = min(max(goal, position_rad[k] - lead_rad), position_rad[k] + lead_rad)
+        low, high = position_rad[k] - lead_rad, position_rad[k] + lead_rad
+        goal = min(max(requested_rad[k], low), high)
+        goal = min(max(goal, last_rad[k] - step_rad), last_rad[k] + step_rad)
         goal = min(max(goal, -limit_rad[k]), limit_rad[k])
         goal_rad[k], clamped[k] = goal, goal != requested_rad[k]
 

@@ -32,6 +32,7 @@ SAFETY = SafetyConfig()
 PATIENCE_S = 1.0
 JOINTS = ROBOT.joint_count
 TICK_RAD = 2 * np.pi / 4096
+HELD_RAD = 0.02
 _STAMPS = 60
 _GOALS = (116).to_bytes(2, "little") + (4).to_bytes(2, "little")
 
@@ -41,9 +42,10 @@ class Witness:
     """What must not happen, counted."""
 
     beyond_limit: int = 0
-    """Goals on the wire beyond a joint limit, or farther ahead of the joint than allowed."""
+    """Goals on the wire beyond a joint limit, or farther ahead of the joint than allowed and not on
+    their way back to it."""
     too_fast: int = 0
-    """Goals on the wire that move faster than allowed, and not back towards the joint."""
+    """Goals on the wire that move faster than allowed, unless to where the joint is."""
     old: int = 0
     """Values taken for new that are of another cycle."""
     foreign: int = 0
@@ -158,13 +160,17 @@ class Rig:
         here = self.line.firmware.plant.position_rad
         known = here if self._seen is None else self._seen.position_rad
         ahead = np.minimum(np.abs(goal - known), np.abs(goal - here))
-        self._sin("beyond_limit", ahead > self.limits.goal_lead_rad + TICK_RAD)
         last = self._sent
+        far = ahead > self.limits.goal_lead_rad + TICK_RAD
+        if last is not None:  # the rate may let it come no nearer at once
+            far &= np.abs(goal - known) >= np.abs(last - known)
+        self._sin("beyond_limit", far)
         if last is not None and self._steady:
             dt_s = min(time_s - self._sent_at_s, self.limits.stale_limit_s) + 2e-3
             fast = np.abs(goal - last) > self.limits.goal_rate_rad_s * dt_s + TICK_RAD
-            nearer = np.abs(goal - known) < np.abs(last - known)
-            self._sin("too_fast", fast & ~nearer)
+            # a chain that was interrupted holds: its goals are where its joints are
+            held = np.minimum(np.abs(goal - known), np.abs(goal - here)) < HELD_RAD
+            self._sin("too_fast", fast & ~held)
         self._sent, self._sent_at_s = goal, time_s
 
     def _sin(self, kind: str, bad: np.ndarray) -> None:

@@ -32,6 +32,8 @@ TARGETS = {
         "test_safety_vet.py",
         "test_safe_link.py",
     ),
+    "snakewalk.drivers.safety.following_error": ("test_following_error.py",),
+    "snakewalk.drivers.safety.measured_step": ("test_measured_step.py",),
     "snakewalk.drivers.protocol.parser": (
         *("test_reader_edges.py", "test_packet_reader.py", "test_packets.py"),
         "test_crc_and_stuffing.py",

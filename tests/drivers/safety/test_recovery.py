@@ -264,7 +264,9 @@ def test_a_stop_button_ends_the_waiting(rig: Rig) -> None:
     with pytest.raises(SafetyTrippedError):
         rig.link.read()
     assert rig.events[-1] == "given up: stop button"
-    assert rig.line.clock.now_s() - start_s < 0.5
+    assert (
+        rig.line.clock.now_s() - start_s < 2.5
+    )  # not the ten of the recovery; torque off waits two for the port
 
 
 def test_it_is_mended_three_times_and_no_more(rig: Rig) -> None:

@@ -25,6 +25,10 @@ LIMITS = SafetyLimits(
     voltage_min_v=10.0,
     voltage_max_v=14.8,
     stale_limit_s=0.1,
+    following_limit_rad=np.array([0.4, 0.4, 0.4]),
+    following_effort_a=np.array([np.inf, 0.05, np.inf]),
+    following_time_s=0.5,
+    step_rate_rad_s=8.0,
 )
 NOW = 100.0
 DT = 2.0**-6
@@ -223,10 +227,11 @@ def test_what_passes_keeps_all_promises(
     assert verdict.veto is None
     passed = verdict.goal_rad
     assert (np.abs(passed) <= LIMITS.limit_rad).all()
-    assert (np.abs(passed - measured) <= 0.8 + 1e-12).all()
-    step = 4.0 * min(dt_s, 0.1) + 1e-12
-    nearer = np.abs(passed - measured) < np.abs(held - measured)
-    assert ((np.abs(passed - held) <= step) | nearer).all()  # faster only to relieve a joint
+    step = 4.0 * min(dt_s, 0.1)
+    assert (np.abs(passed - held) <= step + 1e-12).all()
+    # farther ahead than the lead only where the rate lets the goal come no nearer to the joint
+    nearest = np.maximum(np.abs(held - measured) - step, 0.8)
+    assert (np.abs(passed - measured) <= nearest + 1e-9).all()
     assert (verdict.clamped == (passed != goal)).all()
     assert (verdict.memory.goal_rad == passed).all()
 
@@ -236,6 +241,13 @@ def test_a_vetted_goal_passes_unchanged_when_asked_again(goal: np.ndarray) -> No
     first = vetted(goal)
     again = vet(JointCommand(NOW, first.goal_rad), state(), first.memory, LIMITS, NOW)
     assert not again.clamped.any()
+
+
+def test_a_wrong_answer_moves_no_goal_faster_than_the_rate() -> None:
+    """The lead won over the rate: a forged angle moved a goal by 0.77 rad in one cycle."""
+    forged = state(position_rad=np.full(J, -1.1))
+    verdict = vetted(0.45, forged, memory(0.45))
+    assert np.abs(verdict.goal_rad - 0.45) == pytest.approx(np.full(J, 4.0 * DT))
 
 
 def test_a_pause_gives_no_allowance_for_a_jump() -> None:

@@ -1,0 +1,61 @@
+"""Measured steps: a joint cannot be somewhere else from one reading to the next.
+
+An answer with a right checksum may all the same be another servo's (two with one ID, exchanged IDs)
+or made up. A joint that is measured farther from its last believed angle than any servo turns in
+the time between is not believed: it counts as not read, keeps its old values, and grows older. If
+it does not come back the state is stale, and the run stops.
+"""
+
+import numpy as np
+
+from snakewalk.drivers.safety.limits import SafetyLimits
+from snakewalk.drivers.types import JointState
+
+
+def believable(
+    state: JointState, believed: JointState, limits: SafetyLimits
+) -> tuple[JointState, str | None]:
+    """The part of a state that can be believed, and what cannot, as one line.
+
+    Args:
+        state: as read.
+        believed: the last state that was believed.
+        limits: slack and speed of a measured step.
+
+    Returns:
+        The state, with old values and ages where a joint was not read or is not believed; what is
+        not believed, or None.
+
+    """
+    step_rad = np.abs(state.position_rad - believed.position_rad)
+    measured_s = believed.time_s - believed.age_s
+    between_s = np.maximum(state.time_s - state.age_s - measured_s, 0.0)
+    # a value that is no number is left to the vetting
+    doubted = state.valid & (step_rad > limits.step_slack_rad + limits.step_rate_rad_s * between_s)
+    if not doubted.any():
+        if state.valid.all() or believed.valid.all():
+            return state, None
+        held = ~state.valid & (state.position_rad != believed.position_rad)
+        return (_held(state, believed, held) if held.any() else state), None
+    joint = int(np.argmax(doubted))
+    doubt = (
+        f"{limits.joint_names[joint]}: measured {state.position_rad[joint]:.2f} rad, "
+        f"{between_s[joint]:.3f} s after {believed.position_rad[joint]:.2f} rad: no servo turns so "
+        "fast: two servos with one ID, exchanged IDs, or a lost turn count"
+    )
+    return _held(state, believed, doubted | ~state.valid), doubt
+
+
+def _held(state: JointState, believed: JointState, held: np.ndarray) -> JointState:
+    """State with the believed values of the joints in ``held`` (J,)."""
+    age_s = believed.age_s + (state.time_s - believed.time_s)
+    arrays = {
+        "position_rad": np.where(held, believed.position_rad, state.position_rad),
+        "velocity_rad_s": np.where(held, believed.velocity_rad_s, state.velocity_rad_s),
+        "current_a": np.where(held, believed.current_a, state.current_a),
+        "age_s": np.where(held, age_s, state.age_s),
+        "valid": state.valid & ~held,
+    }
+    for array in arrays.values():
+        array.setflags(write=False)
+    return state._replace(**arrays)
