@@ -287,6 +287,8 @@ class ServoChain:
         confirmed = [servo_id for joint, servo_id in enumerate(ids) if joint not in silent]
         if confirmed:
             bus.sync_write(confirmed, "Bus Watchdog", 0)
+            # the port may be closed right behind it: a reply shows that the packet has arrived
+            bus.block(confirmed, "Bus Watchdog", "Bus Watchdog", fast=False).read()
         return silent
 
     def read(self) -> JointState:
