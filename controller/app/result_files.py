@@ -2,12 +2,20 @@
 
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
+from typing import Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 
+LOG: Final = "log.mcap"
+FILM: Final = "film.mp4"
+REPORT: Final = "report.html"
+SUMMARY: Final = "summary.json"
+RUN_FILES: Final = (LOG, f"{LOG}.part", FILM, REPORT, SUMMARY)
+"""What a run leaves in its folder, which holds the files of one run only."""
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 
 
@@ -15,20 +23,112 @@ def refuse_to_overwrite(paths: Sequence[Path | None], force: bool) -> None:
     """Check the files of all results before any work is done; None is no file.
 
     Raises:
-        InputError: one line for each that exists (without ``force``), whose folder does not, or
-            that is named twice.
+        InputError: one line for each that exists (without ``force``), whose folder does not or
+            takes no new file, or that is named twice.
 
     """
     files = [path for path in paths if path is not None]
     faults = [f"{path}: exists; --force overwrites it" for path in files if path.exists()]
     if force:
         faults = [f"{path}: is a folder" for path in files if path.is_dir()]
-    folders = dict.fromkeys(path.parent for path in files)
-    faults += [f"{folder}: no such folder" for folder in folders if not folder.is_dir()]
+    for folder in dict.fromkeys(path.parent for path in files):
+        fault = _folder_fault(folder)
+        faults += [] if fault is None else [fault]
     if len({path.absolute() for path in files}) < len(files):
         faults.append("two results have the same name")
     if faults:
         raise InputError(faults)
+
+
+def _folder_fault(folder: Path) -> str | None:
+    """What keeps a folder from taking a new file; None if nothing does.
+
+    A file without a name is made in it: permissions alone do not tell a read-only disk.
+    """
+    if not folder.is_dir():
+        return f"{folder}: no such folder"
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            return None
+    except OSError as error:
+        return f"{folder}: takes no file: {error.strerror}"
+
+
+@contextmanager
+def run_folder(name: str, out: Path | None) -> Iterator[Path]:
+    """Give the folder of a new run: ``out``, else ``runs/name``, numbered from 2 where it is taken.
+
+    A numbered folder is made at once, so that two programs never share one; it goes again if
+    nothing was written into it.
+
+    Raises:
+        InputError: the folder cannot be made, or takes no file.
+
+    """
+    folder = Path("runs") / name if out is None else out
+    new: list[Path] = []
+    try:
+        for number in count(2):
+            new = [place for place in (folder, *folder.parents) if not place.exists()]
+            try:
+                folder.mkdir(parents=True)
+            except FileExistsError:
+                if out is not None:
+                    break
+                folder = Path("runs") / f"{name}-{number}"
+            else:
+                break
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made: {error.strerror}") from None
+    try:
+        fault = _folder_fault(folder)
+        if fault is not None:
+            raise InputError(fault)
+        yield folder
+    finally:
+        with suppress(OSError):
+            for place in new:
+                place.rmdir()
+
+
+def refuse_another_run(folder: Path, force: bool) -> None:
+    """Check that a folder holds no run's files.
+
+    Raises:
+        InputError: it does (without ``force``).
+
+    """
+    there = [name for name in RUN_FILES if (folder / name).exists()]
+    if there and not force:
+        raise InputError(
+            f"{folder}: holds a run ({', '.join(there)}); give another --out, or --force, which "
+            "deletes these"
+        )
+
+
+def refuse_mixture(log: Path, folder: Path, force: bool) -> None:
+    """Check that page and film of a log do not come to stand beside another run's files.
+
+    In the log's own folder, as a run leaves it, they are made again. Elsewhere an old page and film
+    are deleted with ``force``, a log never.
+
+    Raises:
+        InputError: the folder holds another log, or (without ``force``) a page or a film.
+
+    """
+    logs = [folder / name for name in RUN_FILES[:2] if (folder / name).exists()]
+    if any(one.samefile(log) for one in logs):
+        return
+    if logs:
+        raise InputError(f"{logs[0]}: is another run's log; give another --out")
+    refuse_another_run(folder, force)
+    clear_run(folder)
+
+
+def clear_run(folder: Path) -> None:
+    """Delete the files of an earlier run, so that none is taken for one of the next."""
+    for name in RUN_FILES:
+        (folder / name).unlink(missing_ok=True)
 
 
 def check_picture(path: Path | None) -> None:
@@ -55,6 +155,11 @@ def atomic_write(path: Path) -> Iterator[Path]:
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
-        yield Path(folder) / path.name
+        try:
+            yield Path(folder) / path.name
+        except OSError as error:
+            if error.errno is None:
+                raise
+            raise OSError(error.errno, error.strerror, str(path)) from error
         for part in sorted(Path(folder).iterdir()):
             part.replace(path.parent / part.name)

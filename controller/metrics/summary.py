@@ -151,7 +151,7 @@ def summary(record: RunRecord) -> RunSummary:
         seed=header.seed,
         log_complete=record.complete,
         log_note=record.note,
-        outcome=_outcome(waypoints, len(times), tripped),
+        outcome=_outcome(record, waypoints, len(times), tripped),
         waypoints=waypoints,
         waypoints_reached=len(times),
         waypoints_counted=int(pose.target.max(initial=0)),
@@ -200,14 +200,17 @@ def summary(record: RunRecord) -> RunSummary:
     )
 
 
-def _outcome(waypoints: int, reached: int, tripped: str | None) -> str:
+def _outcome(record: RunRecord, waypoints: int, reached: int, tripped: str | None) -> str:
     if tripped is not None:
         return f"stopped by safety: {tripped}"
-    if waypoints == 0:
-        return "ran to its end"
-    if reached == waypoints:
+    if waypoints and reached == waypoints:
         return "every waypoint reached"
-    return f"{reached} of {waypoints} waypoints reached"
+    so_far = f"{reached} of {waypoints} waypoints reached"
+    if any(event.kind == "interrupt" for event in record.events):
+        return f"interrupted: {so_far}" if waypoints else "interrupted"
+    if waypoints:
+        return so_far
+    return "ran to its end" if record.complete else "the log breaks off"
 
 
 def _costs(

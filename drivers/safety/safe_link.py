@@ -88,6 +88,11 @@ class SafeLink:
         """Number of joints J."""
         return self._link.joint_count
 
+    @property
+    def was_enabled(self) -> bool:
+        """Whether ``enable`` has been called, so that torque may have been on."""
+        return self._touched
+
     def enable(self) -> JointState:
         """Check and set up the servos, torque on.
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import pytest
 import typer
 
-from snakewalk.controller.app.cli.main import app
+from snakewalk.controller.app.cli.command_line import app
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tests" / "helpers" / "base_install.py"

@@ -10,12 +10,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from snakewalk.controller.app.result_files import LOG
+
 if TYPE_CHECKING:
     from snakewalk.controller.app.report.artifacts import Artifacts
     from snakewalk.controller.metrics.summary import RunSummary
     from snakewalk.controller.runlog.record import RunRecord
 
-console = Console(highlight=False)
+console = Console(highlight=False, markup=False)
 DEFAULT_RUN = "jacksboro-traverse"
 RunName = Annotated[str, typer.Argument(help="shipped run, or a RUN.toml", show_default=True)]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
@@ -26,7 +28,10 @@ Port = Annotated[
 ]
 RunPort = Annotated[str | None, typer.Option(help="serial port; without it, the simulator")]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
-RunFolder = Annotated[Path | None, typer.Option(file_okay=False, help="folder for log and summary")]
+RunFolder = Annotated[
+    Path | None,
+    typer.Option(file_okay=False, help="folder of this run; default: a new one in runs/"),
+]
 Compliant = Annotated[
     bool | None,
     typer.Option(
@@ -76,7 +81,13 @@ def write_artifacts(
     """Make the report and the film of a run; print on standard error what could not be made."""
     from snakewalk.controller.app.report.artifacts import make_artifacts  # noqa: PLC0415  heavy; --help stays quick
 
-    made = make_artifacts(record, folder, numbers, film=film, fine=fine)
+    try:
+        made = make_artifacts(record, folder, numbers, film=film, fine=fine)
+    except KeyboardInterrupt as stop:
+        log = folder / LOG
+        if log.exists():
+            stop.add_note(f"the run is whole: {log}; its film: snakewalk report {log}")
+        raise
     for line in made.notes:
         print(f"snakewalk: {line}", file=sys.stderr)
     return made

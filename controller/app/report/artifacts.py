@@ -8,17 +8,15 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.progress import ProgressBar
 from snakewalk.controller.app.report.film import film_run
-from snakewalk.controller.app.report.page import film_html, page
-from snakewalk.controller.app.result_files import atomic_write
+from snakewalk.controller.app.report.page import Section, film_html, page
+from snakewalk.controller.app.result_files import FILM, REPORT, SUMMARY, atomic_write
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.runlog.record import RunRecord
-
-FILM, REPORT, SUMMARY = "film.mp4", "report.html", "summary.json"
 
 
 @dataclass(frozen=True, slots=True)
 class Artifacts:
-    """Files made; None for what could not be made, and why in ``notes``."""
+    """Files of a run beside its log; None for what is not there, and why in ``notes``."""
 
     report: Path | None
     film: Path | None
@@ -41,20 +39,27 @@ def make_artifacts(
     film: bool = True,
     fine: bool = False,
 ) -> Artifacts:
-    """Make ``folder/film.mp4``, ``folder/summary.json`` and ``folder/report.html`` from a record.
+    """Make ``folder/summary.json``, ``folder/report.html`` and ``folder/film.mp4`` from a record.
 
-    ``numbers`` is the record's summary as ``execute`` returns it; without it, it is computed.
-    What this machine cannot make (no simulator, no matplotlib, no OpenGL) is noted and left out: a
-    run is not lost for want of its pictures. Shows progress on standard error.
+    ``numbers`` is the record's summary as ``execute`` returns it; without it, it is computed. The
+    page is written before the film, which takes longest, and again when the film is drawn; a film
+    that is there already is the same run's, and stays until then. What this machine cannot make (no
+    simulator, no matplotlib, no OpenGL) is noted and left out: a run is not lost for want of its
+    pictures. Shows progress on standard error.
     """
     notes: list[str] = []
-    made = _film(record, folder / FILM, fine, notes) if film else None
-    report = None
+    numbers = write_summary(summary(record) if numbers is None else numbers, folder)
+    path = folder / FILM
+    drawn: list[Section] | None = None
     try:
-        report = build_report(record, folder, made, numbers)
+        drawn = _sections(record)
+        _write_page(record, folder, path if path.exists() else None, numbers, drawn)
     except InputError as error:
         notes += [f"no report: {line}" for line in error.faults]
-    return Artifacts(report, made, tuple(notes))
+    if film and _film(record, path, fine, notes) and drawn is not None:
+        _write_page(record, folder, path, numbers, drawn)
+    report = None if drawn is None else folder / REPORT
+    return Artifacts(report, path if path.exists() else None, tuple(notes))
 
 
 def build_report(
@@ -72,17 +77,31 @@ def build_report(
 
     """
     numbers = write_summary(summary(record) if numbers is None else numbers, out_dir)
-    film_on_page = "" if film is None else film_html(film, out_dir)
+    return _write_page(record, out_dir, film, numbers, _sections(record))
+
+
+def _sections(record: RunRecord) -> list[Section]:
     require_extra("the report needs", "matplotlib")
     from snakewalk.controller.app.report.figures.sections import sections  # noqa: PLC0415  an extra
 
+    return sections(record)
+
+
+def _write_page(
+    record: RunRecord,
+    out_dir: Path,
+    film: Path | None,
+    numbers: RunSummary,
+    drawn: list[Section],
+) -> Path:
+    film_on_page = "" if film is None else film_html(film, out_dir)
     header = record.header
     config = {
         "run": header.run.model_dump(mode="json"),
         "robot": header.robot.model_dump(mode="json"),
         "world": header.world.model_dump(mode="json"),
     }
-    html = page(numbers, sections(record), film=film_on_page, events=record.events, config=config)
+    html = page(numbers, drawn, film=film_on_page, events=record.events, config=config)
     path = out_dir / REPORT
     with atomic_write(path) as part:
         part.write_text(html, encoding="utf-8")
@@ -97,8 +116,8 @@ def write_summary(numbers: RunSummary, out_dir: Path) -> RunSummary:
     return numbers
 
 
-def _film(record: RunRecord, path: Path, fine: bool, notes: list[str]) -> Path | None:
-    path.unlink(missing_ok=True)  # a film of an earlier run would be taken for this run's
+def _film(record: RunRecord, path: Path, fine: bool, notes: list[str]) -> bool:
+    """Draw the film; return whether it was drawn."""
     with ProgressBar("film") as bar:
         try:
             with atomic_write(path) as part:
@@ -106,5 +125,5 @@ def _film(record: RunRecord, path: Path, fine: bool, notes: list[str]) -> Path |
         except InputError as error:
             bar.hide()
             notes += [f"no film: {line}" for line in error.faults]
-            return None
-    return path
+            return False
+    return True

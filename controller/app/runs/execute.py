@@ -8,6 +8,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.app.report.artifacts import write_summary
+from snakewalk.controller.app.result_files import LOG, clear_run, refuse_another_run
 from snakewalk.controller.app.runs.backend import metal, simulated
 from snakewalk.controller.app.runs.pose_provider import PoseProvider, pose_faults, pose_provider
 from snakewalk.controller.app.runs.prepared_run import PreparedRun
@@ -43,20 +44,25 @@ def execute(
     folder: Path,
     port: str | None = None,
     *,
+    force: bool = False,
     confirm: Callable[[str], bool] | None = None,
     on_progress: OnProgress = lambda progress: None,
     on_event: OnEvent = lambda kind, text: None,
 ) -> Finished:
     """Run on ``port``, or on the simulator where it is None; nothing else differs.
 
-    ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``);
-    ``on_progress`` is called after each cycle, ``on_event`` with what the motion decides by itself:
-    a slower rate, an operator's change.
+    The folder is made; one that holds a run's files is refused without ``force``, which deletes
+    them when the new log begins. ``confirm`` asks an operator whether an interrupted chain may go
+    on (``safety.recovery``); ``on_progress`` is called after each cycle, ``on_event`` with what the
+    motion decides by itself: a slower rate, an operator's change.
 
     Raises:
-        InputError: the plan breaks a limit, the port is not there, the servos are not the robot's.
+        InputError: the plan breaks a limit, the port is not there, the servos are not the robot's,
+            or the folder holds a run.
+        KeyboardInterrupt: of an operator; its notes tell what became of torque, and the log's path.
 
     """
+    refuse_another_run(folder, force)
     pose_faults(prepared.run, prepared.robot, prepared.world, metal=port is not None)
     check_compliance(prepared.run, prepared.robot)
     plan = prepared.check_plan()
@@ -67,7 +73,8 @@ def execute(
         )
     else:
         backend = metal(prepared.run, prepared.robot, port or "")
-    log_path = folder / "log.mcap"
+    log_path = folder / LOG
+    clear_run(folder)
     torque_constant_n_m_a, winding = _motor(prepared.robot.servo.model)
     with RunLog(log_path) as log:
         log.config(
@@ -99,8 +106,9 @@ def execute(
         limits = SafetyLimits.from_config(prepared.robot, safety)
         with pose_provider(prepared, backend, log_event) as pose:
             source = prepared.make_source(log_event)
+            link = SafeLink(backend.chain, limits, clock, recovery)
             drive = Drive(
-                link=SafeLink(backend.chain, limits, clock, recovery),
+                link=link,
                 clock=clock,
                 pose=pose.measure,
                 motion=source,
@@ -113,7 +121,16 @@ def execute(
                 on_progress=on_progress,
                 on_event=on_event,
             )
-            outcome = drive.run()
+            try:
+                outcome = drive.run()
+            except (KeyboardInterrupt, SystemExit) as stop:  # a signal: the link is closed by now
+                torque = "torque is off" if link.was_enabled else "torque was not switched on"
+                failed = getattr(stop, "__notes__", [])
+                text = "; ".join(failed) if failed else torque
+                log.event(clock.now_s(), "interrupt", text, "warning")
+                stop.add_note(torque if not failed else "torque may be on: switch the supply off")
+                stop.add_note(f"log: {log_path}; its page: snakewalk report {log_path}")
+                raise
     record = read_log(log_path)
     numbers = write_summary(summary(record), folder)
     return Finished(outcome, log_path, record, numbers, pose, source)

@@ -215,10 +215,10 @@ class RouteRun:
         return facts
 
 
-def default_folder(job: RepertoireRun) -> Path:
-    """Return the default folder of a run."""
+def run_name(job: RepertoireRun) -> str:
+    """Return the name of the run's folder."""
     how = "repertoire" if job.replan else "repertoire-open"
-    return Path("runs") / f"{job.run.name}-{job.robot.name}-{how}"
+    return f"{job.run.name}-{job.robot.name}-{how}"
 
 
 def run_route(
@@ -226,6 +226,8 @@ def run_route(
     folder: Path,
     port: str | None,
     on_progress: OnProgress = lambda progress: None,
+    *,
+    force: bool = False,
 ) -> RouteRun:
     """Execute a plan on ``port``, or on the simulator where it is None.
 
@@ -233,6 +235,6 @@ def run_route(
         InputError: as ``execute``.
 
     """
-    finished = execute(job, folder, port, on_progress=on_progress)
+    finished = execute(job, folder, port, force=force, on_progress=on_progress)
     assert isinstance(finished.source, RouteMotion), "a repertoire run has no other motion"
     return RouteRun(job, finished, finished.source.follower)

@@ -1,9 +1,12 @@
 """The one pool of processes: on this machine, or on the workers of a Dask cluster."""
 
+import signal
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
-from typing import TypeVar
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from multiprocessing import active_children, get_context
+from typing import Any, TypeVar
 
 from snakewalk.config.errors import InputError
 
@@ -11,12 +14,48 @@ A = TypeVar("A")
 B = TypeVar("B")
 
 
-def process_pool(workers: int) -> ProcessPoolExecutor:
-    """Return a pool whose workers are fresh interpreters.
+class _Pool(ProcessPoolExecutor):
+    """A pool whose workers leave Ctrl-C to the parent: a terminal sends it to all of them."""
 
-    A forked worker would inherit the threads of MuJoCo and numba in whatever state they are.
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
+        """Submit; a worker that is started here inherits that SIGINT is blocked."""
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Give a pool whose workers are fresh interpreters.
+
+    A forked worker would inherit the threads of MuJoCo and numba in whatever state they are. Where
+    the block ends by an exception, an interrupt first of all, nobody waits for what the workers are
+    at: they are killed, and their temporary files go with the pool's own folder.
     """
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    others = {child.pid for child in active_children()}
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        pool = _Pool(
+            workers,
+            mp_context=get_context("spawn"),
+            initializer=_use_folder,
+            initargs=(folder,),
+        )
+        with pool:
+            try:
+                yield pool
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                for child in active_children():
+                    if child.pid not in others:
+                        child.kill()
+                raise
+
+
+def _use_folder(folder: str) -> None:
+    """Let a worker's temporary files lie in the pool's folder."""
+    tempfile.tempdir = folder
 
 
 def each(
@@ -33,11 +72,8 @@ def each(
         return
     with process_pool(workers) as pool:
         waiting = {pool.submit(work, item): item for item in items}
-        try:
-            for done in as_completed(waiting):
-                yield waiting[done], done.result()
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+        for done in as_completed(waiting):
+            yield waiting[done], done.result()
 
 
 def _on_cluster(work: Callable[[A], B], items: Sequence[A], address: str) -> Iterator[tuple[A, B]]:

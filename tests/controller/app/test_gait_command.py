@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.run import SafetyConfig
-from snakewalk.controller.app.cli.main import app, main
+from snakewalk.controller.app.cli.command_line import app
+from snakewalk.controller.app.cli.main import main
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait, prepare_run, prepare_walk
 from snakewalk.controller.app.runs.gait_run import GaitRun

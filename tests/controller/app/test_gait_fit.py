@@ -9,7 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.app.cli.main import app, main
+from snakewalk.controller.app.cli.command_line import app
+from snakewalk.controller.app.cli.main import main
 from snakewalk.controller.gaits.backbone import fit_backbone
 
 runner = CliRunner()

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.app.cli.main import app
+from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.app.recordings.recorded_joints import recorded_joints
 from snakewalk.controller.app.runs.factory import prepare_playback, prepare_run
 from snakewalk.controller.runlog.reader import read_log

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.main import app
+from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.app.studies.replay import differences, replay

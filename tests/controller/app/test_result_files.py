@@ -10,8 +10,17 @@ import numpy as np
 import pytest
 from pytest_mock import MockerFixture
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.main import main
-from snakewalk.controller.app.result_files import atomic_write
+from snakewalk.controller.app.result_files import (
+    RUN_FILES,
+    atomic_write,
+    refuse_mixture,
+    refuse_to_overwrite,
+    run_folder,
+)
+from snakewalk.controller.app.runs.execute import execute
+from snakewalk.controller.app.runs.factory import prepare_gait
 from snakewalk.controller.app.studies.tune import Tuned
 from snakewalk.controller.repertoire.repertoire import Repertoire
 
@@ -55,6 +64,63 @@ def test_files_beside_it_are_moved_along(tmp_path: Path) -> None:
     assert sorted(file.name for file in (tmp_path / "sub").iterdir()) == ["a.mtl", "a.obj"]
 
 
+def test_each_run_has_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("job", "job-2", "job-3"):
+        with run_folder("job", None) as folder:
+            (folder / "log.mcap").write_text(name)
+        assert folder == Path("runs") / name
+    with suppress(InputError), run_folder("job", None) as folder:
+        raise InputError("refused before anything was written")
+    assert not folder.exists()
+    with run_folder("job", tmp_path / "mine") as folder:
+        assert folder == tmp_path / "mine"
+    with (
+        pytest.raises(InputError, match="/proc/mine: cannot be made"),
+        run_folder("job", Path("/proc/mine")),
+    ):
+        pass
+
+
+def test_a_run_never_mixes_with_another(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    for name in RUN_FILES:
+        (tmp_path / name).write_text("old")
+    job = prepare_gait("lateral-undulation", seconds=0.2)
+    with pytest.raises(InputError, match=r"holds a run \(log\.mcap, .*--force"):
+        execute(job, tmp_path)
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"old"}
+    (tmp_path / "notes.txt").write_text("mine")
+    execute(job, tmp_path, force=True)
+    left = sorted(path.name for path in tmp_path.iterdir())
+    assert left == ["log.mcap", "notes.txt", "summary.json"], "no film and page of the old run"
+
+
+def test_a_page_never_stands_beside_the_log_of_another_run(tmp_path: Path) -> None:
+    one, other, pages = (tmp_path / name for name in ("one", "other", "pages"))
+    for folder in (one, other, pages):
+        folder.mkdir()
+    for folder in (one, other):
+        (folder / "log.mcap").write_text(folder.name)
+        (folder / "film.mp4").write_text(folder.name)
+    refuse_mixture(one / "log.mcap", one, force=False)
+    refuse_mixture(one / "log.mcap", pages, force=False)
+    for force in (False, True):
+        with pytest.raises(InputError, match="another run's log; give another --out"):
+            refuse_mixture(one / "log.mcap", other, force=force)
+    assert (other / "film.mp4").read_text() == "other"
+    (pages / "film.mp4").write_text("another's")
+    with pytest.raises(InputError, match="holds a run"):
+        refuse_mixture(one / "log.mcap", pages, force=False)
+    refuse_mixture(one / "log.mcap", pages, force=True)
+    assert list(pages.iterdir()) == []
+
+
+def test_a_folder_that_takes_no_file_is_told_before_any_work() -> None:
+    with pytest.raises(InputError, match=r"^/proc: takes no file: "):
+        refuse_to_overwrite([Path("/proc/tuned.toml")], force=True)
+
+
 def arguments(command: str, out: Path) -> list[str]:
     return {
         "match": ["fish", "match", "midlines.npz", "-o", str(out)],
@@ -89,7 +155,7 @@ def test_commands_leave_nothing_on_a_full_disk(
     words = arguments(command, out)
     if old is not None:
         out.write_bytes(old)
-        words += ["--force"] if command != "gait" else []
+        words += ["--force"]
     points = np.cumsum(np.ones((20, 100, 2)), axis=1) / 100.0
     points[..., 1] += 0.1 * np.sin(np.arange(20.0)[:, None] + np.linspace(0, 6, 100))
     np.savez(tmp_path / "midlines.npz", points=points, rate_hz=25.0)
@@ -104,7 +170,7 @@ def test_commands_leave_nothing_on_a_full_disk(
     monkeypatch.setattr("sys.argv", ["snakewalk", *words])
     with full_disk(20), pytest.raises(SystemExit):
         main()
-    assert capsys.readouterr().err.splitlines()[-1] == "snakewalk: File too large"
+    assert capsys.readouterr().err.splitlines()[-1] == f"snakewalk: {out}: File too large"
     assert [file.name for file in out.parent.iterdir()] == ([] if old is None else [name])
     if old is not None:
         assert out.read_bytes() == old

@@ -3,7 +3,8 @@
 import pytest
 from typer.testing import CliRunner
 
-from snakewalk.controller.app.cli.main import app, main
+from snakewalk.controller.app.cli.command_line import app
+from snakewalk.controller.app.cli.main import main
 from snakewalk.controller.app.cli.options import show
 
 

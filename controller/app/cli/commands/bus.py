@@ -11,7 +11,8 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.options import Json, Port, console
+from snakewalk.controller.app.cli.options import Force, Json, Port, console
+from snakewalk.controller.app.result_files import refuse_to_overwrite
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,6 +48,7 @@ def serve(
     link: Annotated[Path | None, typer.Option(help="symbolic link that leads to the port")] = None,
     record: Annotated[Path | None, typer.Option(help="write the exchange here, JSON lines")] = None,
     for_s: Annotated[float | None, typer.Option("--for", help="seconds; default: until ^C")] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Serve simulated servos at a serial device, in real time, with a live table."""
@@ -58,6 +60,7 @@ def serve(
         raise InputError("give --servos or --robot, not both")
     if latency < 0.0:
         raise InputError(f"--latency {latency:g}: must not be negative")
+    refuse_to_overwrite([record], force)
     what, line, traffic = _simulated(servos, robot, baud, faults)
     line.usb_latency_s = latency * 1e-3
     line.taps.append(traffic)

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, Port, Robot, console
 
@@ -53,10 +54,10 @@ def doctor(
     else:
         table = Table(box=None, show_header=False)
         for finding in findings:
-            mark = f"[{_COLOURS[finding.grade]}]{finding.grade}[/]"
+            mark = Text(finding.grade, style=_COLOURS[finding.grade])
             table.add_row(mark, finding.check, finding.found)
             if finding.remedy:
-                table.add_row("", "", f"[bold]-> {finding.remedy}[/]")
+                table.add_row("", "", Text(f"-> {finding.remedy}", style="bold"))
         console.print(table)
     if grade == "fail":
         raise SystemExit(1)

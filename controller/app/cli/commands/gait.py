@@ -8,8 +8,8 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.options import Json, Robot, console, show
-from snakewalk.controller.app.result_files import check_picture
+from snakewalk.controller.app.cli.options import Force, Json, Robot, console, show
+from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
 if TYPE_CHECKING:
     from snakewalk.controller.gaits.gait import Gait
@@ -56,6 +56,7 @@ def show_gait(
     picture: Annotated[
         Path | None, typer.Option(help="draw the body over a cycle here (.png, .svg, .pdf)")
     ] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Show a gait's parameters with ranges and units, its source, and how fast joints must be."""
@@ -65,6 +66,7 @@ def show_gait(
     from snakewalk.controller.motion.gait_cycle import GaitCycle  # noqa: PLC0415
 
     check_picture(picture)
+    refuse_to_overwrite([picture], force)
     prepared = prepare_gait(name, robot=robot, parameters=parameters(param))
     gait, body = prepared.gait, prepared.robot
     cycle = GaitCycle(gait, body)

@@ -15,6 +15,7 @@ from snakewalk.controller.app.cli.commands.gait import Name, Param, parameters
 from snakewalk.controller.app.cli.options import (
     Compliant,
     Film,
+    Force,
     Json,
     Robot,
     RunFolder,
@@ -23,6 +24,7 @@ from snakewalk.controller.app.cli.options import (
     show,
     write_artifacts,
 )
+from snakewalk.controller.app.result_files import run_folder
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.runs.gait_run import MakeOperator
@@ -54,6 +56,7 @@ def run_gait(
     compliance: Compliant = None,
     film: Film = True,
     out: RunFolder = None,
+    force: Force = False,
     seed: Annotated[int, typer.Option(min=0, help="of every random choice")] = 0,
     as_json: Json = False,
 ) -> None:
@@ -81,11 +84,18 @@ def run_gait(
         )
         prepared = replace(prepared, run=with_compliance(prepared.run, compliance))
         run = prepared.run
-        folder = out if out is not None else Path("runs") / f"gait-{run.name}-{prepared.robot.name}"
+        folder = stack.enter_context(run_folder(f"gait-{run.name}-{prepared.robot.name}", out))
         bar = stack.enter_context(TimeBar(run.name, seconds))
         paced = prepared.make_operator is not None and port is None
         on_progress = _in_real_time(bar.on_progress) if paced else bar.on_progress
-        finished = execute(prepared, folder, port, on_progress=on_progress, on_event=bar.on_event)
+        finished = execute(
+            prepared,
+            folder,
+            port,
+            force=force,
+            on_progress=on_progress,
+            on_event=bar.on_event,
+        )
     artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     result: dict[str, object] = {
         "gait": prepared.config.name,

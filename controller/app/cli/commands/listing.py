@@ -4,12 +4,13 @@ import json
 
 from rich.table import Table
 
-from snakewalk.config.loader import load_robot, load_run, load_world, shipped
 from snakewalk.controller.app.cli.options import Json, console
 
 
 def list_(as_json: Json = False) -> None:
     """List the shipped runs, robots and worlds."""
+    from snakewalk.config.loader import load_robot, load_run, load_world, shipped  # noqa: PLC0415  --help stays quick
+
     rows = {
         "runs": [[n, f"{(r := load_run(n)).robot} on {r.world}"] for n in shipped("runs")],
         "robots": [

@@ -153,7 +153,7 @@ def _plan_with_repertoire(
         found["plan"] = str(out)
     complete = True
     if carry:
-        found["ran"], complete = carry_out(job, None, None, False, None)
+        found["ran"], complete = carry_out(job, None, None, False, None, force)
     show(found, as_json)
     if not complete:
         raise SystemExit(1)

@@ -1,6 +1,5 @@
 """``snakewalk play``: a recording in time on the robot."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -8,6 +7,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.options import (
     Film,
+    Force,
     Json,
     Robot,
     RunFolder,
@@ -16,6 +16,7 @@ from snakewalk.controller.app.cli.options import (
     show,
     write_artifacts,
 )
+from snakewalk.controller.app.result_files import run_folder
 
 
 def play(
@@ -28,6 +29,7 @@ def play(
     port: RunPort = None,
     film: Film = True,
     out: RunFolder = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
@@ -36,10 +38,17 @@ def play(
     from snakewalk.controller.app.runs.factory import prepare_playback  # noqa: PLC0415
 
     prepared = prepare_playback(track, robot=robot, world=world, speed=_speed(speed))
-    folder = out if out is not None else Path("runs") / f"play-{prepared.run.name}"
-    with TimeBar(prepared.run.name, prepared.duration_s) as bar:
+    with (
+        run_folder(f"play-{prepared.run.name}", out) as folder,
+        TimeBar(prepared.run.name, prepared.duration_s) as bar,
+    ):
         finished = execute(
-            prepared, folder, port, on_progress=bar.on_progress, on_event=bar.on_event
+            prepared,
+            folder,
+            port,
+            force=force,
+            on_progress=bar.on_progress,
+            on_event=bar.on_event,
         )
     artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     result: dict[str, object] = {

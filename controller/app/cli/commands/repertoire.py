@@ -18,7 +18,12 @@ from snakewalk.controller.app.cli.options import (
     show,
     write_artifacts,
 )
-from snakewalk.controller.app.result_files import atomic_write, check_picture, refuse_to_overwrite
+from snakewalk.controller.app.result_files import (
+    atomic_write,
+    check_picture,
+    refuse_to_overwrite,
+    run_folder,
+)
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.runs.repertoire_run import RepertoireRun
@@ -104,23 +109,30 @@ def run_plan(
 
     refuse_to_overwrite([picture], force)
     job = load_plan(plan, replan=not open_loop)
-    found, complete = carry_out(job, port, out, film, picture)
+    found, complete = carry_out(job, port, out, film, picture, force)
     show({"plan": str(plan), **found}, as_json)
     if not complete and not open_loop:
         raise SystemExit(1)
 
 
 def carry_out(
-    job: "RepertoireRun", port: str | None, out: Path | None, film: bool, picture: Path | None
+    job: "RepertoireRun",
+    port: str | None,
+    out: Path | None,
+    film: bool,
+    picture: Path | None,
+    force: bool,
 ) -> tuple[dict[str, object], bool]:
     """Execute a job with a bar; what it did, and whether it reached every waypoint."""
     from snakewalk.controller.app.progress import TimeBar  # noqa: PLC0415
-    from snakewalk.controller.app.runs.repertoire_run import default_folder, run_route  # noqa: PLC0415
+    from snakewalk.controller.app.runs.repertoire_run import run_name, run_route  # noqa: PLC0415
 
     check_picture(picture)
-    folder = default_folder(job) if out is None else out
-    with TimeBar(job.run.name, job.route.duration_s) as progress:
-        ran = run_route(job, folder, port, progress.on_progress)
+    with (
+        run_folder(run_name(job), out) as folder,
+        TimeBar(job.run.name, job.route.duration_s) as progress,
+    ):
+        ran = run_route(job, folder, port, progress.on_progress, force=force)
     finished = ran.finished
     artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     if picture is not None:

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.controller.app.cli.options import Json, show, write_artifacts
+from snakewalk.controller.app.cli.options import Force, Json, show, write_artifacts
+from snakewalk.controller.app.result_files import refuse_mixture
 
 
 def report(
@@ -16,6 +17,7 @@ def report(
     ] = None,
     film: Annotated[bool, typer.Option("--film/--no-film", help="draw the film again")] = True,
     fine: Annotated[bool, typer.Option("--fine", help="film in 1280 x 720; slow")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Make report.html, summary.json and film.mp4 again from a log."""
@@ -25,6 +27,7 @@ def report(
     if record.note:
         print(f"snakewalk: {log}: {record.note}", file=sys.stderr)
     folder = log.parent if out is None else out
+    refuse_mixture(log, folder, force)
     artifacts = write_artifacts(record, folder, film=film, fine=fine)
     if artifacts.report is None:
         raise SystemExit(2)

@@ -11,6 +11,7 @@ from snakewalk.controller.app.cli.options import (
     DEFAULT_RUN,
     Compliant,
     Film,
+    Force,
     Json,
     Motion,
     Robot,
@@ -23,6 +24,7 @@ from snakewalk.controller.app.cli.options import (
     show,
     write_artifacts,
 )
+from snakewalk.controller.app.result_files import run_folder
 
 
 def run(
@@ -39,6 +41,7 @@ def run(
     out: RunFolder = None,
     compliance: Compliant = None,
     film: Film = True,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
@@ -55,12 +58,15 @@ def run(
     if prepared.run.pose is not None:
         parts.append(f"pose-{prepared.run.pose}")
     name = "-".join(parts)
-    folder = out if out is not None else Path("runs") / name
-    with PathBar(prepared.path.length_m, len(prepared.run.waypoints_m)) as bar:
+    with (
+        run_folder(name, out) as folder,
+        PathBar(prepared.path.length_m, len(prepared.run.waypoints_m)) as bar,
+    ):
         finished = execute(
             prepared,
             folder,
             port,
+            force=force,
             confirm=_confirm if sys.stdin.isatty() else None,
             on_progress=bar.on_progress,
             on_event=bar.on_event,

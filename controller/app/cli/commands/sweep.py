@@ -9,8 +9,8 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.app.cli.options import Json, console
-from snakewalk.controller.app.result_files import check_picture
+from snakewalk.controller.app.cli.options import Force, Json, console
+from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
 _HEADS = {
     "points": "n",
@@ -46,6 +46,7 @@ def sweep(
     picture: Annotated[
         Path | None, typer.Option(help="draw the table here (.png, .svg, .pdf)")
     ] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Measure gaits over their parameters: speed, cost of transport, torque, heat, slip."""
@@ -57,6 +58,8 @@ def sweep(
     from snakewalk.controller.app.studies.sweep_table import digest, read_table  # noqa: PLC0415
 
     check_picture(picture)
+    refuse_to_overwrite([picture], force)
+    refuse_to_overwrite([out], force=True)  # a table grows
     require_extra("a sweep needs", "mujoco" if dask is None else "distributed")
     planned = plan_sweep(gaits, robot, points, seed=seed, seconds=seconds)
     for line in () if as_json else planned.left_out:

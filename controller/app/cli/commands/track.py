@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from snakewalk.controller.app.cli.options import Json, console
+from snakewalk.controller.app.cli.options import Force, Json, console
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.recordings.recording import RecordingFacts
-from snakewalk.controller.app.result_files import check_picture
+from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
 
 def track(
@@ -27,6 +27,7 @@ def track(
     picture: Annotated[
         Path | None, typer.Option(help="draw midlines and angles here (.png, .svg, .pdf)")
     ] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Examine recordings: wave, bends, states this robot can use, slowing for its servos."""
@@ -35,6 +36,7 @@ def track(
     from snakewalk.controller.capture.readers.generated import EMBEDDED  # noqa: PLC0415
 
     check_picture(picture)
+    refuse_to_overwrite([picture], force)
     names = recordings or list(EMBEDDED)
     found = [
         examine(name, robot, world, None if name in EMBEDDED else rate)

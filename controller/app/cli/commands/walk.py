@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from snakewalk.controller.app.cli.options import Json, console
-from snakewalk.controller.app.result_files import check_picture
+from snakewalk.controller.app.cli.options import Force, Json, console
+from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.studies.graph_study import StudyResult
@@ -34,6 +34,7 @@ def walk(
     picture: Annotated[
         Path | None, typer.Option(help="draw states seen over steps here (.png, .svg, .pdf)")
     ] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Walk graphs of states until all are seen: how many steps, and how soon states come again."""
@@ -42,6 +43,7 @@ def walk(
     from snakewalk.controller.shape.walks import RULES, check_rule  # noqa: PLC0415
 
     check_picture(picture)
+    refuse_to_overwrite([picture], force)
     graphs, rules = graph or ["er:1000:9"], rule or list(RULES)
     for spec in graphs:  # refuse bad input before any work starts
         graph_source(spec)

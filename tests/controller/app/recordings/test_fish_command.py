@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.main import app
+from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.capture.fish.postures import save_postures
 from snakewalk.controller.capture.fish.swimmer import swim
 from snakewalk.controller.capture.readers.load import load_track

@@ -122,13 +122,35 @@ def test_what_cannot_be_drawn_is_said_in_a_line(
         raise InputError("films need an OpenGL that draws without a screen")
 
     monkeypatch.setattr(artifacts, "film_run", nothing_draws)
-    (tmp_path / "film.mp4").write_bytes(b"of an earlier run")
     made = artifacts.make_artifacts(read_log(make(tmp_path / "run.mcap", seconds=1.0)), tmp_path)
     assert made.notes == ("no film: films need an OpenGL that draws without a screen",)
     assert made.film is None
-    assert not (tmp_path / "film.mp4").exists()
     assert made.report is not None
     assert "<video" not in made.report.read_text(encoding="utf-8")
+
+
+def test_an_interrupted_film_costs_neither_the_page_nor_an_older_film(
+    make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(_: object, path: Path, **__: object) -> int:
+        path.write_bytes(b"half a film")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(artifacts, "film_run", interrupted)
+    log = make(tmp_path / "log.mcap", seconds=1.0)
+    with pytest.raises(KeyboardInterrupt):
+        artifacts.make_artifacts(read_log(log), tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "log.mcap",
+        "report.html",
+        "summary.json",
+    ]
+    film = tmp_path / "film.mp4"
+    film.write_bytes(b"whole, of this run")
+    with pytest.raises(KeyboardInterrupt):
+        artifacts.make_artifacts(read_log(log), tmp_path)
+    assert film.read_bytes() == b"whole, of this run"
+    assert "<video" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_log_without_poses_has_no_film(make: Make, tmp_path: Path) -> None:

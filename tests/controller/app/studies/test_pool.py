@@ -2,6 +2,10 @@
 
 import math
 import os
+import signal
+import subprocess
+import sys
+from contextlib import suppress
 from operator import attrgetter
 from pathlib import Path
 
@@ -34,6 +38,47 @@ def test_points_travel_to_other_processes() -> None:
 def test_no_scheduler() -> None:
     with pytest.raises(InputError, match="no scheduler"):
         dict(each(math.factorial, [1], workers=1, dask="inproc://nowhere/1/1"))
+
+
+_BLOCKED = """
+import os, sys
+from pathlib import Path
+from snakewalk.controller.app.studies.pool import each
+
+def wait_for_ever(fifo):
+    Path("ready").write_text(str(os.getpid()))
+    Path(fifo).read_text()  # nobody ever writes
+
+if __name__ == "__main__":
+    os.mkfifo("fifo")
+    dict(each(wait_for_ever, ["fifo"] * 3, workers=1))
+"""
+
+
+def test_an_interrupt_waits_for_no_worker(tmp_path: Path) -> None:
+    script = tmp_path / "blocked.py"
+    script.write_text(_BLOCKED)
+    with subprocess.Popen(
+        [sys.executable, script],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+    ) as parent:
+        ready = tmp_path / "ready"
+        while not ready.is_file() or not ready.read_text():
+            assert parent.poll() is None
+        os.killpg(parent.pid, signal.SIGINT)  # as a terminal does
+        try:
+            said = parent.communicate(timeout=30)[1]
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(parent.pid, signal.SIGKILL)
+    assert said.count("Traceback") == 1, "the parent's own; the worker is silent"
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(ready.read_text()), 0)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["blocked.py", "fifo", "ready"]
 
 
 def test_trials_never_fork_beside_the_physics(monkeypatch: pytest.MonkeyPatch) -> None:

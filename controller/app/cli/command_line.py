@@ -1,0 +1,218 @@
+"""The command line: ``snakewalk COMMAND --help``. One line registers a command."""
+
+import sys
+from typing import Any
+
+import typer
+from typer import rich_utils
+from typer.core import TyperGroup
+
+from snakewalk.controller.app.cli.commands.analyse import analyse
+from snakewalk.controller.app.cli.commands.body import body
+from snakewalk.controller.app.cli.commands.bus import bus_set, serve, sniff
+from snakewalk.controller.app.cli.commands.capture import capture
+from snakewalk.controller.app.cli.commands.doctor import doctor
+from snakewalk.controller.app.cli.commands.fish import film, match, synthesise
+from snakewalk.controller.app.cli.commands.gait import list_gaits, show_gait
+from snakewalk.controller.app.cli.commands.gait_fit import fit_gait
+from snakewalk.controller.app.cli.commands.gait_run import run_gait
+from snakewalk.controller.app.cli.commands.listing import list_
+from snakewalk.controller.app.cli.commands.plan import plan
+from snakewalk.controller.app.cli.commands.play import play
+from snakewalk.controller.app.cli.commands.repertoire import record, run_plan, show_file
+from snakewalk.controller.app.cli.commands.replay import replay
+from snakewalk.controller.app.cli.commands.report import report
+from snakewalk.controller.app.cli.commands.run import run
+from snakewalk.controller.app.cli.commands.scan import scan
+from snakewalk.controller.app.cli.commands.sweep import sweep
+from snakewalk.controller.app.cli.commands.synthesise import synthesise as synthesise_walk
+from snakewalk.controller.app.cli.commands.track import track
+from snakewalk.controller.app.cli.commands.trials import trials
+from snakewalk.controller.app.cli.commands.tune import tune
+from snakewalk.controller.app.cli.commands.walk import walk
+
+
+class _Commands(TyperGroup):
+    """The commands; an interrupt ends each with exit code 130 and a line."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command; print what an interrupt's notes say of torque and log."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as stop:
+            text = "; ".join(["interrupted", *getattr(stop, "__notes__", [])])
+            print(f"snakewalk: {text}", file=sys.stderr)
+            raise SystemExit(130) from None
+
+
+app = typer.Typer(
+    cls=_Commands,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Run gaits on a DYNAMIXEL servo snake, or on a simulated one that answers the same bytes.",
+)
+
+
+def _examples(*lines: str) -> str:
+    return "\n\n".join(["Examples:", *(f"[bold]snakewalk {line}[/bold]" for line in lines)])
+
+
+app.command("list", epilog=_examples("list --json"))(list_)
+
+app.command(
+    epilog=_examples(
+        "plan",
+        "plan flat-slalom --motion serpenoid --json",
+        "plan flat-slalom --with repertoire -o plan.json --run",
+    )
+)(plan)
+
+app.command(
+    epilog=_examples("run", "run flat-slalom --seed 3", "run my-run.toml --port /dev/ttyUSB0")
+)(run)
+
+app.command(epilog=_examples("report runs/flat-square-walk-seed0/log.mcap"))(report)
+
+app.command(epilog=_examples("replay runs/flat-square-walk-seed0/log.mcap --json"))(replay)
+
+app.command(
+    epilog=_examples(
+        "sweep sidewinding rolling --points 30 -o sweep.csv --picture sweep.png",
+        "sweep --dask tcp://cluster:8786 --points 500",
+    )
+)(sweep)
+
+app.command(epilog=_examples("tune sidewinding --for speed --out mine.toml", "gait run mine.toml"))(
+    tune
+)
+
+app.command(
+    epilog=_examples("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json")
+)(trials)
+
+app.command(
+    "synthesise",
+    epilog=_examples("synthesise -o motion", "synthesise my-run.toml --seed 3 --json"),
+)(synthesise_walk)
+
+app.command(epilog=_examples("track", "track MIDLINES.csv --rate 60 --picture track.png"))(track)
+
+app.command(epilog=_examples("analyse worm-like", "analyse MIDLINES.csv --picture ."))(analyse)
+
+app.command(
+    epilog=_examples("body worm-like -o worm.glb", "body TRACK.npz --image 0.png -o b.obj")
+)(body)
+
+app.command(
+    epilog=_examples(
+        "capture film.mp4 -o track.npz --length-m 0.4 --sheet sheet.png",
+        "capture frames/ --cropped --overlay overlay.mp4 --force --json",
+    )
+)(capture)
+
+app.command(
+    epilog=_examples("walk", "walk --graph er:1000:9 --rule snake --rule stack --repeats 30 --json")
+)(walk)
+
+app.command(epilog=_examples("scan", "scan --port /dev/ttyUSB0 --baud 57600 --json"))(scan)
+
+app.command(epilog=_examples("doctor", "doctor --port /dev/ttyUSB0 --robot alternating16"))(doctor)
+
+bus = typer.Typer(no_args_is_help=True, help="Servos and their settings.")
+
+app.add_typer(bus, name="bus")
+
+bus.command(
+    "set",
+    epilog=_examples(
+        "bus set --id 1 --baud 57600 --new-id 7 --new-baud 1000000 --dry-run",
+        "bus set --id 7 --return-delay 0 --yes",
+    ),
+)(bus_set)
+
+bus.command(
+    epilog=_examples(
+        "bus serve --servos 1-16", "bus serve --robot yaw16 --faults faults.toml --pace 0.5"
+    )
+)(serve)
+
+bus.command(epilog=_examples("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))(sniff)
+
+app.command(epilog=_examples("play worm-like", "play fish.npz --robot yaw16 --speed 0.5 --json"))(
+    play
+)
+
+gait_app = typer.Typer(no_args_is_help=True, help="Gaits: list, show, run, fit.")
+
+app.add_typer(gait_app, name="gait")
+
+gait_app.command("list", epilog=_examples("gait list --json"))(list_gaits)
+
+gait_app.command(
+    "show", epilog=_examples("gait show sidewinding", "gait show rolling --picture rolling.png")
+)(show_gait)
+
+gait_app.command(
+    "run",
+    epilog=_examples(
+        "gait run sidewinding --param lift_rad=0.15 --seconds 10",
+        "gait run lateral-undulation --robot yaw16 --live",
+        "gait run rolling --port /dev/ttyUSB0",
+    ),
+)(run_gait)
+
+gait_app.command(
+    "fit",
+    epilog=_examples("gait fit CURVE.csv --picture fit.png", "gait fit CURVE.csv -o joints.npz"),
+)(fit_gait)
+
+fish_app = typer.Typer(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
+
+app.add_typer(fish_app, name="fish")
+
+fish_app.command(
+    epilog=_examples(
+        "fish match top.mp4 --side side.mp4 -o postures.npz",
+        "fish match tank/top --background tank/top-background.png --picture match.png",
+    )
+)(match)
+
+fish_app.command(
+    epilog=_examples(
+        "fish synthesise postures.npz --seconds 30 --seed 1 -o track.npz",
+        "fish synthesise postures.npz --through 3,0 --through 5,3 --mirror",
+    )
+)(synthesise)
+
+fish_app.command(
+    epilog=_examples("fish film tank --side", "fish film eel --motion MIDLINES.csv --build eel")
+)(film)
+
+repertoire = typer.Typer(no_args_is_help=True, help="Actions recorded from the physics.")
+
+app.add_typer(repertoire, name="repertoire")
+
+repertoire.command(
+    "record", epilog=_examples("repertoire record", "repertoire record -o yaw16.npz --json")
+)(record)
+
+repertoire.command("show", epilog=_examples("repertoire show repertoire-yaw16-flat.npz"))(show_file)
+
+repertoire.command(
+    "run",
+    epilog=_examples("repertoire run plan.json", "repertoire run plan.json --open-loop --json"),
+)(run_plan)
+
+
+def _in_one_line(error: Any) -> None:
+    """Print what is wrong with a command's words in one line, in place of typer's box."""
+    if type(error).__name__ == "NoArgsIsHelpError":  # its help has been shown
+        return
+    context = getattr(error, "ctx", None)
+    path = "snakewalk" if context is None else context.command_path
+    text = " ".join(error.format_message().split())
+    print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)
+
+
+rich_utils.rich_format_error = _in_one_line  # type: ignore[assignment]

@@ -1,0 +1,88 @@
+"""Ctrl-C and signals: every command ends at once with exit code 130, and says what became of it."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from pytest_mock import MockerFixture
+
+from snakewalk.controller.app.cli.main import main
+from snakewalk.controller.app.runs.execute import execute
+from snakewalk.controller.app.runs.factory import prepare_gait
+from snakewalk.controller.metrics.summary import summary
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runtime.drive import Progress
+
+
+def after(cycles: int, stop: Callable[[], None]) -> Callable[[Progress], None]:
+    left = iter(range(cycles))
+
+    def on_progress(progress: Progress) -> None:
+        if next(left, None) is None:
+            stop()
+
+    return on_progress
+
+
+def run(out: Path, stop: Callable[[], None]) -> None:
+    job = prepare_gait("lateral-undulation", seconds=2.0)
+    execute(job, out, on_progress=after(20, stop))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_says_what_became_of_torque_and_log(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    pytest.importorskip("mujoco")
+    with pytest.raises((KeyboardInterrupt, SystemExit)) as stop:
+        run(tmp_path, lambda: signal.raise_signal(number))
+    log = tmp_path / "log.mcap"
+    assert stop.value.__notes__ == [
+        "torque is off",
+        f"log: {log}; its page: snakewalk report {log}",
+    ]
+    assert [path.name for path in tmp_path.iterdir()] == ["log.mcap"]
+    record = read_log(log)
+    assert record.complete
+    assert record.events[-1].text == "torque is off"
+    assert summary(record).outcome == "interrupted"
+
+
+def test_the_command_line_prints_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(
+        "snakewalk.controller.app.progress.TimeBar.on_progress",
+        lambda bar, progress: signal.raise_signal(signal.SIGINT),
+    )
+    monkeypatch.setattr("sys.argv", ["snakewalk", "gait", "run", "lateral-undulation"])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 130
+    log = Path("runs") / "gait-lateral-undulation-yaw16" / "log.mcap"
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"snakewalk: interrupted; torque is off; log: {log}; its page: snakewalk report {log}"
+    )
+
+
+def test_an_interrupt_before_the_first_line_of_a_command_is_one_line(
+    mocker: MockerFixture, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mocker.patch("snakewalk.controller.app.cli.main._check_words", side_effect=KeyboardInterrupt)
+    monkeypatch.setattr("sys.argv", ["snakewalk", "list"])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 130
+    assert capsys.readouterr().err == "snakewalk: interrupted\n"
+
+
+def test_what_is_imported_before_an_interrupt_is_caught_is_little() -> None:
+    code = "import sys, snakewalk.controller.app.cli.main; print(*sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name.partition(".")[0] for name in found.stdout.split()}
+    assert not loaded & {"typer", "rich", "pydantic", "numpy", "numba", "scipy", "mujoco"}
