@@ -1,6 +1,18 @@
 """The strict base of every schema: unknown keys are faults, values never change after loading."""
 
-from pydantic import BaseModel, ConfigDict
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, StringConstraints
+
+Name = Annotated[
+    str,
+    StringConstraints(
+        min_length=1,
+        max_length=100,
+        pattern=r"^[^./\\\x00-\x1f\x7f-\x9f][^/\\\x00-\x1f\x7f-\x9f]*$",
+    ),
+]
+"""A name that becomes part of a file's: no path, nothing that steers a terminal, not hidden."""
 
 
 class Strict(BaseModel):

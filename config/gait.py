@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from snakewalk.config.base import Strict
+from snakewalk.config.base import Name, Strict
 from snakewalk.config.compliance import ComplianceConfig
 
 Parameters = dict[str, bool | int | float]
@@ -44,7 +44,7 @@ class GaitConfig(Strict):
 class GaitSetConfig(Strict):
     """A shipped set of parameters for one robot."""
 
-    name: str
+    name: Name
     gait: str
     robot: str
     world: str | None = Field(None, description="default: the gait's own")

@@ -3,6 +3,7 @@
 import math
 from importlib.util import find_spec
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
@@ -136,8 +137,10 @@ def _elevation_m(world: str, source: str) -> Floats:
         raise ConfigError(f"{where}: {path}: {error.strerror or error}") from None
     except KeyError:
         raise ConfigError(f"{where}: {path}: holds no array named 'elevation'") from None
-    except (ValueError, TypeError, AttributeError) as error:
-        raise ConfigError(f"{where}: {path}: is not an .npz of arrays: {error}") from None
+    except (ValueError, TypeError, AttributeError, EOFError, BadZipFile):
+        raise ConfigError(
+            f"{where}: {path}: is not an .npz with an array 'elevation' of numbers"
+        ) from None
     if elevation.ndim != 2:
         raise ConfigError(f"{where}: {path}: 'elevation' must have rows and columns")
     return elevation

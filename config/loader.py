@@ -1,18 +1,22 @@
 """TOML to schema, strictly: every fault of a file at once, each with its path inside the file."""
 
 import hashlib
+import re
 import tomllib
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import PydanticSerializationError, to_json
 
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.gait import GaitSetConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.config.world import WorldConfig
+from snakewalk.config.world import ElevationGround, WorldConfig
 
 M = TypeVar("M", bound=BaseModel)
 Kind = Literal["robots", "worlds", "runs", "recordings", "gaits"]
@@ -49,25 +53,33 @@ def load(path: Path, model: type[M]) -> M:
 
     """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8-sig")  # an editor's byte order mark is no content
+        data = tomllib.loads(text)
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: not TOML: {error}") from None
-    return checked(model, data, str(path))
+    return checked(model, data, str(path), text)
 
 
-def checked(model: type[M], data: dict[str, Any], source: str) -> M:
-    """Validate ``data``; ``source`` leads each line of the faults.
+def checked(model: type[M], data: dict[str, Any], source: str, text: str = "") -> M:
+    """Validate ``data``; ``source`` leads each line of the faults, with the line in ``text``.
+
+    A value of another type is a fault: text is no number, and true is not 1.
 
     Raises:
         ConfigError: schema faults, all of them, one line each.
 
     """
     try:
-        return model.model_validate(data)
+        plain = to_json(data, inf_nan_mode="constants", fallback=_plain)
+        return model.model_validate_json(plain, strict=True)
+    except PydanticSerializationError as error:
+        raise ConfigError(f"{source}: {error}") from None
     except ValidationError as error:
-        raise ConfigError([_line(source, dict(fault)) for fault in error.errors()]) from None
+        raise ConfigError(
+            [_line(model, source, text, dict(fault)) for fault in error.errors()]
+        ) from None
 
 
 def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
@@ -96,7 +108,14 @@ def load_robot(name_or_path: str, beside: Path | None = None) -> RobotConfig:
 
 def load_world(name_or_path: str, beside: Path | None = None) -> WorldConfig:
     """Load a world by shipped name or path."""
-    return load(locate("worlds", name_or_path, beside), WorldConfig)
+    path = locate("worlds", name_or_path, beside)
+    world = load(path, WorldConfig)
+    if isinstance(world.ground, ElevationGround):
+        source = path.parent / world.ground.source
+        if source.is_file():  # beside the world that names it
+            ground = world.ground.model_copy(update={"source": str(source)})
+            return world.model_copy(update={"ground": ground})
+    return world
 
 
 def load_run(name_or_path: str) -> RunConfig:
@@ -115,15 +134,81 @@ def digest(*models: BaseModel) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+def _plain(value: Any) -> Any:
+    """Return numbers of numpy, or arrays of them, as Python's own.
+
+    Raises:
+        TypeError: it is something else.
+
+    """
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} is no value of a configuration")
+
+
 def _folder(kind: Kind) -> Path:
     return Path(__file__).parent / kind
 
 
-def _line(path: str, fault: dict[str, Any]) -> str:
+_TABLE: Final = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]")
+_KEY: Final = re.compile(r"""^\s*([\w."' -]+?)\s*=""")
+
+
+def _line_number(text: str, loc: Sequence[str | int]) -> int | None:
+    """Line on which a TOML text sets the innermost key of ``loc`` that it has; None if none."""
+    wanted = [str(part) for part in loc if isinstance(part, str)]
+    places = [part for part in loc if isinstance(part, int)]
+    table: list[str] = []
+    seen: Counter[str] = Counter()
+    found, depth, here = None, 0, True
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := _TABLE.match(line):
+            keys = table = _parts(header[2])
+            here = header[1] == "[" or places[:1] == [seen[header[2]]]
+            seen[header[2]] += 1
+        elif key := _KEY.match(line):
+            keys = table + _parts(key[1])
+        else:
+            continue
+        rest = iter(wanted)
+        if here and len(keys) > depth and all(part in rest for part in keys):
+            found, depth = number, len(keys)
+    return found
+
+
+def _parts(key: str) -> list[str]:
+    return [part.strip(" \"'") for part in key.split(".")]
+
+
+def _keys(kind: Any) -> Iterator[str]:
+    """Keys of a schema and of all tables in it."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        for name, field in kind.model_fields.items():
+            yield name
+            yield from _keys(field.annotation)
+    else:
+        for part in get_args(kind):
+            yield from _keys(part)
+
+
+def _line(model: type[BaseModel], path: str, text: str, fault: dict[str, Any]) -> str:
     loc = fault["loc"]
-    where = ".".join(str(p) for p in loc) if isinstance(loc, tuple) else str(loc)
+    where = ".".join(str(p) for p in loc)
+    number = _line_number(text, loc)
+    if number is not None:
+        path = f"{path}:{number}"
     given = fault.get("input")
     shown = f" (got {given!r})" if isinstance(given, int | float | str | bool) else ""
-    said = {"extra_forbidden": "unknown key", "missing": "is required"}
-    text = said.get(str(fault["type"]), str(fault["msg"]).removeprefix("Value error, "))
-    return f"{path}: {where}: {text}{shown}" if where else f"{path}: {text}{shown}"
+    context = fault.get("ctx", {})
+    tag, known = context.get("tag"), context.get("expected_tags")
+    near = get_close_matches(str(loc[-1]), set(_keys(model)), 1, 0.7) if loc else []
+    said = {
+        "extra_forbidden": f"unknown key; did you mean {near[0]}?" if near else "unknown key",
+        "missing": "is required",
+        "tuple_type": "must be a list: [ ... ]",
+        "model_type": "must be a table",
+        "union_tag_invalid": f"kind {tag!r} is none of {known}",
+        "string_pattern_mismatch": "holds '/', a control character or a leading dot",
+    }
+    what = said.get(str(fault["type"]), str(fault["msg"]).removeprefix("Value error, "))
+    return f"{path}: {where}: {what}{shown}" if where else f"{path}: {what}{shown}"

@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from snakewalk.config.base import Strict
+from snakewalk.config.base import Name, Strict
 
 Baud = Literal[9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000]
 
@@ -83,7 +83,7 @@ class BellyConfig(Strict):
 class RobotConfig(Strict):
     """A chain of links joined by servos; lengths in metres, index 0 is the head."""
 
-    name: str
+    name: Name
     joint_axes: str = Field(
         pattern=r"^[yp]+$", description="one letter a joint from the head: y = yaw, p = pitch"
     )

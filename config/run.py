@@ -5,7 +5,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from snakewalk.config.base import Strict
+from snakewalk.config.base import Name, Strict
 from snakewalk.config.camera import CameraConfig, PoseName
 from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.gait import GaitConfig
@@ -123,7 +123,7 @@ class SafetyConfig(Strict):
 class RunConfig(Strict):
     """One run of the main job."""
 
-    name: str
+    name: Name
     robot: str = Field("yaw16", description="a shipped robot's name or a TOML path")
     world: str = Field("flat", description="a shipped world's name or a TOML path")
     track: str = Field("worm-like", description="a shipped recording's name or a file")
@@ -136,7 +136,7 @@ class RunConfig(Strict):
     start_m: tuple[float, float] = Field((0.0, 0.0), description="where the head starts")
     start_heading_rad: float | None = Field(None, description="default: towards the path")
     waypoint_radius_m: float = Field(0.3, gt=0.0)
-    seed: int = Field(0, ge=0)
+    seed: int = Field(0, ge=0, lt=2**63)
     cycle_hz: float = Field(50.0, gt=0.0, le=1000.0)
     physics_step_s: float | None = Field(
         None, gt=0.0, le=0.01, description="default: 0.002 on a floor, 0.001 on a height field"

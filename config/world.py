@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from snakewalk.config.base import Strict
+from snakewalk.config.base import Name, Strict
 
 
 class FrictionConfig(Strict):
@@ -272,7 +272,7 @@ ReliefGround = ElevationGround | RampGround | RandomGround | StepsGround | GapsG
 class WorldConfig(Strict):
     """One world."""
 
-    name: str
+    name: Name
     ground: Annotated[FlatGround | ReliefGround | WaterGround, Field(discriminator="kind")] = (
         FlatGround()
     )

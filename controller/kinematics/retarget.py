@@ -7,6 +7,7 @@ tangent angle over its span, so the headings' mean is the skeleton's and nothing
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 
 
@@ -16,7 +17,10 @@ class Retarget:
     def __init__(self, robot: RobotConfig, points: int = 100) -> None:
         yaw = np.array(robot.yaw_joints, dtype=int)
         if len(yaw) == 0:
-            raise ValueError(f"{robot.name} has no yaw joint; a skeleton cannot be put on it")
+            raise InputError(
+                f"robot {robot.name}: has no yaw joint: it cannot take the shapes of a walk or a "
+                "recording; gaits that need pitch joints only run on it (snakewalk gait list)"
+            )
         links = robot.joint_count + 1
         edges = np.concatenate([[0], yaw + 1, [links]])
         self.edges = edges * points / links

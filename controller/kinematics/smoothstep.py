@@ -38,6 +38,11 @@ def quintic(x: Share) -> Share:
     return x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
 
 
+def quintic_sum(x: Share) -> Share:
+    """Integral of ``quintic`` from 0 to x; half at 1."""
+    return x**4 * (2.5 - 3.0 * x + x * x)
+
+
 def quintic_slope(x: Share) -> Share:
     """Of ``quintic``."""
     return 30.0 * x * x * (1.0 - x) ** 2

@@ -27,6 +27,8 @@ class Difference:
     """Time of the first row that differs; None if none does."""
     first_column: int | None
     """Joint, or axis, that differs there."""
+    decides: bool = True
+    """Whether it has a tolerance; else it is reported only."""
 
     @property
     def same(self) -> bool:
@@ -128,7 +130,7 @@ def _difference(name: str, time_s: Floats, a: Floats, b: Floats, tolerance: floa
     sizes = float(gap.max(initial=0.0)), rms, tuple(gap.max(axis=0, initial=0.0).tolist())
     bad = np.argwhere(gap > tolerance)
     if len(bad) == 0:
-        return Difference(name, rows, *sizes, None, None)
+        return Difference(name, rows, *sizes, None, None, bool(np.isfinite(tolerance)))
     row, column = bad[0]
     return Difference(name, rows, *sizes, float(time_s[row]), int(column))
 
@@ -137,7 +139,8 @@ def _line(d: Difference) -> str:
     if d.largest == 0.0:
         return f"{d.name}: same in {d.rows} rows"
     if d.same:
-        return f"{d.name}: within its tolerance; {d.largest:.3g} at most, {d.rms:.3g} RMS"
+        judged = "within its tolerance" if d.decides else "not judged"
+        return f"{d.name}: {judged}; {d.largest:.3g} at most, {d.rms:.3g} RMS"
     part = "axis" if d.name == "head_m" else "joint"
     where = "" if d.first_column is None or d.name == "deadline_s" else f", {part} {d.first_column}"
     size = f"{d.largest:.3g} at most, {d.rms:.3g} RMS"

@@ -30,13 +30,15 @@ def waypoint_times_s(pose: PoseTable, plan: PlanSummary) -> Floats:
 def path_error_m(record: RunRecord) -> Floats:
     """Distance (P,) of the centre of mass from the path then in force, in the horizontal plane.
 
-    NaN for a run without waypoints: its plan has no path.
+    A path that is laid again within a cycle holds for the pose of this cycle, whose place on the
+    path is one on the new path already. NaN for a run without waypoints: its plan has no path.
     """
     pose = record.pose
     if len(record.header.plan.waypoints_m) == 0:
         return np.full(len(pose.time_s), np.nan)
     starts = [start for start, _ in record.paths]
-    which = np.searchsorted(starts, pose.time_s, side="right") - 1
+    until_s = np.append(pose.time_s[1:], np.inf)
+    which = np.searchsorted(starts, until_s) - 1
     error = np.full(len(pose.time_s), np.nan)
     for k, (_, path) in enumerate(record.paths):
         rows = np.flatnonzero(which == k)

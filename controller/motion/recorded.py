@@ -1,5 +1,7 @@
 """Recorded joint angles as a motion: splined, and slowed as far as the robot needs."""
 
+from typing import Final
+
 import numpy as np
 from scipy.interpolate import CubicSpline
 
@@ -8,11 +10,20 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.kinematics.smoothstep import quintic, quintic_slope, quintic_sum
 from snakewalk.controller.motion.source import HEADROOM, Pace
+
+RAMP_S = 0.5
+"""Shortest time in which a recording comes to its speed, and to rest again (ours)."""
+_RAMP_SAMPLES: Final = 400
 
 
 class Recorded:
-    """Plays (T, J) joint angles once, from rest to rest."""
+    """Plays (T, J) joint angles once, from rest to rest.
+
+    The animal was not at rest when the recording began. So the clock of the playback is: it comes
+    to its rate along a quintic, and back to rest; the angles stay those of the recording.
+    """
 
     def __init__(self, robot: RobotConfig, time_s: Floats, joint_rad: Floats) -> None:
         """Spline ``joint_rad`` (T, J) over ``time_s`` (T,), T at least 2.
@@ -28,7 +39,7 @@ class Recorded:
             )
         if not (np.diff(time_s) > 0.0).all():
             raise InputError("the times of a recording must grow")
-        self._spline = CubicSpline(time_s, joint_rad, bc_type="clamped")
+        self._spline = CubicSpline(time_s, joint_rad, bc_type="natural")
         fine = np.linspace(time_s[0], time_s[-1], 8 * len(time_s))
         reach, limit = np.abs(self._spline(fine)).max(axis=0), np.array(robot.limit_rad)
         for joint in np.flatnonzero(reach > limit)[:1]:
@@ -41,9 +52,25 @@ class Recorded:
         fast = float(speed.max()) / (HEADROOM * robot.joint_speed_limit_rad_s)
         hard = float(bend.max()) / (HEADROOM * robot.joint_acceleration_limit_rad_s2)
         self.slowed = max(1.0, fast, float(np.sqrt(hard)))
-        """How many times longer it takes here than it took."""
-        self._pace = Pace(speed / self.slowed, bend / self.slowed**2)
-        self._at_s, self._end_s = float(time_s[0]), float(time_s[-1])
+        """How many times longer it takes here than it took, without the time of the ramps."""
+        self._start_s, self._length_s = float(time_s[0]), float(time_s[-1] - time_s[0])
+        most = HEADROOM * robot.joint_acceleration_limit_rad_s2
+        self._ramp_s = min(RAMP_S, self._length_s * self.slowed)
+        while True:
+            ramps = self._ramp_acceleration_rad_s2()
+            if ramps.max(initial=0.0) <= most * (1.0 + 1e-9):
+                break
+            if self._ramp_s < self._length_s * self.slowed:
+                self._ramp_s = min(1.2 * self._ramp_s, self._length_s * self.slowed)
+            else:
+                self.slowed *= 1.05
+        self._pace = Pace(
+            speed / self.slowed,
+            np.maximum(bend / self.slowed**2, ramps),
+        )
+        self.duration_s = self._length_s * self.slowed + self._ramp_s
+        """From rest to rest."""
+        self._now_s = 0.0
         self.needs = Needs(
             yaw=bool(np.any(joint_rad[:, robot.yaw_joints])),
             pitch=bool(np.any(joint_rad[:, robot.pitch_joints])),
@@ -52,15 +79,16 @@ class Recorded:
     @property
     def done(self) -> bool:
         """Whether it has been played."""
-        return self._at_s >= self._end_s
+        return self._now_s >= self.duration_s
 
     def goal_rad(self) -> Floats:
         """(J,) joint targets now."""
-        return np.asarray(self._spline(self._at_s), dtype=float)
+        return np.asarray(self._spline(self._place(self._now_s)[0]), dtype=float)
 
     def velocity_rad_s(self) -> Floats:
         """(J,) how fast they move now."""
-        return np.asarray(self._spline(self._at_s, 1) / self.slowed, dtype=float)
+        place_s, rate = self._place(self._now_s)
+        return np.asarray(self._spline(place_s, 1) * rate, dtype=float)
 
     def pace(self) -> Pace:
         """Largest of the whole recording."""
@@ -68,5 +96,29 @@ class Recorded:
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Play on by ``dt_s``; at the end it stays."""
-        self._at_s = min(self._at_s + dt_s / self.slowed, self._end_s)
+        self._now_s = min(self._now_s + dt_s, self.duration_s)
         return self.goal_rad()
+
+    def _place(self, now_s: float) -> tuple[float, float]:
+        """Time in the recording after ``now_s``, and its rate."""
+        ramp_s, left_s = self._ramp_s, self.duration_s - now_s
+        if min(now_s, left_s) >= ramp_s:
+            return self._start_s + (now_s - 0.5 * ramp_s) / self.slowed, 1.0 / self.slowed
+        x = min(now_s, left_s) / ramp_s
+        done_s = ramp_s * quintic_sum(x) / self.slowed
+        rate = quintic(x) / self.slowed
+        return self._start_s + (done_s if now_s <= left_s else self._length_s - done_s), rate
+
+    def _ramp_acceleration_rad_s2(self) -> Floats:
+        """Largest acceleration (J,) of the joints while the clock comes to its rate or to rest."""
+        x = np.linspace(0.0, 1.0, _RAMP_SAMPLES)[:, None]
+        done_s = self._ramp_s * quintic_sum(x[:, 0]) / self.slowed
+        rate, growth = quintic(x) / self.slowed, quintic_slope(x) / self._ramp_s / self.slowed
+        found = []
+        for places_s, sign in (
+            (self._start_s + done_s, 1.0),
+            (self._start_s + self._length_s - done_s, -1.0),
+        ):
+            bend, speed = self._spline(places_s, 2), self._spline(places_s, 1)
+            found.append(np.abs(bend * rate**2 + sign * speed * growth))
+        return np.asarray(np.concatenate(found).max(axis=0))

@@ -37,6 +37,8 @@ def read_log(path: Path) -> RunRecord:
         LogError: there is no such file, it is no log of ours, or not even its start is left.
 
     """
+    if path.is_dir():
+        raise LogError(f"{path}: is a folder; a run's log is {path / 'log.mcap'}")
     try:
         data = path.read_bytes()
     except OSError as error:

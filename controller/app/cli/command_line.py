@@ -1,7 +1,8 @@
 """The command line: ``snakewalk COMMAND --help``. One line registers a command."""
 
 import sys
-from typing import Any
+from importlib.metadata import version
+from typing import Annotated, Any
 
 import typer
 from typer import rich_utils
@@ -31,6 +32,9 @@ from snakewalk.controller.app.cli.commands.trials import trials
 from snakewalk.controller.app.cli.commands.tune import tune
 from snakewalk.controller.app.cli.commands.walk import walk
 
+_JOB, _MOTION, _RECORDINGS, _BUS = "The job", "Motion", "Recordings", "The bus"
+"""Groups of the commands in ``--help``."""
+
 
 class _Commands(TyperGroup):
     """The commands; an interrupt ends each with exit code 130 and a line."""
@@ -54,74 +58,116 @@ app = typer.Typer(
 )
 
 
+def _show_version(asked: bool) -> None:
+    if asked:
+        print(f"snakewalk {version('snakewalk')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    show_version: Annotated[
+        bool,
+        typer.Option("--version", help="show it", is_eager=True, callback=_show_version),
+    ] = False,
+) -> None:
+    """Take the options before a command."""
+
+
 def _examples(*lines: str) -> str:
     return "\n\n".join(["Examples:", *(f"[bold]snakewalk {line}[/bold]" for line in lines)])
 
 
-app.command("list", epilog=_examples("list --json"))(list_)
+app.command("list", epilog=_examples("list --json"), rich_help_panel=_JOB)(list_)
 
 app.command(
     epilog=_examples(
         "plan",
         "plan flat-slalom --motion serpenoid --json",
         "plan flat-slalom --with repertoire -o plan.json --run",
-    )
+    ),
+    rich_help_panel=_JOB,
 )(plan)
 
 app.command(
-    epilog=_examples("run", "run flat-slalom --seed 3", "run my-run.toml --port /dev/ttyUSB0")
+    epilog=_examples("run", "run flat-slalom --seed 3", "run my-run.toml --port /dev/ttyUSB0"),
+    rich_help_panel=_JOB,
 )(run)
 
-app.command(epilog=_examples("report runs/flat-square-walk-seed0/log.mcap"))(report)
+app.command(epilog=_examples("report runs/flat-square-walk-seed0/log.mcap"), rich_help_panel=_JOB)(
+    report
+)
 
-app.command(epilog=_examples("replay runs/flat-square-walk-seed0/log.mcap --json"))(replay)
+app.command(
+    epilog=_examples("replay runs/flat-square-walk-seed0/log.mcap --json"), rich_help_panel=_JOB
+)(replay)
 
 app.command(
     epilog=_examples(
         "sweep sidewinding rolling --points 30 -o sweep.csv --picture sweep.png",
         "sweep --dask tcp://cluster:8786 --points 500",
-    )
+    ),
+    rich_help_panel=_MOTION,
 )(sweep)
 
-app.command(epilog=_examples("tune sidewinding --for speed --out mine.toml", "gait run mine.toml"))(
-    tune
-)
+app.command(
+    epilog=_examples("tune sidewinding --for speed --out mine.toml", "gait run mine.toml"),
+    rich_help_panel=_MOTION,
+)(tune)
 
 app.command(
-    epilog=_examples("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json")
+    epilog=_examples("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json"),
+    rich_help_panel=_JOB,
 )(trials)
 
 app.command(
     "synthesise",
     epilog=_examples("synthesise -o motion", "synthesise my-run.toml --seed 3 --json"),
+    rich_help_panel=_MOTION,
 )(synthesise_walk)
 
-app.command(epilog=_examples("track", "track MIDLINES.csv --rate 60 --picture track.png"))(track)
-
-app.command(epilog=_examples("analyse worm-like", "analyse MIDLINES.csv --picture ."))(analyse)
+app.command(
+    epilog=_examples("track", "track MIDLINES.csv --rate 60 --picture track.png"),
+    rich_help_panel=_RECORDINGS,
+)(track)
 
 app.command(
-    epilog=_examples("body worm-like -o worm.glb", "body TRACK.npz --image 0.png -o b.obj")
+    epilog=_examples("analyse worm-like", "analyse MIDLINES.csv --picture ."),
+    rich_help_panel=_RECORDINGS,
+)(analyse)
+
+app.command(
+    epilog=_examples("body worm-like -o worm.glb", "body TRACK.npz --image 0.png -o b.obj"),
+    rich_help_panel=_RECORDINGS,
 )(body)
 
 app.command(
     epilog=_examples(
         "capture film.mp4 -o track.npz --length-m 0.4 --sheet sheet.png",
         "capture frames/ --cropped --overlay overlay.mp4 --force --json",
-    )
+    ),
+    rich_help_panel=_RECORDINGS,
 )(capture)
 
 app.command(
-    epilog=_examples("walk", "walk --graph er:1000:9 --rule snake --rule stack --repeats 30 --json")
+    epilog=_examples(
+        "walk", "walk --graph er:1000:9 --rule snake --rule stack --repeats 30 --json"
+    ),
+    rich_help_panel=_MOTION,
 )(walk)
 
-app.command(epilog=_examples("scan", "scan --port /dev/ttyUSB0 --baud 57600 --json"))(scan)
+app.command(
+    epilog=_examples("scan", "scan --port /dev/ttyUSB0 --baud 57600 --json"), rich_help_panel=_BUS
+)(scan)
 
-app.command(epilog=_examples("doctor", "doctor --port /dev/ttyUSB0 --robot alternating16"))(doctor)
+app.command(
+    epilog=_examples("doctor", "doctor --port /dev/ttyUSB0 --robot alternating16"),
+    rich_help_panel=_BUS,
+)(doctor)
 
 bus = typer.Typer(no_args_is_help=True, help="Servos and their settings.")
 
-app.add_typer(bus, name="bus")
+app.add_typer(bus, name="bus", rich_help_panel=_BUS)
 
 bus.command(
     "set",
@@ -139,13 +185,14 @@ bus.command(
 
 bus.command(epilog=_examples("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))(sniff)
 
-app.command(epilog=_examples("play worm-like", "play fish.npz --robot yaw16 --speed 0.5 --json"))(
-    play
-)
+app.command(
+    epilog=_examples("play worm-like", "play fish.npz --robot yaw16 --speed 0.5 --json"),
+    rich_help_panel=_MOTION,
+)(play)
 
 gait_app = typer.Typer(no_args_is_help=True, help="Gaits: list, show, run, fit.")
 
-app.add_typer(gait_app, name="gait")
+app.add_typer(gait_app, name="gait", rich_help_panel=_MOTION)
 
 gait_app.command("list", epilog=_examples("gait list --json"))(list_gaits)
 
@@ -169,7 +216,7 @@ gait_app.command(
 
 fish_app = typer.Typer(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
 
-app.add_typer(fish_app, name="fish")
+app.add_typer(fish_app, name="fish", rich_help_panel=_RECORDINGS)
 
 fish_app.command(
     epilog=_examples(
@@ -191,7 +238,7 @@ fish_app.command(
 
 repertoire = typer.Typer(no_args_is_help=True, help="Actions recorded from the physics.")
 
-app.add_typer(repertoire, name="repertoire")
+app.add_typer(repertoire, name="repertoire", rich_help_panel=_MOTION)
 
 repertoire.command(
     "record", epilog=_examples("repertoire record", "repertoire record -o yaw16.npz --json")

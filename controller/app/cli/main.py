@@ -1,5 +1,6 @@
 """``snakewalk``: runs the command line and says in a line, with an exit code, how it ended."""
 
+import os
 import re
 import sys
 from pathlib import Path
@@ -15,6 +16,9 @@ _CONTROL: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 def main() -> None:
     """Run the command line; bad input ends with exit code 2 and one line per fault."""
+    # Pictures are drawn without a screen, by a context of our own; MuJoCo's import fails on a
+    # choice that is not installed.
+    os.environ["MUJOCO_GL"] = "disable"
     try:
         _check_words(sys.argv[1:])
         from snakewalk.controller.app.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it

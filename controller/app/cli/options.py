@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 from rich.console import Console
@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from snakewalk.controller.metrics.summary import RunSummary
     from snakewalk.controller.runlog.record import RunRecord
 
-console = Console(highlight=False, markup=False)
+_WIDE: Final = 200
+"""Columns of a pipe or a file, which break no line."""
+console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else _WIDE)
 DEFAULT_RUN = "jacksboro-traverse"
 RunName = Annotated[str, typer.Argument(help="shipped run, or a RUN.toml", show_default=True)]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]

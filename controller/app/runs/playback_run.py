@@ -30,15 +30,15 @@ class PlaybackRun(PathlessRun):
         most = 1.0 / Recorded(self.robot, *self.joint_track).slowed
         if asked is not None and asked > most > 0.0 and self._recorded(asked).slowed > 1.0:
             raise InputError(
-                f"--speed {asked:g}: the joints of {self.robot.name} follow {self.run.track} at "
-                "a lower speed only; auto is as fast as they can, at most the animal's own"
+                f"--speed {asked:g}: the joints of {self.robot.name} follow {self.run.track} up to "
+                f"{most:.3f} times the animal's own speed"
             )
         return most if asked is None else asked
 
     @property
     def duration_s(self) -> float:
         """Duration of the playback."""
-        return float(self.joint_track[0][-1]) / self.speed
+        return self._recorded(self.speed).duration_s
 
     def initial_pose(self) -> InitialPose:
         """Return the first shape of the recording."""

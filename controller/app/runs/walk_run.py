@@ -208,8 +208,21 @@ class WalkRun:
         )
 
     def make_source(self, on_event: OnEvent) -> MotionSource:
-        """Return a fresh pilot; it has no events beside those that the drive logs."""
+        """Return a fresh pilot; it warns where the recording has no part in the walk."""
+        for line in self.warnings:
+            on_event("shapes", line)
         return self.pilot()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user would not expect of the shapes, one line each."""
+        if self.run.motion == "serpenoid" or self.library.recorded:
+            return ()
+        return (
+            f"no shape of {self.run.track} is used: the robot or the ground refuses them all; the "
+            f"walk is made of {len(self.library.shapes_rad)} random ones "
+            f"(why: snakewalk track {self.run.track})",
+        )
 
     def _chooser(self) -> ShapeChooser:
         if self.run.motion == "serpenoid":

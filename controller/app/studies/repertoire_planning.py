@@ -68,9 +68,14 @@ def plan_route(
     if not run.waypoints_m:
         raise InputError(f"run {run.name}: has no waypoints to plan for")
     file = repertoire_file or default_file(robot or known.robot, world or known.world)
+    flat(ground)
+    if not file.is_file():
+        raise InputError(
+            f"{file}: no such file; make one by: snakewalk repertoire record --robot {run.robot} "
+            f"--world {run.world} -o {file}"
+        )
     repertoire = load_repertoire(file)
     repertoire.check(body)
-    flat(ground)
     if repertoire.world != ground.name:
         raise InputError(
             f"{file}: recorded on world {repertoire.world}; run {run.name} is on "

@@ -1,6 +1,7 @@
 """Points of a sweep: a Sobol sequence over the parameters of gaits, as far as robots allow them."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 from zlib import crc32
 
@@ -25,6 +26,7 @@ class Point:
 
     gait: str
     robot: str
+    """Shipped name, or the path of a TOML file."""
     world: str
     number: int
     seed: int
@@ -70,9 +72,17 @@ class Space:
 
 
 def points_of(
-    gait: type[Gait], robot: RobotConfig, count: int, *, seed: int, seconds: float
+    gait: type[Gait],
+    robot: RobotConfig,
+    count: int,
+    *,
+    seed: int,
+    seconds: float,
+    file: str | None = None,
 ) -> tuple[list[Point], int]:
     """Return up to ``count`` points that the robot's joints allow, and how many they did not.
+
+    ``file`` is where the robot stands if it is not shipped: a worker loads it again.
 
     Raises:
         InputError: the robot lacks joints that the gait needs.
@@ -80,7 +90,7 @@ def points_of(
     """
     gait().check(robot)
     space = Space.of(gait)
-    place = (gait.name, robot.name, gait.world)
+    place = (gait.name, file or robot.name, gait.world)
     found = [Point(*place, 0, seed, seconds)]
     refused = 0
     sobol = qmc.Sobol(
@@ -99,6 +109,11 @@ def points_of(
         number = len(found)
         found.append(Point(*place, number, seed, seconds, values))
     return found, refused
+
+
+def robot_file(name_or_path: str) -> str | None:
+    """Return the whole path of a robot's own file; None of a shipped robot."""
+    return str(Path(name_or_path).resolve()) if name_or_path.endswith(".toml") else None
 
 
 ROBOTS = ("yaw16", "alternating16")
@@ -132,13 +147,15 @@ def plan_sweep(
         raise InputError(
             [f"{name}: no such gait; there are {', '.join(GAITS)}" for name in unknown]
         )
-    bodies = [load_robot(name) for name in robots or ROBOTS]
+    bodies = [(load_robot(name), robot_file(name)) for name in robots or ROBOTS]
     points: list[Point] = []
     left_out: list[str] = []
     for name in gaits or GAITS:
-        for body in bodies:
+        for body, file in bodies:
             try:
-                some, refused = points_of(GAITS[name], body, count, seed=seed, seconds=seconds)
+                some, refused = points_of(
+                    GAITS[name], body, count, seed=seed, seconds=seconds, file=file
+                )
             except InputError as error:
                 left_out.append(error.faults[0])
                 continue

@@ -18,7 +18,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.app.studies.pool import process_pool
 from snakewalk.controller.app.studies.sweep_measure import Measurement, measure
-from snakewalk.controller.app.studies.sweep_points import Point, Space
+from snakewalk.controller.app.studies.sweep_points import Point, Space, robot_file
 from snakewalk.controller.gaits.gait import Aim as Goal
 from snakewalk.controller.gaits.registry import make_gait
 
@@ -137,7 +137,7 @@ def tune(
     kind = type(make_gait(gait))
     kind().check(body)
     space = Space.of(kind)
-    start = Point(gait, body.name, kind.world, 0, seed, seconds)
+    start = Point(gait, robot_file(robot) or body.name, kind.world, 0, seed, seconds)
     default = kind().params.model_dump()
     with process_pool(workers) as pool:
         first = measure(start)

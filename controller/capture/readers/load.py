@@ -1,5 +1,7 @@
 """The one entry for recordings: a shipped name, figures of your own, or a file of bodies."""
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
@@ -12,6 +14,21 @@ from snakewalk.controller.capture.readers.generated import EMBEDDED, embedded, g
 from snakewalk.controller.capture.readers.tables import load_csv
 from snakewalk.controller.capture.readers.wcon import load_wcon, zipped_text
 from snakewalk.controller.capture.track import Track
+
+
+def check_rate(rate_hz: float | None, names: Sequence[str]) -> None:
+    """Check an option ``--rate`` that is given for the files among ``names``.
+
+    Raises:
+        InputError: it is no rate, or none of the names is a file.
+
+    """
+    if rate_hz is None:
+        return
+    if not (math.isfinite(rate_hz) and rate_hz > 0.0):
+        raise InputError(f"--rate {rate_hz:g}: must be a positive number of frames a second")
+    if all(name in EMBEDDED for name in names):
+        raise InputError(f"--rate {rate_hz:g}: {names[0]} says its own rate; give one for files")
 
 
 def load_track(

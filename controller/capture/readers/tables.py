@@ -74,8 +74,10 @@ def _midline(file: Path, table: Floats, scale_m: float, rate_hz: float | None) -
         )
     points = table[:, 3:].reshape(len(frames), int(count[0]), 2)
     if rate_hz is None:
+        if len(frames) < 2:
+            raise InputError(f"{file}: holds 1 frame; a motion needs at least 2")
         step = np.diff(table[first, 0]) / np.diff(frames)
-        if len(step) == 0 or not np.median(step) > 0.0:
+        if not np.median(step) > 0.0:
             raise InputError(f"{file}: t must increase from frame to frame, in seconds")
         rate_hz = float(1.0 / np.median(step))
     return track_from_points(

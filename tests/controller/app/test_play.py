@@ -1,6 +1,7 @@
 """A recording played in time: within the limits, on the same path as every run."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.app.recordings.recorded_joints import recorded_joints
-from snakewalk.controller.app.runs.factory import prepare_playback, prepare_run
+from snakewalk.controller.app.runs.factory import prepare_playback, prepare_run, prepare_walk
+from snakewalk.controller.motion.recorded import RAMP_S
 from snakewalk.controller.runlog.reader import read_log
 
 
@@ -25,11 +27,16 @@ def test_auto_is_as_fast_as_the_joints_can_and_faster_is_refused() -> None:
 
 
 def test_slower_takes_longer_in_proportion() -> None:
-    """Half the speed is twice the time."""
-    fast = prepare_playback("worm-like", speed=0.2)
-    assert prepare_playback("worm-like", speed=0.1).duration_s == pytest.approx(
-        2.0 * fast.duration_s
-    )
+    """Half the speed is twice the time, beside that of the ramps."""
+    fast, slow = (prepare_playback("worm-like", speed=speed) for speed in (0.2, 0.1))
+    assert slow.duration_s - RAMP_S == pytest.approx(2.0 * (fast.duration_s - RAMP_S))
+
+
+def test_a_worm_is_played_at_its_own_speed() -> None:
+    """The rest before the first frame is no jerk: it does not slow the whole recording."""
+    assert prepare_playback("worm-like").speed == 1.0
+    with pytest.raises(InputError, match=r"up to 0\.\d+ times the animal's own speed"):
+        prepare_playback("lamprey-like", speed=1.0)
 
 
 def test_joints_of_a_synthesis_are_played_as_they_are(tmp_path: Path) -> None:
@@ -53,6 +60,20 @@ def test_joints_of_a_synthesis_are_played_as_they_are(tmp_path: Path) -> None:
     header = record.header
     again = prepare_run(header.run, header.robot, header.world)
     np.testing.assert_allclose(again.make_source(lambda kind, text: None).goal_rad(), wave[0])
+
+
+def test_a_recording_of_which_no_shape_is_used_is_told() -> None:
+    """Shapes that only slip are left out; then the walk is not the animal's, and says so."""
+    prepared = prepare_walk("flat-slalom")
+    assert prepared.warnings == ()
+    unused = replace(prepared)
+    unused.__dict__["library"] = replace(prepared.library, recorded=0)
+    (line,) = unused.warnings
+    assert line.startswith("no shape of worm-like is used")
+    events: list[str] = []
+    unused.make_source(lambda kind, text: events.append(text))
+    assert events == [line]
+    assert prepare_walk("flat-slalom", motion="serpenoid").warnings == ()
 
 
 @pytest.mark.parametrize("arguments", [["nowhere.npz"], ["worm-like", "--speed", "quick"]])

@@ -1,11 +1,16 @@
 """What commands print for a reader: no Python in it, and no line cut at 80 columns."""
 
+from importlib.metadata import version
+
 import pytest
+from pytest_mock import MockerFixture
 from typer.testing import CliRunner
 
+from snakewalk.controller.app.cli import options
 from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.app.cli.main import main
 from snakewalk.controller.app.cli.options import show
+from snakewalk.controller.app.studies.trials import Case, Trial
 
 
 def test_a_table_speaks_no_python(capsys: pytest.CaptureFixture[str]) -> None:
@@ -57,3 +62,37 @@ def test_wrong_words_are_one_line_and_exit_code_2(
     assert said in error
     assert error.startswith("snakewalk: ")
     assert error.count("\n") == 1
+
+
+def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        app(["--version"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out == f"snakewalk {version('snakewalk')}\n"
+
+
+@pytest.mark.parametrize("columns", [80, 120])
+def test_a_narrow_table_of_trials_keeps_its_numbers(
+    columns: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    mocker: MockerFixture,
+) -> None:
+    pytest.importorskip("mujoco")
+    case = Case("jacksboro-traverse", "walk-printed", "alternating16", 0.5)
+    found = [
+        Trial(
+            case, seed, (0.1, 0.2), 4, True, 4, 0, 61.25, 5.4, 0.123, 0.456, 0.789, 12.34,
+            0.1, 1.0, 23.4, 0.3,
+        )
+        for seed in range(20)
+    ]  # fmt: skip
+    mocker.patch("snakewalk.controller.app.studies.trials.plan_trials", return_value=[])
+    mocker.patch("snakewalk.controller.app.studies.trials.trials", return_value=found)
+    monkeypatch.setattr(options.console, "_width", columns)
+    words = "trials jacksboro-traverse --motion walk-printed --robot alternating16 --relief 0.5"
+    app(words.split(), standalone_mode=False)
+    shown = capsys.readouterr().out
+    for number in ("20 of 20", "61.2", "0.123", "0.46", "0.79", "12.3"):
+        assert number in shown
+    assert "\N{HORIZONTAL ELLIPSIS}" not in shown

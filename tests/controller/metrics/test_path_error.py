@@ -92,6 +92,17 @@ def test_a_path_laid_again_counts_from_then_on(record: RunRecord) -> None:
     assert error[t >= 2.0] == pytest.approx(0.1)
 
 
+def test_a_path_laid_again_holds_for_the_cycle_that_laid_it(record: RunRecord) -> None:
+    """The pose of a cycle is logged after the new path, with its place on the new path."""
+    time_s = record.pose.time_s
+    (start_s, path), *_ = record.paths
+    far = path + np.array([0.0, 50.0])
+    laid_s = 0.5 * (time_s[40] + time_s[41])
+    again = dataclasses.replace(record, paths=((start_s, path), (laid_s, far)))
+    assert (np.flatnonzero(path_error_m(again) > 10.0) >= 40).all()
+    assert path_error_m(again)[40] > 10.0
+
+
 def test_many_points_at_once_are_each_alone() -> None:
     rng = np.random.default_rng(1)
     path = np.cumsum(rng.normal(size=(40, 2)), axis=0)

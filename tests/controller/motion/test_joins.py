@@ -1,5 +1,6 @@
 """Any motion joined to any other, at any time: no step, and within the robot's limits."""
 
+from collections.abc import Iterator
 from copy import deepcopy
 from functools import cache
 from itertools import cycle, product
@@ -298,12 +299,28 @@ def test_a_robot_without_the_joints_refuses_the_join() -> None:
         relay.join(GaitMotion(make_gait("rolling"), other))
 
 
+PLAYED_S = 0.002
+
+
+def played(recording: Recorded) -> Iterator[np.ndarray]:
+    nowhere = BodyView(np.zeros((17, 3)), np.tile(np.eye(3), (17, 1, 1)), np.zeros(3))
+    while not recording.done:
+        yield recording.step(PLAYED_S, nowhere)
+
+
 def test_a_recording_faster_than_the_robot_is_slowed_and_a_bad_one_refused() -> None:
     robot = ROBOTS["yaw16"]
     time_s, joints = wave(robot)
     quick = Recorded(robot, time_s / 10.0, joints)
     assert quick.slowed > 2.0
     assert quick.pace().speed_rad_s.max() <= 0.9 * robot.joint_speed_limit_rad_s + 1e-9
+    for recording in (quick, Recorded(robot, time_s, joints)):
+        goals = np.array([joints[0], *played(recording)])
+        np.testing.assert_allclose(goals[-1], joints[-1], atol=1e-12)
+        acceleration = np.abs(np.diff(goals[:-1], 2, axis=0)).max(axis=0) / PLAYED_S**2
+        assert (acceleration <= 1.01 * recording.pace().acceleration_rad_s2 + 1e-6).all()
+        assert (recording.pace().acceleration_rad_s2 <= 0.9 * 25.0 + 1e-6).all()
+        assert np.abs(np.diff(goals[:3], axis=0)).max() < 1e-6, "from rest"
     with pytest.raises(InputError, match="16 joints"):
         Recorded(robot, time_s, joints[:, :3])
     with pytest.raises(InputError, match="must grow"):

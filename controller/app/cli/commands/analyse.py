@@ -35,8 +35,9 @@ def analyse(
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.capture.analysis import analyse as measure  # noqa: PLC0415  heavy
     from snakewalk.controller.capture.readers.generated import EMBEDDED  # noqa: PLC0415
-    from snakewalk.controller.capture.readers.load import load_track  # noqa: PLC0415
+    from snakewalk.controller.capture.readers.load import check_rate, load_track  # noqa: PLC0415
 
+    check_rate(rate, recordings)
     files = _pictures(recordings, picture, force)
     found = []
     pairs = list(zip(recordings, files, strict=True))

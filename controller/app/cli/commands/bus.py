@@ -61,6 +61,7 @@ def serve(
     if latency < 0.0:
         raise InputError(f"--latency {latency:g}: must not be negative")
     refuse_to_overwrite([record], force)
+    refuse_to_overwrite([link], force=True)
     what, line, traffic = _simulated(servos, robot, baud, faults)
     line.usb_latency_s = latency * 1e-3
     line.taps.append(traffic)
@@ -117,12 +118,18 @@ def sniff(
         pieces = stand_between(str(source), baud, for_s)
     else:
         pieces = receive(str(source), baud, for_s)
+    size, packets = 0, 0
     try:
         for time_s, data in pieces:
+            size += len(data)
             for line in decoder.feed(time_s, data):
+                packets += line.kind != "noise"
                 print(json.dumps(line.to_dict()) if as_json else line.text(), flush=live)
     except KeyboardInterrupt:
         print(file=sys.stderr)
+    if not live and packets == 0:
+        what = f"no packet in {size} bytes" if size else "no exchange"
+        raise InputError(f"{source}: holds {what}; --model AX-12A reads Protocol 1.0")
 
 
 def _simulated(

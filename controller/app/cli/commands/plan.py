@@ -90,7 +90,7 @@ def plan(
         )
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts
-    warnings: tuple[str, ...] = ()
+    warnings = prepared.warnings
     if prepared.ground is not None:
         relief = path_relief(prepared.planner, prepared.path)
         found["slope_median_deg"] = _deg(relief.median_slope_rad)
@@ -102,7 +102,7 @@ def plan(
         found["side_slope_max_deg"] = _deg(relief.max_side_slope_rad)
         found["climb_m"] = round(relief.climb_m, 3)
         found["safe_nodes"] = f"{relief.safe_node_share:.0%}"
-        warnings = path_warnings(prepared.planner, relief, prepared.run.waypoints_m)
+        warnings += path_warnings(prepared.planner, relief, prepared.run.waypoints_m)
     if as_json:
         found["warnings"] = warnings
     show(found, as_json)

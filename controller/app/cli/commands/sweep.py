@@ -1,9 +1,11 @@
 """``snakewalk sweep``: gaits on the physics over many parameters."""
 
 import json
+import sys
+from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
@@ -65,6 +67,7 @@ def sweep(
     for line in () if as_json else planned.left_out:
         console.print(f"left out: {line}", style="dim")
     table = Sweep(out)
+    refused: Counter[str] = Counter()
     missing = table.missing(planned.points)
     with table:
         for point, row in show_progress(
@@ -75,6 +78,10 @@ def sweep(
             transient=False,
         ):
             table.add(point, row)
+            if row.ended.startswith("refused"):
+                refused[row.ended] += 1
+    for why, times in refused.items():
+        print(f"snakewalk: {times} of {len(missing)} points {why}", file=sys.stderr)
     rows = [asdict(one) for one in digest(read_table(out))]
     if picture is not None:
         from snakewalk.controller.app.report.plots.sweep import draw_sweep  # noqa: PLC0415
@@ -83,7 +90,13 @@ def sweep(
     if as_json:
         found = {"table": str(out), "run": len(missing), "held": len(planned.points)}
         print(json.dumps(found | {"left_out": planned.left_out, "gaits": rows}))
-        return
+    else:
+        _show(out, rows)
+    if missing and refused.total() == len(missing):
+        raise SystemExit(1)
+
+
+def _show(out: Path, rows: list[dict[str, Any]]) -> None:
     console.print(str(out))
     grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     grid.add_column("gait, robot")

@@ -34,10 +34,12 @@ def track(
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.recordings.recording import examine  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.capture.readers.generated import EMBEDDED  # noqa: PLC0415
+    from snakewalk.controller.capture.readers.load import check_rate  # noqa: PLC0415
 
     check_picture(picture)
     refuse_to_overwrite([picture], force)
     names = recordings or list(EMBEDDED)
+    check_rate(rate, names)
     found = [
         examine(name, robot, world, None if name in EMBEDDED else rate)
         for name in show_progress(names, "recordings", len(names))

@@ -152,7 +152,9 @@ def trials(
         grid.add_column("\n".join(key.split(".")[-2:]), justify="right", no_wrap=True)
     for key in shown:
         text = key in _TEXT
-        grid.add_column(_HEADS[key], justify="left" if text else "right", no_wrap=key != "why")
+        grid.add_column(
+            _HEADS[key], justify="left" if text else "right", no_wrap=not text, overflow="fold"
+        )
     for row in rows:
         values = [row["keys"][key] for key in varied] + [row[key] for key in shown]
         grid.add_row(*["" if value is None else str(value) for value in values])

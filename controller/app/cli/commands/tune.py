@@ -32,6 +32,7 @@ def tune(
     """Search a gait's parameters for speed or efficiency, and compare with the defaults."""
     from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
     from snakewalk.controller.app.studies import tune as search  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.app.studies.sweep_points import robot_file  # noqa: PLC0415
     from snakewalk.controller.gaits.registry import make_gait  # noqa: PLC0415
 
     if out is not None and out.suffix != ".toml":
@@ -39,6 +40,7 @@ def tune(
     refuse_to_overwrite([out], force)
     require_extra("tuning needs", "mujoco")
     body = robot or ("alternating16" if make_gait(gait).needs.pitch else "yaw16")
+    body = robot_file(body) or body  # the set may lie in another folder
     with ProgressBar(f"{gait} for {aim}", budget) as bar:
         result = search.tune(
             gait,
@@ -66,9 +68,9 @@ def tune(
     if out is not None:
         lines = [
             f"# tuned for {aim}: {result.margin:+.0%} on {seeds} grounds",
-            f'name = "{out.stem}"',
+            f"name = {json.dumps(out.stem, ensure_ascii=False)}",
         ]
-        lines += [f'gait = "{gait}"', f'robot = "{body}"', "", "[parameters]"]
+        lines += [f"gait = {json.dumps(gait)}", f"robot = {json.dumps(body)}", "", "[parameters]"]
         lines += [f"{key} = {json.dumps(value)}" for key, value in result.parameters.items()]
         with atomic_write(out) as part:
             part.write_text("\n".join(lines) + "\n")

@@ -1,12 +1,15 @@
 """Points of a sweep: in the ranges, allowed by the robot, the same for the same seed."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.loader import load_robot
+from snakewalk.config.loader import load_robot, locate
+from snakewalk.controller.app.studies.sweep_measure import measure
 from snakewalk.controller.app.studies.sweep_points import SLOWEST_HZ, Space, plan_sweep, points_of
 from snakewalk.controller.gaits.gait import ranges
 from snakewalk.controller.gaits.registry import GAITS
@@ -25,6 +28,20 @@ def test_points_are_in_range_and_within_the_joints(name: str) -> None:
         for key, value in point.parameters.items():
             assert spans[key].low - 1e-3 <= value <= spans[key].high + 1e-3
     assert len({tuple(p.parameters.items()) for p in points}) == 30
+
+
+def test_a_robot_of_ones_own_is_loaded_again_in_another_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    text = locate("robots", "yaw16").read_text().replace('"yaw16"', '"mine"')
+    (tmp_path / "my.toml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    planned = plan_sweep(["lateral-undulation"], ["my.toml"], 1, seed=0, seconds=4.0)
+    monkeypatch.chdir("/")
+    (point,) = planned.points
+    assert point.robot == str(tmp_path / "my.toml")
+    assert measure(point).ended == "ran to its end"
 
 
 def test_the_seed_decides_the_points() -> None:

@@ -1,0 +1,89 @@
+"""What a user may get wrong: exit code 2, one line a fault with what would be right, no file.
+
+One row a command line; a command that is new here brings its rows.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snakewalk.controller.app.cli.main import main
+
+_RUN = 'name = "mine"\nwaypoints_m = [[1.0, 0.0]]\n'
+_NO_UTF8 = b"h\xe9.csv".decode(errors="surrogateescape")
+
+ROWS = [
+    ("report .", "a folder; a run's log is log.mcap"),
+    ("report nosuch.mcap", "nosuch.mcap: No such file"),
+    ("report empty", "is not an MCAP log"),
+    ("replay .", "a folder; a run's log is log.mcap"),
+    (f"capture {_NO_UTF8} -o t.npz", r"h\xe9.csv: this name is not UTF-8; rename the file"),
+    (f"run --track {_NO_UTF8}", "this name is not UTF-8"),
+    ("plan nosuch", "nosuch: no such run; shipped are"),
+    ("plan empty.toml", "empty.toml: name: is required"),
+    ("plan pitch.toml", "robot pitch: has no yaw joint"),
+    ("plan path.toml", "path.toml:1: name: holds '/'"),
+    ("plan typo.toml", "typo.toml:3: cycle_herz: unknown key; did you mean cycle_hz?"),
+    ("plan --seed 12345678901234567890123", "seed: "),
+    ("plan jacksboro-traverse --with repertoire", "only on a flat one"),
+    ("plan flat-slalom --with repertoire", "record --robot yaw16 --world flat -o"),
+    ("run flat-square --out file.txt", "'--out': dir 'file.txt' is a file"),
+    ("gait run rolling --robot nosuch", "nosuch: no such robot"),
+    ("gait show rolling --picture /nosuch/a.png", "/nosuch: no such folder"),
+    ("track --picture /nosuch/a.png", "/nosuch: no such folder"),
+    ("track --rate -5", "--rate -5: must be a positive number"),
+    ("track --rate nan", "--rate nan: must be a positive number"),
+    ("track --rate 30", "--rate 30: lamprey-like says its own rate"),
+    ("analyse worm-like --rate 30", "--rate 30: worm-like says its own rate"),
+    ("track one.csv", "one.csv: holds 1 frame"),
+    ("track back.csv", "back.csv: t must increase from frame to frame"),
+    ("sweep rolling -o /nosuch/a.csv", "/nosuch: no such folder"),
+    ("tune rolling -o /proc/a.toml", "/proc: takes no file"),
+    ("walk --picture /nosuch/a.png", "/nosuch: no such folder"),
+    ("bus serve --servos 1 --record /nosuch/a", "/nosuch: no such folder"),
+    ("bus serve --servos 1 --link /nosuch/a", "/nosuch: no such folder"),
+    ("bus serve --servos 1 --link file.txt", "file.txt: "),
+    ("bus serve --servos 1 --pace 0", "pace"),
+    ("bus serve --servos 1 --latency -1", "must not be negative"),
+    ("bus sniff empty", "empty: holds no exchange"),
+    ("bus sniff noise.bin", "noise.bin: holds no packet in 400 bytes"),
+    ("trials flat-slalom --robot nosuch --seeds 1", "nosuch: no such robot"),
+    ("nosuch", "No such command 'nosuch'"),
+]
+
+
+@pytest.mark.parametrize(("words", "said"), ROWS, ids=[words for words, _ in ROWS])
+def test_bad_input_is_told_and_nothing_is_written(
+    words: str,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name, text in {
+        "empty": "",
+        "empty.toml": "",
+        "file.txt": "mine",
+        "path.toml": _RUN.replace("mine", "../../mine"),
+        "typo.toml": f"{_RUN}cycle_herz = 50\n",
+        "pitch.toml": f'{_RUN}robot = "body.toml"\n',
+        "body.toml": 'name = "pitch"\njoint_axes = "pppppppp"\n',
+    }.items():
+        Path(name).write_text(text)
+    Path("noise.bin").write_bytes(np.random.default_rng(0).bytes(400))
+    x = np.linspace(0.0, 10.0, 11)
+    for name, frames in (("one.csv", [0]), ("back.csv", [0, 1])):
+        rows = [f"{-frame},{frame},{i},{x[i]},{frame}" for frame in frames for i in range(len(x))]
+        Path(name).write_text("\n".join(["t,frame,point,x_m,y_m", *rows]) + "\n")
+    before = sorted(tmp_path.rglob("*"))
+    monkeypatch.setattr("sys.argv", ["snakewalk", *words.split()])
+    with pytest.raises(SystemExit) as end:
+        main()
+    told = [line for line in capsys.readouterr().err.splitlines() if "snakewalk:" in line]
+    assert end.value.code == 2
+    assert told
+    assert any(said in line for line in told), told
+    assert sorted(tmp_path.rglob("*")) == before
+    assert Path("file.txt").read_text() == "mine"
