@@ -19,7 +19,7 @@ from snakewalk.config.run import RunConfig
 from snakewalk.config.world import ElevationGround, WorldConfig
 
 M = TypeVar("M", bound=BaseModel)
-Kind = Literal["robots", "worlds", "runs", "recordings", "gaits"]
+Kind = Literal["robots", "worlds", "runs", "recordings", "gaits", "skins"]
 
 
 def shipped(kind: Kind) -> tuple[str, ...]:

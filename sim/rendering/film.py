@@ -15,7 +15,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.sim.rendering.looks import dressed_model, mark_reached
+from snakewalk.sim.rendering.looks import SkinLook, dressed_model, mark_reached
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import add_shade
 from snakewalk.sim.rendering.trail import make_trail
@@ -44,6 +44,7 @@ def render_film(
     reached_s: Sequence[float] = (),
     paths: Sequence[tuple[float, Floats]] = (),
     title: str = "",
+    look: SkinLook | None = None,
     fine: bool = False,
     on_frame: Callable[[int, int], None] | None = None,
 ) -> int:
@@ -64,6 +65,7 @@ def render_film(
         reached_s: when the first, second, ... of them turn green.
         paths: each the time from when on it is in force and (P, 2) points; drawn as dots.
         title: shown in the caption.
+        look: the body's skin; None is a capsule a link.
         fine: smooth edges, at three times the cost.
         on_frame: told (frames done, of) after each.
 
@@ -84,7 +86,9 @@ def render_film(
     if faults:
         raise InputError(faults)
     shots = poses_at(times, poses, np.arange(times[0], times[-1], speed_up / fps))
-    model = dressed_model(robot, world, ground, waypoints_m, waypoint_radius_m, fine=fine)
+    model = dressed_model(
+        robot, world, ground, waypoints_m, waypoint_radius_m, look=look, fine=fine
+    )
     data = mujoco.MjData(model)
     camera = _camera(model, data, shots, fps, robot.length_m)
     trail = make_trail(paths, times, poses, ground)

@@ -2,11 +2,12 @@
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WaterGround, WorldConfig
@@ -33,6 +34,26 @@ _SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
 
+@dataclass(frozen=True, slots=True)
+class SkinLook:
+    """An animal's skin on the links, in place of capsules; the body at rest lies along -x."""
+
+    vertices_m: Floats
+    """(V, 3)"""
+    uv: Floats
+    """(V, 2)"""
+    faces: Ints
+    """(F, 3)"""
+    link: Ints
+    """(V, B) links that carry a corner."""
+    share: Floats
+    """(V, B) of each; they sum to 1."""
+    rest_m: Floats
+    """(L, 3) origins of the links' bodies at rest: the middle of the head, then the joints."""
+    texture: Image | None
+    """(H, W, 3), first row at v = 1; None is the colour of ``BACK``."""
+
+
 def dressed_model(
     robot: RobotConfig,
     world: WorldConfig,
@@ -40,18 +61,23 @@ def dressed_model(
     waypoints_m: Sequence[tuple[float, float]] = (),
     waypoint_radius_m: float = 0.3,
     *,
+    look: SkinLook | None = None,
     fine: bool = False,
 ) -> mujoco.MjModel:
     """Build the model with skin, floor, sky, and waypoints (poles and rings).
 
-    ``fine`` smooths edges: three times the work of a software renderer.
+    ``look`` is the skin; None is a capsule a link. ``fine`` smooths edges: three times the work of
+    a software renderer.
     """
     spec = mujoco.MjSpec.from_string(mjcf(robot, world, ground, 0.002))
     for geom in spec.geoms:
         geom.group = 4 if geom.name.startswith("belly") else 0  # bellies are not drawn
     _light(spec, robot, fine)
     _floor(spec, ground)
-    _skin(spec, robot)
+    if look is None:
+        _skin(spec, robot)
+    else:
+        _animal(spec, look)
     _water(spec, world)
     for k, (x, y) in enumerate(waypoints_m):
         z = 0.0 if ground is None else float(ground.elevation_m(x, y))
@@ -217,6 +243,31 @@ def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
         TONGUE,
         (half * 1.3, 0, -0.35 * r, half * 1.9, 0, -0.35 * r),
     )
+
+
+def _animal(spec: mujoco.MjSpec, look: SkinLook) -> None:
+    """A skin that MuJoCo bends with the bodies of the links."""
+    links = len(look.rest_m)
+    skin = spec.add_skin(name="animal", rgba=BACK[0])
+    if look.texture is not None:
+        high, wide = look.texture.shape[:2]
+        texture = spec.add_texture(
+            name="animal", type=mujoco.mjtTexture.mjTEXTURE_2D, width=wide, height=high, nchannel=3
+        )
+        texture.data = look.texture.tobytes()
+        material = spec.add_material(name="animal")
+        material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "animal"
+        material.specular, material.shininess = 0.2, 0.3
+        skin.material, skin.rgba = "animal", [1.0, 1.0, 1.0, 1.0]
+    skin.vert = look.vertices_m.ravel()
+    skin.texcoord = (look.uv * [1.0, -1.0] + [0.0, 1.0]).ravel()  # the first row lies at 0
+    skin.face = look.faces.ravel().tolist()
+    skin.bodyname = [f"link{k}" for k in range(links)]
+    skin.bindpos = look.rest_m.ravel()
+    skin.bindquat = np.tile([1.0, 0.0, 0.0, 0.0], links)
+    carried = [np.nonzero((look.link == k) & (look.share > 0.0)) for k in range(links)]
+    skin.vertid = [rows.tolist() for rows, _ in carried]
+    skin.vertweight = [look.share[both].tolist() for both in carried]
 
 
 def _thickness_m(robot: RobotConfig) -> Floats:

@@ -30,6 +30,9 @@ Port = Annotated[
 ]
 RunPort = Annotated[str | None, typer.Option(help="serial port; without it, the simulator")]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
+Look = Annotated[
+    str, typer.Option(help="body in the film: servos, animal, or a BODY as of `snakewalk body`")
+]
 RunFolder = Annotated[
     Path | None,
     typer.Option(file_okay=False, help="folder of this run; default: a new one in runs/"),
@@ -79,12 +82,13 @@ def write_artifacts(
     *,
     film: bool,
     fine: bool = False,
+    look: str = "servos",
 ) -> "Artifacts":
     """Make the report and the film of a run; print on standard error what could not be made."""
     from snakewalk.controller.app.report.artifacts import make_artifacts  # noqa: PLC0415  heavy; --help stays quick
 
     try:
-        made = make_artifacts(record, folder, numbers, film=film, fine=fine)
+        made = make_artifacts(record, folder, numbers, film=film, fine=fine, look=look)
     except KeyboardInterrupt as stop:
         log = folder / LOG
         if log.exists():

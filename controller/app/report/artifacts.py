@@ -7,6 +7,7 @@ from pathlib import Path
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.progress import ProgressBar
+from snakewalk.controller.app.recordings.body_look import SERVOS, skin_look
 from snakewalk.controller.app.report.film import film_run
 from snakewalk.controller.app.report.page import Section, film_html, page
 from snakewalk.controller.app.result_files import FILM, REPORT, SUMMARY, atomic_write
@@ -38,6 +39,7 @@ def make_artifacts(
     *,
     film: bool = True,
     fine: bool = False,
+    look: str = SERVOS,
 ) -> Artifacts:
     """Make ``folder/summary.json``, ``folder/report.html`` and ``folder/film.mp4`` from a record.
 
@@ -45,7 +47,8 @@ def make_artifacts(
     page is written before the film, which takes longest, and again when the film is drawn; a film
     that is there already is the same run's, and stays until then. What this machine cannot make (no
     simulator, no matplotlib, no OpenGL) is noted and left out: a run is not lost for want of its
-    pictures. Shows progress on standard error.
+    pictures. Shows progress on standard error. ``look`` is the body in the film, as ``skin_look``
+    takes it.
     """
     notes: list[str] = []
     numbers = write_summary(summary(record) if numbers is None else numbers, folder)
@@ -56,7 +59,7 @@ def make_artifacts(
         _write_page(record, folder, path if path.exists() else None, numbers, drawn)
     except InputError as error:
         notes += [f"no report: {line}" for line in error.faults]
-    if film and _film(record, path, fine, notes) and drawn is not None:
+    if film and _film(record, path, fine, look, notes) and drawn is not None:
         _write_page(record, folder, path, numbers, drawn)
     report = None if drawn is None else folder / REPORT
     return Artifacts(report, path if path.exists() else None, tuple(notes))
@@ -116,12 +119,13 @@ def write_summary(numbers: RunSummary, out_dir: Path) -> RunSummary:
     return numbers
 
 
-def _film(record: RunRecord, path: Path, fine: bool, notes: list[str]) -> bool:
+def _film(record: RunRecord, path: Path, fine: bool, look: str, notes: list[str]) -> bool:
     """Draw the film; return whether it was drawn."""
     with ProgressBar("film") as bar:
         try:
             with atomic_write(path) as part:
-                film_run(record, part, fine=fine, on_progress=bar.update)
+                skin = skin_look(look, record.header)
+                film_run(record, part, look=skin, fine=fine, on_progress=bar.update)
         except InputError as error:
             bar.hide()
             notes += [f"no film: {line}" for line in error.faults]

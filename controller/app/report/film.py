@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,6 +15,9 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.metrics.path_error import waypoint_times_s
 from snakewalk.controller.runlog.record import Header, RunRecord
 
+if TYPE_CHECKING:
+    from snakewalk.sim.rendering.looks import SkinLook
+
 FPS, FINE_FPS = 15, 25
 SIZE, FINE_SIZE = (800, 450), (1280, 720)
 _LONGEST_S: Final = 27.0
@@ -25,6 +28,7 @@ def film_run(
     record: RunRecord,
     path: Path,
     *,
+    look: "SkinLook | None" = None,
     fine: bool = False,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> int:
@@ -33,6 +37,7 @@ def film_run(
     Args:
         record: the run.
         path: of the film; its folder is made.
+        look: the body's skin; None is a capsule a link.
         fine: larger, smoother, and eight times slower to draw.
         on_progress: called with (frames done, of).
 
@@ -65,6 +70,7 @@ def film_run(
         reached_s=[float(t) for t in waypoint_times_s(record.pose, plan)],
         paths=record.paths,
         title=header.run.name,
+        look=look,
         fine=fine,
         on_frame=on_progress,
     )

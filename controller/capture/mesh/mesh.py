@@ -51,7 +51,7 @@ def body_mesh(model: BodyModel, skeleton: Floats, around: int = AROUND) -> Mesh:
     left = np.stack([-forward[:, 1], forward[:, 0]], axis=-1)
     turn = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
     # a ring of no size has no normals; a hair's breadth does
-    round_ = _round_tips(model, s)
+    round_ = round_tips(model, s)
     wide = np.maximum(np.interp(s, even, model.half_width) * round_, 1e-5)[:, None]
     high = np.maximum(np.interp(s, even, model.half_height) * round_, 1e-5)[:, None]
     plan = place[:, None] + (wide * np.cos(turn))[..., None] * left[:, None]
@@ -62,16 +62,16 @@ def body_mesh(model: BodyModel, skeleton: Floats, around: int = AROUND) -> Mesh:
     along = np.repeat(s, around)
     uv = np.stack([along, across], axis=-1)
     vertices = np.concatenate([rings, middle]) * scale
-    faces = _faces(len(s), around)
+    faces = tube_faces(len(s), around)
     return Mesh(
         vertices=vertices,
-        normals=_normals(vertices, faces),
+        normals=vertex_normals(vertices, faces),
         uv=np.concatenate([uv, [[0.0, 0.5], [1.0, 0.5]]]),
         faces=faces,
     )
 
 
-def _tips(model: BodyModel) -> tuple[float, float]:
+def tips(model: BodyModel) -> tuple[float, float]:
     """Half widths at the head's and the tail's tip."""
     return max(float(model.half_width[0]), 1e-4), max(float(model.half_width[-1]), 1e-4)
 
@@ -79,20 +79,20 @@ def _tips(model: BodyModel) -> tuple[float, float]:
 def _stations(model: BodyModel) -> Floats:
     """Places of the rings, 0..1: those of the skeleton, and closer ones around the tips."""
     quarter = 1.0 - np.cos(np.linspace(0.0, 0.5 * np.pi, _CAP))
-    head, tail = _tips(model)
+    head, tail = tips(model)
     even = np.linspace(0.0, 1.0, len(model.half_width))
     middle = even[(even > head) & (even < 1.0 - tail)]
     return np.concatenate([head * quarter, middle, 1.0 - tail * quarter[::-1]])
 
 
-def _round_tips(model: BodyModel, s: Floats) -> Floats:
+def round_tips(model: BodyModel, s: Floats) -> Floats:
     """Factor on the radii: the skeleton ends on the boundary, so no circle may reach beyond it."""
-    head, tail = _tips(model)
+    head, tail = tips(model)
     near = np.minimum(s / head, (1.0 - s) / tail)
     return np.asarray(np.sqrt(np.clip(1.0 - np.clip(1.0 - near, 0.0, 1.0) ** 2, 0.0, None)))
 
 
-def _faces(points: int, around: int) -> Ints:
+def tube_faces(points: int, around: int) -> Ints:
     """Two triangles for each side between rings, and a fan at each tip."""
     k = np.arange(around)
     after = (k + 1) % around
@@ -105,7 +105,7 @@ def _faces(points: int, around: int) -> Ints:
     return np.concatenate([sides, front, back]).astype(np.int64)
 
 
-def _normals(vertices: Floats, faces: Ints) -> Floats:
+def vertex_normals(vertices: Floats, faces: Ints) -> Floats:
     """Mean of the faces around each vertex, by area."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     face = np.cross(b - a, c - a)

@@ -1,8 +1,9 @@
 """A mesh as files: Wavefront OBJ with its material and texture beside it, or one binary glTF."""
 
 import io
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import trimesh
@@ -14,6 +15,85 @@ from snakewalk.controller.capture.mesh.mesh import Mesh
 
 SKIN_RGB = (0.66, 0.48, 0.20)
 """Of a body without a picture."""
+MESH_ENDINGS: Final = (".obj", ".glb")
+_AXES: Final = {f"{sign}{axis}": (k, factor)
+                for sign, factor in (("", 1.0), ("+", 1.0), ("-", -1.0))
+                for k, axis in enumerate("xyz")}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class GivenMesh:
+    """A mesh of somebody else's, turned so that x is forward and z up."""
+
+    mesh: Mesh
+    solid: Any
+    """``trimesh.Trimesh`` of the same triangles with its corners joined, for cutting."""
+    texture: Image | None
+    """(H, W, 3), first row at v = 1."""
+    forward: str
+    """Axis of the file along which the head lies."""
+    up: str
+    """Axis of the file that points up."""
+
+
+def read_mesh(file: Path, forward: str | None = None, up: str | None = None) -> GivenMesh:
+    """Read the triangles of an OBJ or a binary glTF, with the texture if it has one picture.
+
+    Args:
+        file: ends in .obj or .glb; further parts of a scene are joined.
+        forward: ``+x``, ``-z``, ...: where its head lies; default: along its longest side, +.
+        up: default: +y, which glTF prescribes; of an OBJ, +z, but where z is forward, +y.
+
+    Raises:
+        InputError: no such file, no triangles in it, or axes that are none or not at right angles.
+
+    """
+    if not file.is_file():
+        raise InputError(f"{file}: no such file")
+    try:
+        scene: Any = trimesh.load_scene(file)
+        solid: Any = scene.to_mesh()
+    except Exception as error:  # trimesh raises whatever its parsers meet
+        raise InputError(f"{file}: cannot be read as a mesh: {error}") from None
+    if len(solid.faces) == 0 or not np.isfinite(solid.vertices).all():
+        raise InputError(f"{file}: holds no triangles")
+    longest = "xyz"[int(np.argmax(np.ptp(solid.vertices, axis=0)))]
+    ahead = f"+{longest}" if forward is None else forward
+    above = up if up is not None else "+y" if file.suffix.lower() == ".glb" else "+z"
+    if up is None and above[1] == ahead[-1:]:
+        above = "+z" if above == "+y" else "+y"
+    x, z = _axis(ahead, "forward"), _axis(above, "up")
+    if not np.isclose(x @ z, 0.0):
+        raise InputError(f"{file}: --forward {ahead} and --up {above} are one axis")
+    turned = np.stack([x, np.cross(z, x), z])
+    texture = _picture_of(solid.visual)
+    uv = getattr(solid.visual, "uv", None)
+    vertices = np.asarray(solid.vertices, dtype=float) @ turned.T
+    normals = np.asarray(solid.vertex_normals, dtype=float) @ turned.T
+    size = np.linalg.norm(normals, axis=1, keepdims=True)
+    mesh = Mesh(
+        vertices=vertices,
+        normals=np.where(size > 0.5, normals / np.maximum(size, 1e-300), [0.0, 0.0, 1.0]),
+        uv=np.zeros((len(vertices), 2)) if uv is None else np.asarray(uv, dtype=float),
+        faces=np.asarray(solid.faces, dtype=np.int64),
+    )
+    joined: Any = trimesh.Trimesh(vertices, solid.faces, process=True)
+    joined.merge_vertices(merge_tex=True, merge_norm=True)
+    return GivenMesh(mesh, joined, texture if uv is not None else None, ahead, above)
+
+
+def _axis(name: str, option: str) -> Any:
+    if name not in _AXES:
+        raise InputError(f"--{option} {name}: expected one of +x, -x, +y, -y, +z, -z")
+    axis, sign = _AXES[name]
+    return sign * np.eye(3)[axis]
+
+
+def _picture_of(visual: Any) -> Image | None:
+    """The picture that a mesh wears, as RGB; None if it wears none."""
+    material = getattr(visual, "material", None)
+    picture = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    return None if picture is None else np.asarray(picture.convert("RGB"))
 
 
 def mesh_files(file: Path, textured: bool) -> list[Path]:

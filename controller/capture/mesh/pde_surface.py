@@ -1,17 +1,24 @@
-"""A skin: the biharmonic surface through four closed curves, solved in closed form ([GC] 1.3).
+"""A skin: the elliptic PDE surface of order 2N through closed curves, in closed form ([GC] 1.3).
 
-    (d2/du2 + a2 d2/dv2)^2 X = 0,   X(u_j, v) = C_j(v) for j = 1..4,   X = A_0(u) + sum_n ... + R
+    (d2/du2 + a2 d2/dv2)^N X = 0,   X = A_0(u) + sum_n [A_n(u) cos(nv) + B_n(u) sin(nv)] + R(u, v)
+
+``2N`` closed curves are met, each as a place of the surface or as its slope, curvature, ... along
+u: four places with N = 2 are the biharmonic surface of the paper; places and slopes at both ends
+join patches without a crease, and so do six conditions with N = 3 with even curvature.
 
 Mode n of the curves' Fourier series is carried from curve to curve by ``e^(-a n (1 - u))``, the
-same with ``u``, and both times a linear factor: the printed ``e^(a n u)`` (Eq. 4) grows to 1e13 at
-n = 30, which makes the system singular in practice (condition 1e18; here 7e4): these are the same
-functions, scaled. What the series leaves out of a curve goes into the remainder R, of mode ``M +
-1`` (Eq. 8), so that all four curves are met exactly. ``A_0``, a cubic, is the spine.
+same with ``u``, and both times powers: the printed ``e^(a n u)`` (Eq. 4) grows to 1e13 at n = 30,
+which makes the system singular in practice (condition 1e18; here 7e4): these are the same
+functions, scaled. All modes that the samples hold are taken unless fewer are asked for; what the
+series then leaves out of a curve goes into the remainder R, of mode ``M + 1`` (Eq. 8), so that the
+curves are met exactly either way. ``A_0``, a polynomial, is the spine.
 
 The equation is printed (Eq. 1) without ``a2``, although its solution (Eq. 4) has ``a``.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import comb, perm
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,93 +27,147 @@ from scipy.spatial import cKDTree
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 
-CURVES_AT = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
-"""Where along u the four curves lie."""
 TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True, slots=True)
 class PdeSurface:
-    """The surface through four curves of N points; ``u`` from 0 to 1, ``v`` from 0 to 2 pi."""
+    """The surface through 2N curves of C points; ``u`` from 0 to 1, ``v`` from 0 to 2 pi."""
 
     spread: float
     """a: how fast the detail of a curve fades from it."""
-    at: tuple[float, float, float, float]
+    at: tuple[float, ...]
+    """(2N,) where along u the curves lie."""
+    slopes: tuple[int, ...]
+    """(2N,) what a curve gives: 0 the place, 1 the slope dX/du, 2 the second derivative, ..."""
     spine_terms: Floats
-    """(4, 3) of the cubic ``A_0``."""
+    """(2N, 3) of the polynomial ``A_0``, from the constant up."""
     cosine: Floats
-    """(M, 4, 3) of each mode's four functions of u."""
+    """(M, 2N, 3) of each mode's functions of u."""
     sine: Floats
-    """(M, 4, 3)"""
+    """(M, 2N, 3)"""
     left_out: Floats
-    """(4, N, 3) remainder's four functions of u, at the curves' own samples of v."""
+    """(2N, C, 3) remainder's functions of u, at the curves' own samples of v."""
 
     @staticmethod
     def through(
         curves_m: ArrayLike,
-        modes: int = 5,
+        modes: int | None = None,
         spread: float = 1.0,
-        at: tuple[float, float, float, float] = CURVES_AT,
+        at: Sequence[float] | None = None,
+        slopes: Sequence[int] | None = None,
     ) -> "PdeSurface":
-        """Solve for four closed curves (4, N, 3), sampled evenly in v without a last one at 2 pi.
+        """Solve for 2N closed curves (2N, C, 3), sampled evenly in v without a last one at 2 pi.
 
         A sample at ``2 pi`` is that at 0 again: it would count double in every Fourier coefficient.
 
+        Args:
+            curves_m: metres; of slopes, metres per unit of u.
+            modes: M of the series; None takes all, which leaves nothing for the remainder.
+            spread: a.
+            at: (2N,) default: evenly from 0 to 1.
+            slopes: (2N,) default: all places.
+
         Raises:
-            InputError: not four curves, a last sample that repeats the first, too many modes.
+            InputError: no even number of curves, a last sample that repeats the first, too many
+                modes, conditions that do not determine a surface.
 
         """
         curves = np.asarray(curves_m, dtype=float)
-        if curves.ndim != 3 or curves.shape[0] != 4 or curves.shape[2] != 3:
-            raise InputError(f"a PDE surface takes curves of shape (4, N, 3), not {curves.shape}")
-        if not np.isfinite(curves).all() or list(at) != sorted(set(at)) or spread <= 0.0:
-            raise InputError("a PDE surface takes finite points, rising places and a > 0")
+        if curves.ndim != 3 or curves.shape[0] % 2 or not curves.size or curves.shape[2] != 3:
+            raise InputError(
+                f"a PDE surface takes curves of shape (2 N, points, 3), not {curves.shape}"
+            )
+        number, count = curves.shape[:2]
+        places = np.linspace(0.0, 1.0, number) if at is None else np.array(at, dtype=float)
+        kinds = [0] * number if slopes is None else [int(kind) for kind in slopes]
+        if len(places) != number or len(kinds) != number:
+            raise InputError(f"a PDE surface takes a place and a kind for each of {number} curves")
+        rising = list(zip(places, kinds, strict=True))
+        if rising != sorted(set(rising)) or min(kinds) < 0 or max(kinds) >= number:
+            raise InputError("a PDE surface takes rising places, and at one place rising slopes")
+        if not np.isfinite(curves).all() or spread <= 0.0 or kinds.count(0) == 0:
+            raise InputError("a PDE surface takes finite points, a > 0 and one place at least")
         size = np.ptp(curves, axis=1).max(axis=1)
         again = np.abs(curves[:, -1] - curves[:, 0]).max(axis=1) <= 1e-9 * size
-        if (again & (size > 0.0)).any():
+        if (again & (size > 0.0) & (np.array(kinds) == 0)).any():
             raise InputError("a curve's last point repeats its first: leave out the one at 2 pi")
-        count = curves.shape[1]
-        if not 0 <= modes < (count + 1) // 2:
+        if modes is not None and not 0 <= modes < (count + 1) // 2:
             raise InputError(f"{modes} modes need more than {2 * modes} points a curve: {count}")
-        places = np.array(at)
-        series = np.fft.rfft(curves, axis=1)[:, : modes + 1] / count
-        spine = np.linalg.solve(np.vander(places, 4, increasing=True), series[:, 0].real)
-        cosine, sine = np.zeros((modes, 4, 3)), np.zeros((modes, 4, 3))
-        for n in range(1, modes + 1):
-            basis = _basis(places, spread * n)
-            cosine[n - 1] = np.linalg.solve(basis, 2.0 * series[:, n].real)
-            sine[n - 1] = np.linalg.solve(basis, -2.0 * series[:, n].imag)
-        half = PdeSurface(spread, at, spine, cosine, sine, np.zeros((4, count, 3)))
-        rest = curves - half.points_m(places, np.arange(count) * TURN / count)
-        fading = _basis(places, spread * (modes + 1))
-        left_out = np.asarray(np.linalg.solve(fading, rest.reshape(4, -1)), dtype=float)
-        return PdeSurface(spread, at, spine, cosine, sine, left_out.reshape(4, -1, 3))
+        kept = count // 2 if modes is None else modes
+        series = np.fft.rfft(curves, axis=1)[:, : kept + 1] / count
+        double = np.where(2 * np.arange(kept + 1) == count, 1.0, 2.0)  # the last mode has no pair
+        spine = np.linalg.solve(_conditions(places, kinds, 0.0), series[:, 0].real)
+        cosine, sine = np.zeros((2, kept, number, 3))
+        for n in range(1, kept + 1):
+            basis = _conditions(places, kinds, spread * n)
+            cosine[n - 1] = np.linalg.solve(basis, double[n] * series[:, n].real)
+            if 2 * n != count:
+                sine[n - 1] = np.linalg.solve(basis, -2.0 * series[:, n].imag)
+        left_out = np.zeros((number, count, 3))
+        if modes is not None:
+            v = np.arange(count) * TURN / count
+            terms = np.exp(1j * np.arange(kept + 1)[:, None] * v)
+            held = np.einsum("jnx,n,nv->jvx", series, np.r_[1.0, double[1:]], terms).real
+            fading = _conditions(places, kinds, spread * (kept + 1))
+            left_out = np.linalg.solve(fading, (curves - held).reshape(number, -1))
+        return PdeSurface(
+            spread=spread,
+            at=tuple(places.tolist()),
+            slopes=tuple(kinds),
+            spine_terms=spine,
+            cosine=cosine,
+            sine=sine,
+            left_out=np.asarray(left_out, dtype=float).reshape(number, count, 3),
+        )
 
     def spine_m(self, u: ArrayLike) -> Floats:
         """(U, 3) the zeroth term: what the surface is wound around."""
-        return np.asarray(np.vander(np.atleast_1d(u), 4, increasing=True) @ self.spine_terms)
+        return np.asarray(_basis(np.atleast_1d(np.asarray(u, float)), 0.0, self._order, 0)
+                          @ self.spine_terms)  # fmt: skip
 
-    def points_m(self, u: ArrayLike, v: ArrayLike) -> Floats:
-        """(U, V, 3) at all pairs; the remainder is linear in v between the curves' samples."""
+    def points_m(self, u: ArrayLike, v: ArrayLike, along: int = 0, around: int = 0) -> Floats:
+        """(U, V, 3) at all pairs, or the derivative there; the remainder is linear between samples.
+
+        Args:
+            u: (U,)
+            v: (V,)
+            along: times differentiated by u.
+            around: times differentiated by v.
+
+        """
         us, vs = np.atleast_1d(np.asarray(u, float)), np.atleast_1d(np.asarray(v, float))
-        out = np.repeat(self.spine_m(us)[:, None], len(vs), axis=1)
+        out = np.zeros((len(us), len(vs), 3))
+        if around == 0:
+            out += (_basis(us, 0.0, self._order, along) @ self.spine_terms)[:, None]
+        quarter = around * 0.5 * np.pi  # a derivative of cos and sin is a quarter turn
         for n in range(1, len(self.cosine) + 1):
-            basis = _basis(us, self.spread * n)
-            out += np.cos(n * vs)[None, :, None] * (basis @ self.cosine[n - 1])[:, None]
-            out += np.sin(n * vs)[None, :, None] * (basis @ self.sine[n - 1])[:, None]
+            basis = _basis(us, self.spread * n, self._order, along) * float(n) ** around
+            out += np.cos(n * vs + quarter)[None, :, None] * (basis @ self.cosine[n - 1])[:, None]
+            out += np.sin(n * vs + quarter)[None, :, None] * (basis @ self.sine[n - 1])[:, None]
+        if around < 2 and self.left_out.any():
+            out += self._remainder(us, vs, along, around)
+        return out
+
+    def moved_m(self, u: ArrayLike, v: ArrayLike, shift_m: ArrayLike) -> Floats:
+        """(U, V, 3) with the spine moved by (U, 3), as printed: no part beside it turns."""
+        return np.asarray(self.points_m(u, v) + np.asarray(shift_m, dtype=float)[:, None])
+
+    @property
+    def _order(self) -> int:
+        """N."""
+        return len(self.at) // 2
+
+    def _remainder(self, us: Floats, vs: Floats, along: int, around: int) -> Floats:
+        """(U, V, 3) of R or its derivative."""
         count = self.left_out.shape[1]
         place = np.mod(vs, TURN) / TURN * count
         before = np.floor(place).astype(int)
-        share = (place - before)[None, :, None]
         left, right = self.left_out[:, before % count], self.left_out[:, (before + 1) % count]
-        fading = _basis(us, self.spread * (len(self.cosine) + 1))
-        return np.asarray(
-            out + np.einsum("ub,bvx->uvx", fading, (1 - share) * left + share * right)
-        )
-
-    def moved_m(self, u: ArrayLike, v: ArrayLike, shift_m: ArrayLike) -> Floats:
-        """(U, V, 3) with the spine moved by (U, 3): each point keeps its place beside it."""
-        return np.asarray(self.points_m(u, v) + np.asarray(shift_m, dtype=float)[:, None])
+        share = (place - before)[None, :, None]
+        rest = (1 - share) * left + share * right if around == 0 else (right - left) * count / TURN
+        fading = _basis(us, self.spread * (len(self.cosine) + 1), self._order, along)
+        return np.asarray(np.einsum("ub,bvx->uvx", fading, rest))
 
 
 def carry_over(mesh_m: ArrayLike, before_m: ArrayLike, after_m: ArrayLike) -> Floats:
@@ -123,7 +184,35 @@ def carry_over(mesh_m: ArrayLike, before_m: ArrayLike, after_m: ArrayLike) -> Fl
     return np.asarray(mesh + np.asarray(after_m, float).reshape(-1, 3)[nearest] - rest[nearest])
 
 
-def _basis(u: Floats, rate: float) -> Floats:
-    """(U, 4) ``e^(-w (1 - u))``, ``(1 - u)`` times it, ``e^(-w u)``, ``u`` times it: at most 1."""
-    falling, rising = np.exp(-rate * u), np.exp(-rate * (1.0 - u))
-    return np.stack([rising, (1.0 - u) * rising, falling, u * falling], axis=1)
+def _conditions(places: Floats, kinds: Sequence[int], rate: float) -> Floats:
+    """(2N, 2N) what each condition asks of the functions of u."""
+    order = len(places) // 2
+    return np.stack(
+        [_basis(places[k : k + 1], rate, order, kind)[0] for k, kind in enumerate(kinds)]
+    )
+
+
+def _basis(u: Floats, rate: float, order: int, along: int) -> Floats:
+    """(U, 2N) functions of a mode that fades at ``rate``, differentiated ``along`` times.
+
+    Powers of u for the rate 0; else ``(1 - u)^k e^(-w (1 - u))`` and ``u^k e^(-w u)`` for k < N.
+    """
+    if rate == 0.0:
+        return np.stack([_power(u, k, along) for k in range(2 * order)], axis=1)
+    sign = -1.0 if along % 2 else 1.0
+    rising = [sign * _faded(1.0 - u, rate, k, along) for k in range(order)]
+    return np.stack([*rising, *(_faded(u, rate, k, along) for k in range(order))], axis=1)
+
+
+def _power(u: Floats, k: int, times: int) -> Floats:
+    """``u^k``, differentiated."""
+    return np.zeros_like(u) if times > k else perm(k, times) * u ** (k - times)
+
+
+def _faded(u: Floats, rate: float, k: int, times: int) -> Floats:
+    """``u^k e^(-w u)``, differentiated by Leibniz' rule."""
+    parts = [
+        comb(times, j) * (-rate) ** (times - j) * _power(u, k, j)
+        for j in range(min(times, k) + 1)
+    ]  # fmt: skip
+    return np.asarray(np.sum(parts, axis=0) * np.exp(-rate * u))

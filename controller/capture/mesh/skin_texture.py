@@ -8,6 +8,7 @@ from snakewalk.controller.capture.resample import SEGMENTS, equal_arc_length
 
 ALONG, ACROSS = 512, 64
 """Pixels of the strip."""
+_EYE_RGB = (0.05, 0.05, 0.05)
 _MIXED_PX = 0.75  # at the boundary pixels are partly background
 
 
@@ -47,3 +48,37 @@ def unroll(image: Image, points_px: Floats, radius_px: Floats) -> Image:
         for k in range(3)
     ]
     return np.asarray(np.clip(np.rint(np.stack(channels, axis=-1)), 0, 255), dtype=np.uint8)
+
+
+def painted(
+    back_rgb: tuple[float, float, float],
+    band_rgb: tuple[float, float, float],
+    bands: int,
+    eye_at: float,
+    eye_radius: tuple[float, float],
+) -> Image:
+    """Paint a strip for a body of which there is no picture: bands across, and an eye a side.
+
+    Args:
+        back_rgb: colour, 0 to 1.
+        band_rgb: of the bands, which are broadest over the back.
+        bands: how many from head to tail.
+        eye_at: place of the eyes along the body, 0 to 1.
+        eye_radius: of an eye, over the body's length and over the half height of the body there.
+
+    Returns:
+        (256, 1024, 3), laid out as that of ``unroll``; finer, for the eyes.
+
+    """
+    u = (np.arange(2 * ALONG) + 0.5) / (2 * ALONG)
+    across = np.linspace(1.0, -1.0, 4 * ACROSS)[
+        :, None
+    ]  # cosine of the angle around: 1 is the left
+    wave = np.cos(2.0 * np.pi * bands * u) - 0.3 - 0.9 * across**2
+    share = np.clip(0.5 + 2.0 * wave, 0.0, 1.0)[..., None] if bands else np.zeros((1, 1, 1))
+    strip = (1.0 - share) * np.array(back_rgb) + share * np.array(band_rgb)
+    strip = np.broadcast_to(strip, (len(across), len(u), 3)).copy()
+    height = np.sqrt(1.0 - across**2)
+    eye = ((u - eye_at) / eye_radius[0]) ** 2 + (height / eye_radius[1]) ** 2 <= 1.0
+    strip[eye] = _EYE_RGB
+    return np.asarray(np.rint(255.0 * strip), dtype=np.uint8)

@@ -25,7 +25,15 @@ from snakewalk.controller.app.studies.tune import Tuned
 from snakewalk.controller.repertoire.repertoire import Repertoire
 
 APP = Path(__file__).resolve().parents[3] / "controller" / "app"
-WRITERS = {"write_text", "write_bytes", "savefig", "save", "save_postures", "write_mesh"}
+WRITERS = {
+    "write_text",
+    "write_bytes",
+    "savefig",
+    "save",
+    "save_postures",
+    "write_mesh",
+    "write_skin",
+}
 STREAMS = {"bus.py": "a recording of the line grows", "sweep_table.py": "a table grows by rows"}
 """Files that grow, each row whole, in place of being written at once."""
 
@@ -127,6 +135,7 @@ def arguments(command: str, out: Path) -> list[str]:
         "record": ["repertoire", "record", "-o", str(out)],
         "tune": ["tune", "rolling", "-o", str(out)],
         "mesh": ["body", "worm-like", "-o", str(out)],
+        "skin": ["body", "snake", "--animate", "worm-like", "-o", str(out)],
         "gait": ["gait", "show", "rolling", "--picture", str(out)],
         "analysis": ["analyse", "worm-like", "--picture", str(out)],
     }[command]
@@ -136,7 +145,7 @@ def arguments(command: str, out: Path) -> list[str]:
     ("command", "name"),
     [
         *(("match", "p.npz"), ("record", "r.npz"), ("tune", "t.toml"), ("mesh", "m.glb")),
-        *(("gait", "g.png"), ("analysis", "a.png")),
+        *(("gait", "g.png"), ("analysis", "a.png"), ("skin", "s.glb")),
     ],
 )
 @pytest.mark.parametrize("old", [b"old", None])

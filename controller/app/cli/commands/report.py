@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.controller.app.cli.options import Force, Json, show, write_artifacts
+from snakewalk.controller.app.cli.options import Force, Json, Look, show, write_artifacts
 from snakewalk.controller.app.result_files import refuse_mixture
 
 
@@ -17,18 +17,21 @@ def report(
     ] = None,
     film: Annotated[bool, typer.Option("--film/--no-film", help="draw the film again")] = True,
     fine: Annotated[bool, typer.Option("--fine", help="film in 1280 x 720; slow")] = False,
+    look: Look = "servos",
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Make report.html, summary.json and film.mp4 again from a log."""
+    from snakewalk.controller.app.recordings.body_look import check_look  # noqa: PLC0415
     from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415  heavy; --help stays quick
 
+    check_look(look)
     record = read_log(log)
     if record.note:
         print(f"snakewalk: {log}: {record.note}", file=sys.stderr)
     folder = log.parent if out is None else out
     refuse_mixture(log, folder, force)
-    artifacts = write_artifacts(record, folder, film=film, fine=fine)
+    artifacts = write_artifacts(record, folder, film=film, fine=fine, look=look)
     if artifacts.report is None:
         raise SystemExit(2)
     files = artifacts.to_dict()

@@ -13,6 +13,7 @@ from snakewalk.controller.app.cli.options import (
     Film,
     Force,
     Json,
+    Look,
     Motion,
     Robot,
     RunFolder,
@@ -41,14 +42,17 @@ def run(
     out: RunFolder = None,
     compliance: Compliant = None,
     film: Film = True,
+    look: Look = "servos",
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
     from snakewalk.controller.app.progress import PathBar  # noqa: PLC0415
+    from snakewalk.controller.app.recordings.body_look import check_look  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_walk, with_compliance  # noqa: PLC0415
 
+    check_look(look)
     prepared = prepare_walk(
         run, seed=seed, motion=motion, robot=robot, world=world, track=track, pose=pose
     )
@@ -72,7 +76,7 @@ def run(
             on_event=bar.on_event,
         )
     outcome = finished.outcome
-    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
+    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film, look=look)
     show(
         {
             "run": name,

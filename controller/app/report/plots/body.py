@@ -1,5 +1,6 @@
 """A body model as a picture: where it was seen, its skin unrolled, and the solid."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,10 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.controller.app.report.figures.style import AMBER, BLUE, INK, RED, save_picture, style
 from snakewalk.controller.app.result_files import check_picture
 from snakewalk.controller.capture.mesh.body_model import BodyModel
+from snakewalk.controller.capture.mesh.bone_motion import BoneMotion
 from snakewalk.controller.capture.mesh.mesh import Mesh
 from snakewalk.controller.capture.mesh.mesh_files import SKIN_RGB
+from snakewalk.controller.capture.mesh.skin import Skin, posed_m
 
 _SUN = np.array([0.3, 0.5, 0.81])
 
@@ -77,6 +80,26 @@ def _sections(axes: Axes, model: BodyModel) -> None:
     axes.set_xticks([0.0, 1.0], ["head", "tail"])
     axes.legend(ncols=2, loc="upper center", fontsize=8)
     axes.set_title("ellipses, over the length")
+
+
+def draw_skin(file: Path, skin: Skin, motion: BoneMotion | None, texture: Image | None) -> None:
+    """Draw a skin at rest, or in four frames of its motion, all to one scale.
+
+    Raises:
+        InputError: an ending that is no picture's.
+
+    """
+    check_picture(file)
+    shown = [0] if motion is None else np.linspace(0, len(motion.time_s) - 1, 5).astype(int)[:4]
+    with style():
+        figure = Figure(figsize=(9.0, 5.6), layout="constrained", dpi=88)
+        panels: Any = figure.subfigures(1 if motion is None else 2, len(shown) // 2 or 1)
+        for frame, panel in zip(shown, np.ravel(panels), strict=True):
+            corners = skin.mesh.vertices if motion is None else posed_m(skin, motion, int(frame))
+            _solid(panel, replace(skin.mesh, vertices=corners), texture)
+            if motion is not None:
+                panel.suptitle(f"{motion.time_s[frame]:.2f} s", fontsize=9)
+        save_picture(figure, file)
 
 
 def _solid(figure: Figure, mesh: Mesh, texture: Image | None) -> None:

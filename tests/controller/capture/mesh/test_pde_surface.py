@@ -1,14 +1,18 @@
 """The biharmonic skin: curves met exactly, the equation met, and what fails as printed."""
 
+from math import comb
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.mesh.pde_surface import CURVES_AT, TURN, PdeSurface, carry_over
+from snakewalk.controller.capture.mesh.pde_surface import TURN, PdeSurface, carry_over
 
 Floats = NDArray[np.float64]
 COUNT = 48
+CURVES_AT = np.linspace(0.0, 1.0, 4)
 V = np.arange(COUNT) * TURN / COUNT
 
 
@@ -34,6 +38,67 @@ def test_all_four_curves_are_met_exactly(modes: int, spread: float) -> None:
     np.testing.assert_allclose(surface.points_m(CURVES_AT, V), curves, atol=1e-10)
 
 
+def operator(surface: PdeSurface, order: int, factor: float, u: Floats, v: Floats) -> Floats:
+    """``(d2/du2 + factor d2/dv2)^N X`` from the closed derivatives."""
+    total = np.zeros((len(u), len(v), 3))
+    for k in range(order + 1):
+        part = surface.points_m(u, v, along=2 * (order - k), around=2 * k)
+        total += comb(order, k) * factor**k * part
+    return total
+
+
+@pytest.mark.parametrize("count", [47, 48])
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_with_all_modes_the_surface_solves_the_equation_and_meets_every_curve(
+    order: int, count: int
+) -> None:
+    """Rough curves, no remainder: the operator is nought to rounding, relative to its own terms."""
+    rng = np.random.default_rng(order)
+    curves = rng.normal(size=(2 * order, count, 3))
+    spread = 0.7
+    surface = PdeSurface.through(curves, spread=spread)
+    turn = np.arange(count) * TURN / count
+    np.testing.assert_allclose(
+        surface.points_m(np.linspace(0, 1, 2 * order), turn), curves, atol=1e-8
+    )
+    assert not surface.left_out.any()
+    u, v = np.linspace(0.05, 0.95, 7), np.linspace(0.1, 6.0, 9)
+    size = np.abs(surface.points_m(u, v, along=2 * order)).max()
+    assert np.abs(operator(surface, order, spread**2, u, v)).max() < 1e-9 * size
+    assert np.abs(operator(surface, order, 1.0, u, v)).max() > 1e-2 * size
+
+
+def test_derivatives_are_those_of_differences() -> None:
+    surface = PdeSurface.through(tube(), 9, 1.3)
+    u, v, h = np.array([0.37]), np.array([1.1]), 1e-5
+    along = (surface.points_m(u + h, v) - surface.points_m(u - h, v)) / (2 * h)
+    around = (surface.points_m(u, v + h) - surface.points_m(u, v - h)) / (2 * h)
+    np.testing.assert_allclose(surface.points_m(u, v, along=1), along, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(surface.points_m(u, v, around=1), around, rtol=1e-6, atol=1e-8)
+
+
+def test_slopes_and_curvatures_are_met_where_they_are_given() -> None:
+    rng = np.random.default_rng(3)
+    given = rng.normal(size=(6, 20, 3))
+    kinds = [0, 1, 2, 0, 1, 2]
+    surface = PdeSurface.through(given, at=[0, 0, 0, 1, 1, 1], slopes=kinds)
+    turn = np.arange(20) * TURN / 20
+    for k, kind in enumerate(kinds):
+        np.testing.assert_allclose(
+            surface.points_m(float(k > 2), turn, along=kind)[0], given[k], atol=1e-8
+        )
+
+
+def test_moved_curves_make_the_moved_surface() -> None:
+    """A rigid motion and the solution commute: the surface has no place of its own."""
+    curves = tube()
+    turn = Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
+    u, v = np.linspace(0, 1, 9), np.linspace(0, 6, 11)
+    moved = PdeSurface.through(curves @ turn.T + [1.0, 2.0, 3.0]).points_m(u, v)
+    rest = PdeSurface.through(curves).points_m(u, v)
+    np.testing.assert_allclose(moved, rest @ turn.T + [1.0, 2.0, 3.0], atol=1e-11)
+
+
 def test_the_surface_solves_the_equation_with_the_factor_that_is_not_printed() -> None:
     """[GC] Eq. 1 lacks a^2: by finite differences the operator with it is nought."""
     spread, h = 2.0, 1e-2
@@ -41,12 +106,12 @@ def test_the_surface_solves_the_equation_with_the_factor_that_is_not_printed() -
     steps = h * np.arange(-4, 5)
     patch = surface.points_m(0.45 + steps, 0.7 + steps)
 
-    def operator(x: Floats, factor: float) -> Floats:
+    def differences(x: Floats, factor: float) -> Floats:
         uu = (x[2:, 1:-1] - 2 * x[1:-1, 1:-1] + x[:-2, 1:-1]) / h**2
         vv = (x[1:-1, 2:] - 2 * x[1:-1, 1:-1] + x[1:-1, :-2]) / h**2
         return np.asarray(uu + factor * vv)
 
-    right, printed = (np.abs(operator(operator(patch, f), f)).max() for f in (spread**2, 1.0))
+    right, printed = (np.abs(differences(differences(patch, f), f)).max() for f in (spread**2, 1.0))
     assert right < 0.02 * printed
 
 
