@@ -34,7 +34,7 @@ WRITERS = {
     "write_mesh",
     "write_skin",
 }
-STREAMS = {"bus.py": "a recording of the line grows", "sweep_table.py": "a table grows by rows"}
+STREAMS = {"bus.py": "a recording of the line grows", "table.py": "a table grows by rows"}
 """Files that grow, each row whole, in place of being written at once."""
 
 
