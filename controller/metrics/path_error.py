@@ -37,7 +37,7 @@ def path_error_m(record: RunRecord) -> Floats:
     if len(record.header.plan.waypoints_m) == 0:
         return np.full(len(pose.time_s), np.nan)
     starts = [start for start, _ in record.paths]
-    until_s = np.append(pose.time_s[1:], np.inf)
+    until_s = np.append(pose.time_s, np.inf)[1:]
     which = np.searchsorted(starts, until_s) - 1
     error = np.full(len(pose.time_s), np.nan)
     for k, (_, path) in enumerate(record.paths):

@@ -43,3 +43,13 @@ def test_bends_of_a_body_on_its_side_lie_in_the_plane_that_was_meant(side: float
     assert height_m < 0.3 * np.ptp(level.link_m[:, 1])
     across = np.corrcoef(lying.link_m[:, 1], level.link_m[:, 1])[0, 1]
     assert across > 0.9
+
+
+def test_a_whole_turn_is_forgotten() -> None:
+    """A body that came home the long way is not turned back."""
+    compensate, straight = RollCompensation(ROBOT), 0.0 * BEND
+    for roll in np.arange(0.0, 2.0 * np.pi, 0.02):
+        compensate(BEND, rolled(float(roll), straight), 0.02)
+    for _ in range(100):
+        compensate(BEND, rolled(0.0, straight), 0.02)
+    assert compensate(BEND, rolled(0.0, straight), 0.02) is BEND

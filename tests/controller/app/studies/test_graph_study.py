@@ -83,7 +83,7 @@ def snakewalk(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_command_compares_rules_as_json_and_draws_them(tmp_path: Path) -> None:
-    picture = tmp_path / "made" / "curves.png"
+    picture = tmp_path / "curves.png"
     words = ("--graph", "er:60:5", "--graph", "ws:60:4:0.1", "--rule", "snake", "--rule", "stack")
     done = snakewalk("walk", *words, "--repeats", "3", "--picture", str(picture), "--json")
     assert done.returncode == 0, done.stderr

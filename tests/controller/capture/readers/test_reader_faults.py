@@ -90,7 +90,7 @@ def test_a_frame_rate_is_above_zero(rate: float, tmp_path: Path) -> None:
 
 def test_figures_of_your_own_are_checked_like_every_configuration(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text('name = "mine"\nwaves = -1\n')
-    with pytest.raises(InputError, match=r"mine\.toml: waves"):
+    with pytest.raises(InputError, match=r"mine\.toml:2: waves"):
         load_track(str(tmp_path / "mine.toml"))
     with pytest.raises(InputError, match="hold the frame rate"):
         load_track("worm-like", 60.0)
