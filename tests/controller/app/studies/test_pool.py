@@ -41,7 +41,7 @@ def test_no_scheduler() -> None:
 
 
 _BLOCKED = """
-import os, sys
+import os, signal, sys
 from pathlib import Path
 from snakewalk.controller.app.studies.pool import each
 
@@ -50,6 +50,7 @@ def wait_for_ever(fifo):
     Path(fifo).read_text()  # nobody ever writes
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
     os.mkfifo("fifo")
     dict(each(wait_for_ever, ["fifo"] * 3, workers=1))
 """
