@@ -34,8 +34,8 @@ class RollCompensation:
         """Return goals (J,) whose bends lie as ``goal_rad`` would on a body that has not rolled."""
         # counted on over half a turn: a body on its back is turned home one way, not to and fro
         self._measured_rad += float(wrap(body_roll_rad(view) - self._measured_rad))
-        if abs(wrap(self._measured_rad)) < _LEFT_IN_RAD:  # it lies well: whole turns are forgotten
-            turns = self._measured_rad - float(wrap(self._measured_rad))
+        turns = 2.0 * np.pi * round(self._measured_rad / (2.0 * np.pi))
+        if abs(self._measured_rad - turns) < _LEFT_IN_RAD:  # it lies well: turns are forgotten
             self._measured_rad -= turns
             self._roll_rad -= turns
         measured = self._measured_rad

@@ -308,7 +308,8 @@ class Pilot:
             self.reached += 1
             self._fall_back(False)
         elif self._feedback and self.head >= self._replan_after:
-            stalled = self._is_stalled()
+            self._note_gain()
+            stalled = self._is_stalled
             if not stalled and not self._is_off_path(centre_m):
                 return
             if stalled:
@@ -320,11 +321,15 @@ class Pilot:
             with suppress(InputError):  # no safe path leads back from here: the old one stays
                 self._plan_path(head_m, self.reached, heading_rad)
 
-    def _is_stalled(self) -> bool:
-        """Whether the shape has travelled far, and the body not."""
+    def _note_gain(self) -> None:
+        """Remember where on the track the body last came on by a share of its length."""
         along_m = float(self._along_m[0])
         if along_m > self._gained_m + _STALL_BODIES * self._length_m:
             self._gained_m, self._gained_at = along_m, self.head
+
+    @property
+    def _is_stalled(self) -> bool:
+        """Whether the shape has travelled far, and the body not."""
         track = (self.head - self._gained_at) / self._chooser.track.points
         return track > _STALL_AFTER_BODIES
 

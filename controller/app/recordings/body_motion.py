@@ -11,6 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WaterGround
 from snakewalk.controller.app.report.film import body_qpos
+from snakewalk.controller.app.result_files import LOG
 from snakewalk.controller.capture.mesh.bone_motion import BoneMotion, from_track, swimming
 from snakewalk.controller.capture.mesh.skin import Skin
 from snakewalk.controller.capture.readers.load import load_track
@@ -50,7 +51,7 @@ def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, B
             raise InputError(f"{source}: a cycle has 24 frames; fps is for recordings and logs")
         return skin, swimming(gait(), skin.length_m)
     path = Path(source)
-    log = path / "log.mcap" if path.is_dir() else path
+    log = path / LOG if path.is_dir() else path
     if log.name.endswith((".mcap", ".mcap.part")):
         return _robot_skin(skin, read_log(log), LOG_FPS if fps is None else fps, source)
     track = load_track(source)

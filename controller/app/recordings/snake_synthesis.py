@@ -19,7 +19,6 @@ from snakewalk.controller.mechanics.speed_law import SpeedLaw
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.angle_track import AngleTrack
-from snakewalk.controller.walk.shape_filters import passes_all
 from snakewalk.controller.walk.synthesis import (
     Behaviour,
     Locomotion,
@@ -28,7 +27,6 @@ from snakewalk.controller.walk.synthesis import (
     varied_pulse,
 )
 from snakewalk.controller.walk.tongue import HeightChain, Tongue, flicks
-from snakewalk.controller.walk.walker import Walker
 
 _ANIMAL = ("turn", "self-contact")
 """Tests of a shape that no robot needs to make."""
@@ -170,10 +168,7 @@ class SnakeSynthesis:
             self.prepared.planner,
         )
         printed = run.motion == "walk-printed"
-        change = {"decision_fraction": 1.0, "ramp_limit_rad": 0.0} if printed else {}
-        order = np.random.default_rng(run.seed).permutation(len(self.library.shapes_rad))
-        walk = run.walk.model_copy(update=change)
-        walker = Walker(self.library.shapes_rad[order], walk, passes_all(self.shape_filters))
+        walker = self.prepared.walker(self.library, self.shape_filters)
         heading_rad = self.prepared.start_heading_rad
         states, at = [(0, 0)], [0]
 

@@ -1,10 +1,12 @@
 """A run of the snake walk: recording, library of shapes, path, pilot, forecast and margins."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
@@ -153,9 +155,7 @@ class WalkRun:
             plan=self.planner,
             pitch_fitter=None if level or self.ground is None else self.pitch_fitter,
             pitch_lead_s=robot.servo.pitch_lead_s,
-            roll=None
-            if level or not robot.pitch_joints or __import__("os").environ.get("ROLL") == "0"
-            else RollCompensation(robot),
+            roll=None if level or not robot.pitch_joints else RollCompensation(robot),
             fall_back=(
                 chooser.fall_back
                 if isinstance(chooser, PredictiveWalker) and run.walk.fallback
@@ -224,20 +224,27 @@ class WalkRun:
             f"(why: snakewalk track {self.run.track})",
         )
 
+    def walker(self, library: StateLibrary, filters: Mapping[str, ShapeFilter]) -> Walker:
+        """Make a fresh walk by the graph alone over a library, as this run sets it."""
+        walk = self.run.walk
+        if self.run.motion == "walk-printed":
+            walk = walk.model_copy(update={"decision_fraction": 1.0, "ramp_limit_rad": 0.0})
+        return Walker(self._shuffled(library), walk, passes_all(filters))
+
+    def _shuffled(self, library: StateLibrary) -> Floats:
+        """Shapes (S, N) in an order that is the seed's: W settles ties by the order."""
+        order = np.random.default_rng(self.run.seed).permutation(len(library.shapes_rad))
+        return np.asarray(library.shapes_rad[order])
+
     def _chooser(self) -> ShapeChooser:
         if self.run.motion == "serpenoid":
             return Aimed(Serpenoid(POINTS))
-        run, walk = self.run, self.run.walk
-        order = np.random.default_rng(run.seed).permutation(len(self.library.shapes_rad))
-        shapes_rad = self.library.shapes_rad[order]
-        if run.motion == "walk-printed":
-            walk = walk.model_copy(update={"decision_fraction": 1.0, "ramp_limit_rad": 0.0})
-        if run.motion != "walk":
-            return Aimed(Walker(shapes_rad, walk, passes_all(self.shape_filters)))
+        if self.run.motion != "walk":
+            return Aimed(self.walker(self.library, self.shape_filters))
         rollout = Rollout(self.robot, self.world.friction, self.bridged, POINTS)
         return PredictiveWalker(
-            shapes_rad,
-            walk,
+            self._shuffled(self.library),
+            self.run.walk,
             lambda track: Steering(rollout, track, self.pulse_segments_s),
             len(self.robot.yaw_joints),
             passes_all({name: self.shape_filters[name] for name in MADE}),

@@ -218,7 +218,9 @@ def _check_options(
     of_meshes: dict[str, object],
 ) -> None:
     """Refuse options that would do nothing."""
-    mesh = given and body.lower().endswith((".obj", ".glb"))
+    from snakewalk.controller.capture.mesh.mesh_files import MESH_ENDINGS  # noqa: PLC0415
+
+    mesh = given and body.lower().endswith(MESH_ENDINGS)
     faults = [
         f"{name}: is for recordings with widths; {body} is none"
         for name, value in of_widths.items()
