@@ -88,7 +88,12 @@ class SafetyConfig(Strict):
     voltage_max_v: float | None = Field(
         None, gt=0.0, description="default: the robot's servo.supply_max_v"
     )
-    stale_limit_s: float = Field(0.1, gt=0.0)
+    stale_limit_s: float = Field(
+        0.1, gt=0.0, description="how old a measured position, velocity or current may be"
+    )
+    slow_stale_limit_s: float = Field(
+        3.0, gt=1.0, description="the same for temperature and voltage; overdue after 1 s"
+    )
     advance_fraction: float = Field(0.5, ge=0.0, lt=1.0, description="alarm below this share")
     watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="register 98, 20 ms steps")
     recovery: Literal["stop", "confirm", "resume"] = Field(

@@ -43,9 +43,12 @@ class JointState(NamedTuple):
     error: NDArray[np.uint8]
     """(J,) error byte of the last status packet."""
     age_s: Floats
-    """(J,) since position, velocity and current were last read."""
+    """(J,) since position, velocity and current were last measured, at most: counted from the end
+    of the request, as a servo measures between it and its reply."""
     valid: Bools
     """(J,) whether this cycle's read succeeded."""
+    slow_age_s: Floats
+    """(J,) the same for temperature and voltage; infinite until first read."""
 
 
 class BodyPose(NamedTuple):

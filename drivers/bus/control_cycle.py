@@ -105,6 +105,16 @@ class ControlCycle:
         """Whether the next read is a fast one."""
         self.counters = CycleCounters()
 
+    @property
+    def since_sent_s(self) -> float:
+        """How long ago the last packet had left the line, s.
+
+        After a read: how old its values are at most, as no servo measures before it was asked.
+        """
+        if self._fast_path is not None:
+            return self._fast_path.since_sent_s
+        return max(0.0, self._port.clock.now_s() - self._sent_until_s)
+
     def write_goals(self, goals: NDArray[np.int32]) -> None:
         """Send raw goals (N,); servos do not reply to a sync write."""
         if self._fast_path is None:

@@ -163,6 +163,11 @@ class SerialFastPath:
         return float(_reserve_line(self._plan, now_ns(), int(wire_s * 1e9)) * 1e-9)
 
     @property
+    def since_sent_s(self) -> float:
+        """How long ago all that was sent had left the line; 0 while it is still on it."""
+        return max(0, now_ns() - int(self._plan[FREE_NS])) * 1e-9
+
+    @property
     def remaining_s(self) -> float:
         """How long the reply of an irregular cycle may still take."""
         return float(self._plan[REMAINING_NS] * 1e-9)

@@ -107,23 +107,24 @@ class Readings:
 
     def __init__(self, joints: int, table: ControlTable, units: ServoUnits) -> None:
         self._decoder = StateDecoder(table, units)
-        self._numbers = np.full((6, joints), np.nan)
+        self._numbers = np.full((7, joints), np.nan)
         self._motion = self._numbers[:3]
-        self._temperature, self._voltage, self._read_at_s = self._numbers[3:]
-        self._read_at_s[:] = -np.inf
+        self._temperature, self._voltage = self._numbers[3:5]
+        self._measured_at_s, self._slow_at_s = self._numbers[5:]
+        self._numbers[5:] = -np.inf
         self._hardware_error = np.zeros(joints, np.uint8)
         self._error = np.zeros(joints, np.uint8)
         self._valid = np.zeros(joints, np.bool_)
         self._alarmed = False
         self._flags = self._frozen_flags()
 
-    def update(self, reply: GroupReadReply, now_s: float) -> Sequence[int]:
+    def update(self, reply: GroupReadReply, measured_at_s: float) -> Sequence[int]:
         """Take new state blocks; returns the joints whose alarm (register 70) must be read."""
         ok = reply.valid
         trouble = np.count_nonzero(reply.error) or self._alarmed
         if not trouble and np.count_nonzero(ok) == len(ok):  # the regular case
             self._decoder.decode(reply.data, self._motion)
-            self._read_at_s.fill(now_s)
+            self._measured_at_s.fill(measured_at_s)
             if ok is not self._valid:
                 self._valid = ok
                 self._flags = self._frozen_flags()
@@ -132,7 +133,7 @@ class Readings:
         motion = np.empty_like(self._motion)
         self._decoder.decode(reply.data, motion)
         self._motion[:, ok] = motion[:, ok]
-        self._read_at_s[ok] = now_s
+        self._measured_at_s[ok] = measured_at_s
         self._error[reply.answered] = reply.error[reply.answered]
         alert = (reply.error & ALERT) != 0
         self._hardware_error[reply.answered & ~alert] = 0  # without the alert bit register 70 is 0
@@ -146,19 +147,24 @@ class Readings:
         self._alarmed = True
         self._flags = self._frozen_flags()
 
-    def update_slow(self, reply: GroupReadReply) -> None:
+    def update_slow(self, reply: GroupReadReply, measured_at_s: float) -> None:
         """Take the slow blocks: Present Input Voltage (2 bytes), Present Temperature (1)."""
         ok = reply.valid
         low, high = reply.data[ok, 0], reply.data[ok, 1].astype(np.uint16)
         self._voltage[ok] = (high << 8 | low) * VOLTAGE_UNIT_V
         self._temperature[ok] = reply.data[ok, 2]
+        self._slow_at_s[ok] = measured_at_s
+
+    def slow_at_s(self) -> float:
+        """When the oldest temperature and voltage were measured; before the first, -inf."""
+        return float(self._slow_at_s.min())
 
     def state(self, now_s: float) -> JointState:
         """Read-only copies of everything."""
         numbers = np.empty_like(self._numbers)
         _copy(self._numbers, now_s, numbers)
         numbers.setflags(write=False)
-        current, velocity, position, temperature, voltage, age_s = numbers
+        current, velocity, position, temperature, voltage, age_s, slow_age_s = numbers
         hardware_error, error, valid = self._flags
         return JointState(
             time_s=now_s,
@@ -171,6 +177,7 @@ class Readings:
             error=error,
             age_s=age_s,
             valid=valid,
+            slow_age_s=slow_age_s,
         )
 
     def _frozen_flags(self) -> tuple[Bytes, Bytes, Bools]:
@@ -180,11 +187,12 @@ class Readings:
 
 @compiled("void(float64[:, ::1], float64, float64[:, ::1])")
 def _copy(numbers: Floats, now_s: float, copy: Floats) -> None:
-    """Copy (6, J), with ages in place of the reading times in the last row."""
+    """Copy (7, J), with ages in place of the measuring times in the last two rows."""
     for joint in range(numbers.shape[1]):
         for row in range(5):
             copy[row, joint] = numbers[row, joint]
         copy[5, joint] = now_s - numbers[5, joint]
+        copy[6, joint] = now_s - numbers[6, joint]
 
 
 def _frozen(array: NDArray[S]) -> NDArray[S]:

@@ -36,6 +36,8 @@ from snakewalk.drivers.types import JointCommand, JointState
 SLOW_EVERY = 16
 """Cycles from one reading of voltages and temperatures to the next (ours); torque and watchdog are
 checked as often, in other cycles."""
+_SLOW_S = 1.0
+"""Age from which voltages and temperatures are read in every cycle until they come (ours)."""
 _OFF_ROUNDS = 3
 """Group reads in which the servos may confirm that their torque is off (ours)."""
 _OFF_S = 1.0
@@ -292,7 +294,7 @@ class ServoChain:
         return silent
 
     def read(self) -> JointState:
-        """Read all joints once; in every 16th call voltages and temperatures too.
+        """Read all joints once; voltages and temperatures in every 16th call and when overdue.
 
         Raises:
             BusError: a servo has lost its torque or a setting (it has rebooted, or another program
@@ -304,13 +306,16 @@ class ServoChain:
         reply = self._cycle.read()
         if self._fast_reads and not self._cycle.fast:
             self._report_plain_reads()
-        for joint in self._readings.update(reply, self._clock.now_s()):
+        measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
+        for joint in self._readings.update(reply, measured_at_s):
             self._read_alarm(int(joint))
         place = self._reads % SLOW_EVERY
         self._reads += 1
-        if place == 0:
-            self._readings.update_slow(self._slow.read())
-        elif self._armed and self._liveness is not None:
+        if place == 0 or measured_at_s - self._readings.slow_at_s() > _SLOW_S:
+            reply = self._slow.read()
+            slow_at_s = self._clock.now_s() - self._slow.since_sent_s
+            self._readings.update_slow(reply, slow_at_s)
+        if self._armed and self._liveness is not None:
             self._liveness.check(self._reads - 1)
         return self._readings.state(self._clock.now_s())
 
@@ -369,7 +374,7 @@ class ServoChain:
     def _first_state(self) -> JointState:
         for _ in range(_FIRST_READS):
             state = self.read()
-            if state.valid.all() and np.isfinite(state.voltage_v).all():
+            if state.valid.all() and state.slow_age_s.max() <= _SLOW_S:
                 return state
             self._reads = 0  # so that the slow state is read again, too
         silent = [str(i) for i, v in zip(self.robot.servo_ids, state.valid, strict=True) if not v]

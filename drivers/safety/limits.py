@@ -37,6 +37,8 @@ class SafetyLimits:
     voltage_min_v: float
     voltage_max_v: float
     stale_limit_s: float
+    slow_stale_limit_s: float
+    """The same for temperature and voltage."""
     following_limit_rad: Floats
     """(J,) how far a joint may be from its goal."""
     following_effort_a: Floats
@@ -65,6 +67,7 @@ class SafetyLimits:
             voltage_min_v=voltage_min_v,
             voltage_max_v=voltage_max_v,
             stale_limit_s=safety.stale_limit_s,
+            slow_stale_limit_s=safety.slow_stale_limit_s,
             following_limit_rad=np.array(safety.following_limits_rad(robot)),
             following_effort_a=np.array(
                 [np.inf if axis == "y" else effort_a for axis in robot.joint_axes]

@@ -139,7 +139,7 @@ def state_fault(
 ) -> str | None:
     """First reason to stop that the state gives; None if all is well.
 
-    Temperature and voltage that were not read yet (NaN) are no reason.
+    Temperature and voltage that were never read (NaN) are no reason: a link may have none.
     """
     stale = stale_fault(state, limits, now_s)
     if stale is not None:
@@ -157,6 +157,11 @@ def state_fault(
             "measured {:.3f} rad: forced beyond its limit",
         ),
         (over_s >= limits.current_time_s, state.current_a, "{:.2f} A for too long"),
+        (
+            ~np.isnan(state.temperature_c) & ~(state.slow_age_s <= limits.slow_stale_limit_s),
+            state.slow_age_s,
+            "temperature and voltage not read for {:.2f} s",
+        ),
         (
             state.temperature_c > limits.temperature_limit_c,
             state.temperature_c,
@@ -194,19 +199,19 @@ def _age_max_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> f
     try:
         return _quick_check(
             *(state.position_rad, state.velocity_rad_s, state.current_a),
-            *(state.temperature_c, state.voltage_v, state.age_s),
+            *(state.temperature_c, state.voltage_v, state.age_s, state.slow_age_s),
             *(state.error, state.hardware_error),
             limits.limit_rad,
             *(limits.limit_slack_rad, limits.current_limit_a, limits.temperature_limit_c),
-            *(limits.voltage_min_v, limits.voltage_max_v),
+            *(limits.voltage_min_v, limits.voltage_max_v, limits.slow_stale_limit_s),
         )
     except TypeError:  # a link with other number types: state_fault takes any
         return math.nan
 
 
 @compiled(
-    f"float64({_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, {_BYTES}, {_BYTES},"
-    f" {_FLOATS}, float64, float64, float64, float64, float64)"
+    f"float64({', '.join([_FLOATS] * 7)}, {_BYTES}, {_BYTES}, {_FLOATS},"
+    " float64, float64, float64, float64, float64, float64)"
 )
 def _quick_check(
     position_rad: Floats,
@@ -215,6 +220,7 @@ def _quick_check(
     temperature_c: Floats,
     voltage_v: Floats,
     age_s: Floats,
+    slow_age_s: Floats,
     error: Bytes,
     hardware_error: Bytes,
     limit_rad: Floats,
@@ -223,6 +229,7 @@ def _quick_check(
     temperature_max_c: float,
     voltage_min_v: float,
     voltage_max_v: float,
+    slow_age_max_s: float,
 ) -> float:
     """Greatest age if every value is a number inside its limits and there is no error; else NaN."""
     age_max_s = -np.inf
@@ -235,6 +242,7 @@ def _quick_check(
             and temperature_c[k] <= temperature_max_c
             and voltage_min_v <= voltage_v[k] <= voltage_max_v
             and age_s[k] < np.inf
+            and slow_age_s[k] <= slow_age_max_s
         )
         if not inside or error[k] or hardware_error[k]:
             return np.nan

@@ -125,6 +125,7 @@ def make_log(
                 np.zeros(joints, dtype=np.uint8),
                 np.where(valid, 0.0, 0.02),
                 valid,
+                np.zeros(joints),
             )
             log.cycle(
                 t,

@@ -14,7 +14,7 @@ ROBOT = load_robot("yaw16")
 def state(time_s: float, joints: np.ndarray) -> JointState:
     z = np.zeros(16)
     byte = np.zeros(16, np.uint8)
-    return JointState(time_s, joints, z, z, z, z, byte, byte, z, np.ones(16, bool))
+    return JointState(time_s, joints, z, z, z, z, byte, byte, z, np.ones(16, bool), z)
 
 
 def test_it_follows_the_forecast_from_the_joints_alone() -> None:

@@ -40,9 +40,8 @@ def turn_between(one: float, other: float) -> float:
 def state_at(time_s: float, joints: np.ndarray) -> JointState:
     count = len(joints)
     still, none = np.zeros(count), np.zeros(count, dtype=np.uint8)
-    return JointState(
-        time_s, joints, still, still, still, still, none, none, still, np.ones(count, dtype=bool)
-    )
+    read = np.ones(count, dtype=bool)
+    return JointState(time_s, joints, still, still, still, still, none, none, still, read, still)
 
 
 @pytest.mark.parametrize("heading", [0.0, 1.3, -2.6])

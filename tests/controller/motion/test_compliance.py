@@ -37,6 +37,7 @@ def state(current_a: float | np.ndarray, *, valid: bool = True, at_s: float = 0.
         error=np.zeros(J, np.uint8),
         age_s=np.full(J, 0.0 if valid else 0.02),
         valid=np.full(J, valid),
+        slow_age_s=np.zeros(J),
     )
 
 

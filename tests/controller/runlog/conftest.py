@@ -26,7 +26,10 @@ def joint_state(k: int) -> JointState:
         age[3], valid[3] = 0.02, False
     slow = np.full(JOINTS, np.nan) if k < 25 else np.full(JOINTS, 30.0 + k // 50)
     zeros = np.zeros(JOINTS, dtype=np.uint8)
-    return JointState(t, q, 2.1 * q, 0.5 * np.abs(q), slow, slow / 2.5, zeros, zeros, age, valid)
+    slow_age = np.where(np.isnan(slow), np.inf, 0.0)
+    return JointState(
+        t, q, 2.1 * q, 0.5 * np.abs(q), slow, slow / 2.5, zeros, zeros, age, valid, slow_age
+    )
 
 
 def write_log(path: Path, cycles: int) -> Path:

@@ -28,6 +28,7 @@ def state(celsius: float = 30.0, volts: float = 12.0, amps: float = 0.3) -> Join
         error=np.zeros(J, np.uint8),
         age_s=np.zeros(J),
         valid=np.ones(J, bool),
+        slow_age_s=np.zeros(J),
     )
 
 

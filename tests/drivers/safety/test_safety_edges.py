@@ -105,6 +105,7 @@ def test_the_quick_check_passes_what_is_at_its_limit_and_nothing_beyond() -> Non
         temperature_c=np.full(J, LIMITS.temperature_limit_c),
         voltage_v=np.array([LIMITS.voltage_min_v, LIMITS.voltage_max_v, 12.0]),
         age_s=np.array([0.0, 0.05, 0.01]),
+        slow_age_s=np.array([0.0, LIMITS.slow_stale_limit_s, 0.3]),
     )
     assert _age_max_s(at_limits, memory(), LIMITS) == 0.05
     beyond = {
@@ -118,6 +119,7 @@ def test_the_quick_check_passes_what_is_at_its_limit_and_nothing_beyond() -> Non
             np.full(J, np.nan),
         ],
         "age_s": [np.full(J, np.inf), np.full(J, np.nan)],
+        "slow_age_s": [np.full(J, LIMITS.slow_stale_limit_s + 1e-9), np.full(J, np.nan)],
         "error": [np.full(J, 1, np.uint8)],
         "hardware_error": [np.full(J, 0x20, np.uint8)],
     }

@@ -25,6 +25,7 @@ LIMITS = SafetyLimits(
     voltage_min_v=10.0,
     voltage_max_v=14.8,
     stale_limit_s=0.1,
+    slow_stale_limit_s=3.0,
     following_limit_rad=np.array([0.4, 0.4, 0.4]),
     following_effort_a=np.array([np.inf, 0.05, np.inf]),
     following_time_s=0.5,
@@ -49,6 +50,7 @@ def state(**changes: object) -> JointState:
         error=np.zeros(J, np.uint8),
         age_s=np.zeros(J),
         valid=np.ones(J, np.bool_),
+        slow_age_s=np.zeros(J),
     )
     return calm._replace(**changes)  # type: ignore[arg-type]
 
@@ -129,6 +131,9 @@ class TestVetoesAtTheirBoundary:
     def test_stale_state(self, joint: int, offset: float) -> None:
         assert vetoed(state(age_s=one(0.1 + offset, joint))) == (offset > 0)
 
+    def test_stale_temperature_and_voltage(self, joint: int, offset: float) -> None:
+        assert vetoed(state(slow_age_s=one(3.0 + offset, joint))) == (offset > 0)
+
     def test_state_that_aged_since_it_was_read(self, joint: int, offset: float) -> None:
         old = state(age_s=one(0.04, joint), time_s=NOW - 0.06 - offset)
         if offset != 0:  # at the edge itself rounding decides
@@ -176,9 +181,9 @@ def test_what_is_not_a_number_is_vetoed(bad: float, joint: int) -> None:
     verdict = vetted(one(bad, joint))
     assert verdict.veto == f"{LIMITS.joint_names[joint]}: commanded {bad}: not a number"
     assert (verdict.goal_rad == 0.0).all()
-    for name in ("position_rad", "velocity_rad_s", "current_a", "age_s"):
+    for name in ("position_rad", "velocity_rad_s", "current_a", "age_s", "slow_age_s"):
         assert vetted(now=state(**{name: one(bad, joint)})).veto is not None or (
-            name == "age_s" and bad == -np.inf
+            name in ("age_s", "slow_age_s") and bad == -np.inf
         )
 
 
@@ -209,7 +214,9 @@ def test_a_refused_read_alone_is_no_veto(code: int) -> None:
 
 def test_what_was_not_read_yet_is_no_reason() -> None:
     unread = np.full(J, np.nan)
-    assert vetted(now=state(temperature_c=unread, voltage_v=unread)).veto is None
+    never = np.full(J, np.inf)
+    now = state(temperature_c=unread, voltage_v=unread, slow_age_s=never)
+    assert vetted(now=now).veto is None
 
 
 angles = st.floats(-3.0, 3.0)
