@@ -3,7 +3,7 @@
 The library and every piece of a walk are tested by them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -53,7 +53,7 @@ def shape_filters(
     }
 
 
-def passes_all(filters: dict[str, ShapeFilter]) -> Callable[[Floats], bool]:
+def passes_all(filters: Mapping[str, ShapeFilter]) -> Callable[[Floats], bool]:
     """Return a test of one body (N,): whether it passes every filter."""
 
     def passes(body_rad: Floats) -> bool:
