@@ -64,7 +64,13 @@ class BehaviourConfig(Strict):
 
     pulse_body_lengths_s: float = Field(0.25, gt=0.0, le=3.0)
     sliding: float = Field(0.0, ge=0.0, lt=1.0, description="w_d")
-    curvature: float = Field(1.0, gt=0.0, le=2.0, description="scales every shape's bends")
+    curvature: float | None = Field(
+        None,
+        gt=0.0,
+        le=2.0,
+        description="scales every shape's bends; by default 1, and more where the ground's "
+        "friction leaves narrow bends no hold",
+    )
 
 
 class SafetyConfig(Strict):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.arrays import Bools, Complexes, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.synthesis import WavesConfig
 from snakewalk.controller.shape.states import (
@@ -19,6 +19,8 @@ from snakewalk.controller.shape.states import (
 ShapeFilter = Callable[[Floats], Bools]
 """Shapes (S, N) to a mask (S,) of those that cannot be used."""
 _ROUNDS = 50
+_FACTORS = (1.0, 1.2, 1.4, 1.6, 1.8, 2.0)
+_DRAWN, _ENOUGH = 200, 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,8 @@ class StateLibrary:
     """The first so many come from the recording, the rest are random."""
     rejected: dict[str, int]
     """Random and recorded states refused, by the first reason."""
+    curvature: float
+    """Factor on the bends of the recorded shapes."""
     energy_kept: float
     """Share of the recorded shapes' energy that the coefficients hold, mean over the frames."""
 
@@ -48,11 +52,14 @@ def build_library(
     *,
     coefficients: int,
     random_count: int,
-    curvature: float,
+    curvature: float | None,
     rng: np.random.Generator,
     waves: WavesConfig | None = None,
 ) -> StateLibrary:
     """Turn tangent angles (T, N) into states, add ``random_count`` random ones, filter all.
+
+    Bends are scaled by ``curvature``; None takes the least of 1, 1.2, ... 2 at which a fifth of
+    random states passes the filters, or where most do.
 
     Where kinds of waves are wanted ([PT] 2.6.6), the library holds random states of these only, in
     the wanted parts.
@@ -62,7 +69,10 @@ def build_library(
 
     """
     points = track_rad.shape[-1]
-    states = curvature * to_states(track_rad, coefficients)
+    states = to_states(track_rad, coefficients)
+    if curvature is None:
+        curvature = _wide_enough(states, filters, points)
+    states = curvature * states
     rejected = dict.fromkeys(filters, 0)
     recorded, made = np.empty((0, points)), [np.empty((0, points))]
     for wanted, band in _counts(random_count, waves):
@@ -86,7 +96,19 @@ def build_library(
             "is anything else, or take another track"
         )
     kept = float(energy_kept(track_rad, coefficients).mean())
-    return StateLibrary(np.concatenate([recorded, fresh]), len(recorded), rejected, kept)
+    shapes_rad = np.concatenate([recorded, fresh])
+    return StateLibrary(shapes_rad, len(recorded), rejected, curvature, kept)
+
+
+def _wide_enough(states: Complexes, filters: dict[str, ShapeFilter], points: int) -> float:
+    """Return the factor on bends at which enough random states can be used (ours)."""
+    shares = []
+    for factor in _FACTORS:
+        drawn = random_states(factor * states, _DRAWN, np.random.default_rng(0))
+        shares.append(len(_passing(to_angles(drawn, points), filters, {})) / _DRAWN)
+        if shares[-1] >= _ENOUGH:
+            return factor
+    return _FACTORS[int(np.argmax(shares))]
 
 
 def _counts(
@@ -105,6 +127,6 @@ def _passing(shapes: Floats, filters: dict[str, ShapeFilter], rejected: dict[str
         if len(shapes) == 0:
             break
         bad = refuses(shapes)
-        rejected[name] += int(bad.sum())
+        rejected[name] = rejected.get(name, 0) + int(bad.sum())
         shapes = shapes[~bad]
     return shapes

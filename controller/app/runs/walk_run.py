@@ -216,12 +216,25 @@ class WalkRun:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user would not expect of the shapes, one line each."""
-        if self.run.motion == "serpenoid" or self.library.recorded:
+        if self.run.motion == "serpenoid":
             return ()
+        lines = []
+        if self.run.behaviour.curvature is None and self.library.curvature > 1.0:
+            lines.append(
+                f"every bend is {self.library.curvature:g} times as wide as recorded: this "
+                "ground's friction leaves narrower ones no hold (behaviour.curvature)"
+            )
+        if not self.library.recorded:
+            lines.append(self._no_recorded)
+        return tuple(lines)
+
+    @property
+    def _no_recorded(self) -> str:
+        """Why no shape is the animal's."""
         return (
             f"no shape of {self.run.track} is used: the robot or the ground refuses them all; the "
             f"walk is made of {len(self.library.shapes_rad)} random ones "
-            f"(why: snakewalk track {self.run.track})",
+            f"(why: snakewalk track {self.run.track})"
         )
 
     def walker(self, library: StateLibrary, filters: Mapping[str, ShapeFilter]) -> Walker:

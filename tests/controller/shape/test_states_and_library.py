@@ -129,6 +129,24 @@ def test_a_robot_that_cannot_make_the_states_is_told_so_with_reasons() -> None:
         )
 
 
+@pytest.mark.parametrize(
+    ("across", "least", "most"), [(0.7, 1.0, 1.0), (0.15, 1.2, 1.8), (0.12, 1.4, 2.0)]
+)
+def test_bends_are_as_wide_as_the_friction_asks(across: float, least: float, most: float) -> None:
+    friction = FrictionConfig(along=0.1, across=across)
+    filters = {"traction": lambda x: quasi_static_gain(x, friction) < 0.6}
+    made = build_library(
+        embedded("worm-like").angles_rad,
+        filters,
+        coefficients=7,
+        random_count=40,
+        curvature=None,
+        rng=np.random.default_rng(1),
+    )
+    assert least <= made.curvature <= most
+    assert (quasi_static_gain(made.shapes_rad, friction) >= 0.6).all()
+
+
 @pytest.mark.parametrize("name", EMBEDDED)
 def test_embedded_waves_travel_from_head_to_tail(name: str) -> None:
     angles = embedded(name).angles_rad
