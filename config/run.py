@@ -14,7 +14,15 @@ from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.synthesis import SynthesisConfig
 
 MotionName = Literal[
-    "walk", "walk-printed", "walk-blind", "serpenoid", "gait", "playback", "repertoire", "source"
+    "walk",
+    "walk-printed",
+    "walk-blind",
+    "kp",
+    "serpenoid",
+    "gait",
+    "playback",
+    "repertoire",
+    "source",
 ]
 
 _FULL_OUTPUT_RAD = 885 * 128 * 2.0 * math.pi / 4096
@@ -139,7 +147,9 @@ class RunConfig(Strict):
     world: str = Field("flat", description="a shipped world's name or a TOML path")
     track: str = Field("worm-like", description="a shipped recording's name or a file")
     motion: MotionName = Field(
-        "walk", description="source: a motion source of your own, run by `prepare_source`"
+        "walk",
+        description="kp: on paper only, `snakewalk synthesise`; source: a motion source of your "
+        "own, run by `prepare_source`",
     )
     waypoints_m: tuple[tuple[float, float], ...] = Field(
         (), description="in order; gait, playback and source need none"

@@ -64,6 +64,25 @@ class Analysis:
         ratio = self._over_pulse(self.advance.head_speed(self.pulse.points_per_frame))
         return None if ratio is None or abs(ratio) < 1e-3 else 1.0 - 1.0 / ratio
 
+    @property
+    def slope_rad(self) -> Floats:
+        """``abs(Theta_n(n, t))`` of the frames of ``pulse``, (S, N) rad a point."""
+        return np.abs(np.gradient(self.track.angles_rad[self.pulse.frame], axis=1))
+
+    @property
+    def error_slope(self) -> tuple[float, float] | None:
+        """How the error of one pulse speed for the whole body follows ``abs(Theta_n)``.
+
+        [PT] 2.4 calls the absolute error proportional to it (Fig. 5(a)): slope through the origin,
+        points, and correlation, over all frames and points.
+        """
+        error, slope = np.abs(self.pulse.body_error_rad), self.slope_rad
+        seen = np.isfinite(error)
+        if seen.sum() < 3 or min(np.ptp(error[seen]), np.ptp(slope[seen])) < 1e-12:
+            return None
+        points = float((error[seen] * slope[seen]).sum() / (slope[seen] ** 2).sum())
+        return points, float(np.corrcoef(error[seen], slope[seen])[0, 1])
+
     def _over_pulse(self, speed: Floats) -> float | None:
         """Ratio of a speed (S, N) to the pulse speed, weighted by how well a shift is seen."""
         both = np.isfinite(self.pulse.points_per_frame)
@@ -80,6 +99,8 @@ class Analysis:
         spread = np.percentile(u[known], [25.0, 75.0]) * scale if known.any() else [np.nan] * 2
         angle, lateral = self.undulation.angle_rad, self.undulation.lateral
         at = [0, 25, 50, 75, 99]
+        points, correlation = (None, None) if self.error_slope is None else self.error_slope
+        rms = np.sqrt(np.nanmean(pulse.body_error_rad**2)) if known.any() else np.nan
         return {
             "recording": track.name,
             "frames": track.frames,
@@ -100,6 +121,9 @@ class Analysis:
             "pulse_frames_compared": pulse.step,
             "pulse_measured_share": round(float(known.mean()), 3),
             "wave_speed_body_lengths_s": round(wave.pulse_body_lengths_s, 4),
+            "one_pulse_error_rad": _number(float(rms), 4),
+            "one_pulse_error_over_slope_points": _number(points, 3),
+            "one_pulse_error_correlation": _number(correlation, 3),
             "travel": _number(self.travel, 3),
             "sliding_weight": _number(self.sliding, 3),
             "angle_amplitude_rad": [round(float(angle[k]), 3) for k in at],

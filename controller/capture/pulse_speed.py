@@ -35,6 +35,11 @@ class PulseSpeed:
     """(S,) index of the later frame of each pair."""
     step: int
     """Frames from the earlier to the later of a pair; speeds are divided by it."""
+    body_points_per_frame: Floats
+    """(S,) one speed for the whole body: the mean of U, weighted by slope squared; or NaN."""
+    body_error_rad: Floats
+    """(S, N) signed error of that model, ``Theta(n - U(t)) - Theta(n)``, [PT] Fig. 5(a); NaN where
+    the pattern came from beyond the body."""
 
     @property
     def typical(self) -> float:
@@ -93,13 +98,34 @@ def measure_pulse_speed(
     inside = (ahead > _EDGE) & (behind > _EDGE) & (np.abs(shift) < most - 0.5)
     known = inside & (slope > LEAST_SLOPE * usual) & np.isfinite(best)
     _forget_beyond(known, shift, most)
+    whole = _whole_body(shift, np.where(known, slope**2, 0.0))
     return PulseSpeed(
         points_per_frame=np.where(known, shift, np.nan) / step,
         slope=slope,
         error_rad=np.sqrt(np.where(known, best, np.nan) / NEIGHBOURS),
         frame=later,
         step=step,
+        body_points_per_frame=whole / step,
+        body_error_rad=_estimate(before, whole) - now,
     )
+
+
+def _whole_body(shift: Floats, weight: Floats) -> Floats:
+    """Weighted mean (S,) of shifts (S, N); NaN where all weights are 0."""
+    total = weight.sum(axis=1)
+    moved = (weight * np.where(weight > 0.0, shift, 0.0)).sum(axis=1)
+    return np.where(total > 0.0, moved / np.where(total > 0.0, total, 1.0), np.nan)
+
+
+def _estimate(before: Floats, shift: Floats) -> Floats:
+    """``Theta_e(n) = Theta(n - U)``, (S, N), linear between points; NaN from beyond the body."""
+    last = before.shape[1] - 1
+    place = np.arange(last + 1) - shift[:, None]
+    seen = (place >= 0.0) & (place <= last)
+    safe = np.where(seen, place, 0.0)
+    low = np.minimum(safe.astype(np.int64), last - 1)
+    start, end = (np.take_along_axis(before, low + k, axis=1) for k in (0, 1))
+    return np.where(seen, start + (safe - low) * (end - start), np.nan)
 
 
 def _forget_beyond(known: Bools, shift: Floats, most: int) -> None:

@@ -143,7 +143,7 @@ def synthesise(
     points, speed = np.empty((frames, len(n) + 1, 2)), np.empty(frames)
     place[0], speed[0] = ahead - n - 1, speed_m_s
     angles[0], _ = _posture(track.body_rad(track.points) + heading_rad, how, 0)
-    points[0] = _chain(angles[0], segment_m) + head_m
+    points[0] = chain(angles[0], segment_m) + head_m
     turn, last = 0.0, frames - 1
     mean, bend = _moments(angles[0])
     for t in range(1, frames):
@@ -159,7 +159,7 @@ def synthesise(
         angles[t], leader = _posture(track.at_rad(place[t]) + heading_rad, how, t)
         was, (mean, bend) = mean, _moments(angles[t])
         turn = (mean - was) / dt_s
-        shape, step = _chain(angles[t], segment_m), speed[t] * dt_s
+        shape, step = chain(angles[t], segment_m), speed[t] * dt_s
         along = step * np.array([cos(angles[t, leader]), sin(angles[t, leader])])
         points[t] = shape + (points[t - 1, leader] + along - shape[leader])
     made = slice(0, last + 1)
@@ -223,7 +223,7 @@ def _moments(angles_rad: Floats) -> tuple[float, float]:
 
 
 @compiled(f"float64[:, ::1]({_VALUES}, float64)")
-def _chain(angles_rad: Floats, segment_m: float) -> Floats:
+def chain(angles_rad: Floats, segment_m: float) -> Floats:
     """(N + 1, 2): ``P(0)`` is the origin, ``P(n) = P(n - 1) - r [cos Theta, sin Theta]``."""
     points = np.zeros((len(angles_rad) + 1, 2))
     for n in range(len(angles_rad)):
@@ -232,6 +232,7 @@ def _chain(angles_rad: Floats, segment_m: float) -> Floats:
     return points
 
 
+_PATH_POINTS = 200
 Replan = Callable[[Floats, float], SplinePath]
 """Takes points (W + 1, 2), from the head through the waypoints left, and the body's heading."""
 
@@ -262,19 +263,21 @@ class Targets:
         """(L,) whether each is a waypoint."""
         self._marks_m: list[float] = []
         self._ahead: list[tuple[float, float]] = []
+        self._planned: list[tuple[int, SplinePath]] = []
+        self.current: list[int] = []
+        """n at each frame."""
         self._extend(path, waypoints_m)
         self.index = 0
         """n, from 0; L when all are reached."""
         self.missed = 0
         """How often a waypoint was passed by, and a new path planned to it."""
-        self.current: list[int] = []
-        """n at each frame."""
         self.distance_m: list[float] = []
         """D_n at each frame, to the target in force after it."""
 
     def _extend(self, path: SplinePath, waypoints_m: Floats) -> None:
         """Go on along a path through waypoints (W, 2)."""
         self.path, self._head_s_m, at_s_m = path, 0.0, 0.0
+        self._planned.append((len(self.current), path))
         for waypoint in waypoints_m:
             to_s_m = max(path.first_pass(waypoint, at_s_m), at_s_m)
             pieces = max(1, int(np.ceil((to_s_m - at_s_m) / self._spacing_m - 1e-9)))
@@ -285,6 +288,13 @@ class Targets:
             self._ahead += [(cos(heading), sin(heading)) for heading in headings_rad]
             self.required = np.append(self.required, [False] * (pieces - 1) + [True])
             at_s_m = to_s_m
+
+    def paths(self, rate_hz: float) -> list[tuple[float, Floats]]:
+        """Time, s, from when on each planned path was in force, and (P, 2) points of it."""
+        return [
+            (frame / rate_hz, path.position(np.linspace(0.0, path.length_m, _PATH_POINTS)))
+            for frame, path in self._planned
+        ]
 
     @property
     def count(self) -> int:

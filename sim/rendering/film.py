@@ -55,7 +55,7 @@ def render_film(
         world: where.
         ground: its height field, None if flat.
         time_s: increasing, s.
-        qpos: ``MujocoPlant.qpos`` at these times.
+        qpos: ``MujocoPlant.qpos`` at these times; of a free look, (T, 7 L).
         path: of the film; its folder exists.
         fps: frames a second of film.
         speed_up: seconds of run a second of film.
@@ -85,14 +85,15 @@ def render_film(
         faults.append(f"film: width and height must be even, not {size[0]} x {size[1]}")
     if faults:
         raise InputError(faults)
-    shots = poses_at(times, poses, np.arange(times[0], times[-1], speed_up / fps))
+    bodies = len(look.rest_m) if look is not None and look.free else 1
+    shots = poses_at(times, poses, np.arange(times[0], times[-1], speed_up / fps), bodies)
     model = dressed_model(
         robot, world, ground, waypoints_m, waypoint_radius_m, look=look, fine=fine
     )
     data = mujoco.MjData(model)
     camera = _camera(model, data, shots, fps, robot.length_m)
     trail = make_trail(paths, times, poses, ground)
-    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + robot.joint_count + 11 + trail.most)
+    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + model.nbody + 11 + trail.most)
     scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
     scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
     view, option = mujoco.MjvCamera(), mujoco.MjvOption()
@@ -120,13 +121,19 @@ def render_film(
     return len(shots)
 
 
-def poses_at(time_s: Floats, qpos: Floats, at_s: Floats) -> Floats:
-    """Poses (F, 7 + J) at ``at_s``, linear between the recorded ones; quaternions stay unit."""
+def poses_at(time_s: Floats, qpos: Floats, at_s: Floats, bodies: int = 1) -> Floats:
+    """Poses (F, 7 + J) at ``at_s``, linear between the recorded ones; quaternions stay unit.
+
+    The first ``bodies`` groups of seven columns are place and quaternion of a floating body each.
+    """
     q = qpos.copy()
-    flips = np.where((q[1:, 3:7] * q[:-1, 3:7]).sum(axis=1) < 0.0, -1.0, 1.0)
-    q[1:, 3:7] *= flips.cumprod()[:, None]
+    turns = [slice(7 * k + 3, 7 * k + 7) for k in range(bodies)]
+    for turn in turns:
+        flips = np.where((q[1:, turn] * q[:-1, turn]).sum(axis=1) < 0.0, -1.0, 1.0)
+        q[1:, turn] *= flips.cumprod()[:, None]
     out = np.column_stack([np.interp(at_s, time_s, column) for column in q.T])
-    out[:, 3:7] /= np.linalg.norm(out[:, 3:7], axis=1, keepdims=True)
+    for turn in turns:
+        out[:, turn] /= np.linalg.norm(out[:, turn], axis=1, keepdims=True)
     return out
 
 

@@ -52,6 +52,9 @@ class SkinLook:
     """(L, 3) origins of the links' bodies at rest: the middle of the head, then the joints."""
     texture: Image | None
     """(H, W, 3), first row at v = 1; None is the colour of ``BACK``."""
+    free: bool = False
+    """Whether each link floats by itself, as the bones of a motion that no robot makes: a pose is
+    then (7 L,), place and unit quaternion of each."""
 
 
 def dressed_model(
@@ -70,6 +73,8 @@ def dressed_model(
     a software renderer.
     """
     spec = mujoco.MjSpec.from_string(mjcf(robot, world, ground, 0.002))
+    if look is not None and look.free:
+        _replace_robot(spec, len(look.rest_m))
     for geom in spec.geoms:
         geom.group = 4 if geom.name.startswith("belly") else 0  # bellies are not drawn
     _light(spec, robot, fine)
@@ -93,6 +98,15 @@ def dressed_model(
     if ground is not None:
         _paint(model, ground)
     return model
+
+
+def _replace_robot(spec: mujoco.MjSpec, bones: int) -> None:
+    """Put floating bodies in the place of the robot's links."""
+    spec.delete(spec.body("link0"))
+    for k in range(bones):
+        bone = spec.worldbody.add_body(name=f"link{k}", mass=1.0, inertia=[1.0, 1.0, 1.0])
+        bone.explicitinertial = True
+        bone.add_freejoint()
 
 
 def mark_reached(model: mujoco.MjModel, waypoint: int) -> None:

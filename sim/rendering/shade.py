@@ -31,7 +31,7 @@ def add_shade(
         scene: what is about to be drawn.
         links_m: (L, 3) centres of the links.
         forward: (L, 3) their axes.
-        robot: length and radius of a link.
+        robot: length and radius of the body.
         ground: None on a plane.
 
     """
@@ -42,7 +42,9 @@ def add_shade(
     side = np.cross(normal, ahead)
     thin = 1.0 - 0.5 * np.clip(np.linspace(0.0, 1.0, len(links_m)) - 0.55, 0.0, None) / 0.45
     for k in range(len(links_m)):
-        size = np.array([0.62 * robot.link_length_m, thin[k] * robot.body_radius_m, 0.001])
+        size = np.array(
+            [0.62 * robot.length_m / len(links_m), thin[k] * robot.body_radius_m, 0.001]
+        )
         axes = np.stack([ahead[k], side[k], normal[k]], axis=1).ravel()
         patch = scene.geoms[scene.ngeom]
         mujoco.mjv_initGeom(patch, mujoco.mjtGeom.mjGEOM_ELLIPSOID, size, place[k], axes, DARK)

@@ -5,12 +5,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.world import WaterGround
 from snakewalk.controller.runlog.record import Header
 
 if TYPE_CHECKING:
+    from snakewalk.controller.app.recordings.body_skin import BodySkin
+    from snakewalk.controller.capture.mesh.skin import Skin
     from snakewalk.sim.rendering.looks import SkinLook
 
 SERVOS: Final = "servos"
@@ -52,32 +55,55 @@ def skin_look(look: str, header: Header) -> "SkinLook | None":
     require_extra("a skin needs", "trimesh", "mujoco")
     from snakewalk.controller.app.recordings.body_motion import robot_skin  # noqa: PLC0415  an extra
     from snakewalk.controller.app.recordings.body_skin import body_skin  # noqa: PLC0415
-    from snakewalk.controller.capture.mesh.skin import rest_fronts_m, weights  # noqa: PLC0415
-    from snakewalk.sim.rendering.looks import SkinLook  # noqa: PLC0415
+    from snakewalk.controller.capture.mesh.skin import rest_fronts_m  # noqa: PLC0415
 
-    dressed = body_skin(_animal(header) if look == ANIMAL else look)
+    dressed = body_skin(animal(header.run.track) if look == ANIMAL else look)
     robot = header.robot
     skin = robot_skin(dressed.skin, robot, isinstance(header.world.ground, WaterGround))
     bone_m = np.full(robot.joint_count + 1, robot.link_length_m)
-    held = weights(skin, bone_m)
     origins = rest_fronts_m(bone_m, skin.axis_m)  # a body begins at its joint, the head's amidst
     origins[0, 0] -= 0.5 * robot.link_length_m
+    return _look(skin, bone_m, origins, dressed.texture)
+
+
+def bone_look(dressed: "BodySkin", skin: "Skin", bone_m: Floats) -> "SkinLook":
+    """Make a look of floating bones (K,), for a motion that no robot makes.
+
+    Args:
+        dressed: whose texture is worn.
+        skin: its skin, of the motion's size.
+        bone_m: lengths of the bones; a body begins at its bone's front.
+
+    """
+    from snakewalk.controller.capture.mesh.skin import rest_fronts_m  # noqa: PLC0415  an extra
+
+    origins = rest_fronts_m(bone_m, skin.axis_m)
+    return _look(skin, bone_m, origins, dressed.texture, free=True)
+
+
+def _look(
+    skin: "Skin", bone_m: Floats, origins_m: Floats, texture: Image | None, *, free: bool = False
+) -> "SkinLook":
+    from snakewalk.controller.capture.mesh.skin import weights  # noqa: PLC0415  an extra
+    from snakewalk.sim.rendering.looks import SkinLook  # noqa: PLC0415
+
+    held = weights(skin, bone_m)
     return SkinLook(
         vertices_m=skin.mesh.vertices,
         uv=skin.mesh.uv,
         faces=skin.mesh.faces,
         link=held.bones,
         share=held.shares,
-        rest_m=origins,
-        texture=dressed.texture,
+        rest_m=origins_m,
+        texture=texture,
+        free=free,
     )
 
 
-def _animal(header: Header) -> str:
-    """Name of the body that the run's motion was captured from."""
+def animal(track: str) -> str:
+    """Name of the body that a motion was captured from: the recording's, or a plain snake."""
     from snakewalk.controller.capture.mesh.body_model import read_silhouettes  # noqa: PLC0415
 
-    track = header.run.track
     try:
         read_silhouettes(Path(track))
     except InputError:

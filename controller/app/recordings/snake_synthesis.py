@@ -1,5 +1,6 @@
 """A snake's motion without a robot: library, path, walk, speed, skeleton, ground ([PT] 2.6)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.synthesis import Along, Curve, SynthesisConfig, along_body, curve_at
 from snakewalk.controller.app.runs.walk_run import POINTS, WalkRun
+from snakewalk.controller.capture.mesh.bone_motion import BoneMotion, from_points
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.mechanics.ground_step import (
     GroundedSkeleton,
@@ -17,8 +19,10 @@ from snakewalk.controller.mechanics.ground_step import (
 )
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
+from snakewalk.controller.shape.states import to_states
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.controller.walk.graph_motion import graph_angles, graph_motion
 from snakewalk.controller.walk.synthesis import (
     Behaviour,
     Locomotion,
@@ -69,6 +73,22 @@ class SynthesisedWalk:
         """(T,) of the frames."""
         return np.arange(len(self.plan.speed_m_s)) / self.rate_hz
 
+    def bones(self, segments: int = 1) -> BoneMotion:
+        """Bones on the ground; each is ``segments`` of the skeleton's, a divisor of their number.
+
+        Raises:
+            InputError: the motion stands upright somewhere.
+
+        """
+        return from_points(self.skeleton.points_m[:, ::segments], self.time_s)
+
+    def reached_s(self) -> list[float]:
+        """When each of the waypoints that were reached was reached."""
+        current = np.array(self.targets.current)
+        ends = np.flatnonzero(self.targets.required) + 1
+        at = [np.flatnonzero(current >= end) for end in ends]
+        return [float(self.time_s[frames[0]]) for frames in at if len(frames)]
+
     def facts(self) -> dict[str, object]:
         """Plain numbers, for the table and JSON."""
         plan, targets = self.plan, self.targets
@@ -114,6 +134,16 @@ class SynthesisedWalk:
             tongue=self.tongue,
             state=state[np.searchsorted(at, frames, side="right") - 1],
         )
+
+
+@dataclass(frozen=True, slots=True)
+class _Curves:
+    """The behaviour at every frame."""
+
+    sliding: Floats
+    pulse_m_s: Floats
+    head_held: Floats
+    calm_tail: Floats
 
 
 class SnakeSynthesis:
@@ -167,45 +197,20 @@ class SnakeSynthesis:
             run.walk.carrot_m,
             self.prepared.planner,
         )
-        printed = run.motion == "walk-printed"
-        walker = self.prepared.walker(self.library, self.shape_filters)
-        heading_rad = self.prepared.start_heading_rad
-        states, at = [(0, 0)], [0]
+        curves = _Curves(
+            self._over(how.sliding, how.sliding_along, most),
+            self._over(how.pulse_m_s, how.pulse_along, most) + self._varied(most),
+            curve_at(how.head_held, np.arange(most) * self.dt_s),
+            curve_at(how.calm_tail, np.arange(most) * self.dt_s),
+        )
 
-        def observe(frame: int, points_m: Floats) -> bool:
-            at[0] = frame + 1
+        def until(points_m: Floats) -> bool:
             return targets.observe(points_m) and frames is None
 
-        def grow(_: AngleTrack, points_m: Floats) -> None:
-            mean_rad = heading_rad + float(walker.track.body_rad(walker.track.end).mean())
-            aim_rad = (
-                targets.printed_aim_rad(points_m)
-                if printed
-                else targets.aim_rad(points_m, mean_rad)
-            )
-            states.append((at[0], walker.decide(heading_rad, aim_rad).state))
-
-        sliding = self._over(how.sliding, how.sliding_along, most)
-        pulse = self._over(how.pulse_m_s, how.pulse_along, most) + self._varied(most)
-        time_s = np.arange(most) * self.dt_s
-        held, calm = curve_at(how.head_held, time_s), curve_at(how.calm_tail, time_s)
-        plan = synthesise(
-            walker.track,
-            self.law,
-            most,
-            self.dt_s,
-            self.segment_m,
-            grow,
-            Behaviour(
-                sliding=lambda t: sliding[t],
-                pulse_m_s=lambda t: pulse[t],
-                head_held=lambda t: held[t],
-                calm_tail=lambda t: calm[t],
-            ),
-            head_m=run.start_m,
-            heading_rad=heading_rad,
-            until=observe,
-        )
+        if run.motion == "kp":
+            plan, states = self._on_graph(most, until)
+        else:
+            plan, states = self._on_star(most, targets, curves, until)
         made = len(plan.speed_m_s)
         half_m = half_heights_m(robot, POINTS)
         return SynthesisedWalk(
@@ -217,12 +222,74 @@ class SnakeSynthesis:
             targets,
             states,
             self.library,
-            sliding[:made],
-            pulse[:made],
-            held[:made],
-            calm[:made],
+            curves.sliding[:made],
+            curves.pulse_m_s[:made],
+            curves.head_held[:made],
+            curves.calm_tail[:made],
             self._tongue(made),
         )
+
+    def _on_star(
+        self, most: int, targets: Targets, curves: "_Curves", until: Callable[[Floats], bool]
+    ) -> tuple[Locomotion, list[tuple[int, int]]]:
+        """[PT] 2.6: a star of states around the present one, aimed at the targets."""
+        run = self.run
+        printed = run.motion == "walk-printed"
+        walker = self.prepared.walker(self.library, self.shape_filters)
+        heading_rad = self.prepared.start_heading_rad
+        states, at = [(0, 0)], [0]
+
+        def observe(frame: int, points_m: Floats) -> bool:
+            at[0] = frame + 1
+            return until(points_m)
+
+        def grow(_: AngleTrack, points_m: Floats) -> None:
+            mean_rad = heading_rad + float(walker.track.body_rad(walker.track.end).mean())
+            aim_rad = (
+                targets.printed_aim_rad(points_m)
+                if printed
+                else targets.aim_rad(points_m, mean_rad)
+            )
+            states.append((at[0], walker.decide(heading_rad, aim_rad).state))
+
+        plan = synthesise(
+            walker.track,
+            self.law,
+            most,
+            self.dt_s,
+            self.segment_m,
+            grow,
+            Behaviour(
+                sliding=lambda t: curves.sliding[t],
+                pulse_m_s=lambda t: curves.pulse_m_s[t],
+                head_held=lambda t: curves.head_held[t],
+                calm_tail=lambda t: curves.calm_tail[t],
+            ),
+            head_m=run.start_m,
+            heading_rad=heading_rad,
+            until=observe,
+        )
+        return plan, states
+
+    def _on_graph(
+        self, most: int, until: Callable[[Floats], bool]
+    ) -> tuple[Locomotion, list[tuple[int, int]]]:
+        """[KP] 4.2.1: a walk on the fixed graph, the mass centre on the path."""
+        run = self.run
+        states: list[tuple[int, int]] = []
+        between = max(1, round(run.walk.decision_fraction * POINTS))
+        coefficients = to_states(self.library.shapes_rad, self.how.coefficients)
+        shapes = graph_angles(coefficients, between, POINTS, np.random.default_rng(run.seed))
+        plan = graph_motion(
+            shapes,
+            self.path,
+            most,
+            self.segment_m,
+            self.dt_s,
+            lambda _, points_m: until(points_m),
+            lambda frame, state: states.append((frame, state)),
+        )
+        return plan, states
 
     @property
     def law(self) -> SpeedLaw:

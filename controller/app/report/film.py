@@ -1,6 +1,6 @@
 """Film of a run, from the head pose and the joint angles in its log; on metal too."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -12,6 +12,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.capture.mesh.bone_motion import BoneMotion
 from snakewalk.controller.metrics.path_error import waypoint_times_s
 from snakewalk.controller.runlog.record import Header, RunRecord
 
@@ -72,6 +75,67 @@ def film_run(
         title=header.run.name,
         look=look,
         fine=fine,
+        on_frame=on_progress,
+    )
+
+
+def film_motion(
+    motion: BoneMotion,
+    path: Path,
+    *,
+    look: "SkinLook",
+    robot: RobotConfig,
+    world: WorldConfig,
+    ground: HeightField | None,
+    waypoints_m: Sequence[tuple[float, float]] = (),
+    waypoint_radius_m: float = 0.3,
+    reached_s: Sequence[float] = (),
+    paths: Sequence[tuple[float, Floats]] = (),
+    title: str = "",
+    on_progress: Callable[[int, int], None] | None = None,
+) -> int:
+    """Draw the film of a skin that no robot moves into ``path`` (.mp4); the number of its frames.
+
+    Args:
+        motion: its bones.
+        path: of the film; its folder exists.
+        look: free, of as many bones.
+        robot: for the size of the body.
+        world: where.
+        ground: its height field, None if flat.
+        waypoints_m: drawn as rings.
+        waypoint_radius_m: of these rings.
+        reached_s: when they turn green.
+        paths: each the time from when on it is in force and (P, 2) points.
+        title: shown in the caption.
+        on_progress: called with (frames done, of).
+
+    Raises:
+        InputError: the simulator or PyAV is not installed, or nothing draws here without a screen.
+
+    """
+    require_extra("films need", "mujoco", "av")
+    from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
+
+    frames, bones = motion.front_m.shape[:2]
+    turns = Rotation.from_matrix(motion.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    poses = np.concatenate([motion.front_m, turns.reshape(frames, bones, 4)], axis=2)
+    return render_film(
+        robot,
+        world,
+        ground,
+        motion.time_s,
+        poses.reshape(frames, -1),
+        path,
+        fps=FPS,
+        speed_up=speed_up(float(motion.time_s[-1])),
+        size=SIZE,
+        waypoints_m=waypoints_m,
+        waypoint_radius_m=waypoint_radius_m,
+        reached_s=reached_s,
+        paths=paths,
+        title=title,
+        look=look,
         on_frame=on_progress,
     )
 

@@ -61,12 +61,16 @@ def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Prepa
 
 
 def prepare_walk(
-    name: str, *, keys: Mapping[str, object] | None = None, **changes: object
+    name: str,
+    *,
+    keys: Mapping[str, object] | None = None,
+    on_paper: bool = False,
+    **changes: object,
 ) -> WalkRun:
     """Load a run with its robot and world; ``changes`` replace fields of the run where not None.
 
     ``keys`` replace single values of the three files: ``run.seed``, ``robot.link_mass_kg``,
-    ``world.ground.slope_rad``.
+    ``world.ground.slope_rad``. ``on_paper`` allows motions that no robot makes by itself.
 
     Raises:
         ConfigError: every fault of a file at once.
@@ -83,6 +87,11 @@ def prepare_walk(
     options.setdefault("track", track_beside(run.track, beside))
     run = checked(RunConfig, run.model_dump() | options, "command line")
     run = _with_keys_of("run", run, keys)
+    if run.motion == "kp" and not on_paper:
+        raise InputError(
+            f"run {run.name}: kp is a motion on paper: snakewalk synthesise RUN --motion kp "
+            "-o NAME, then snakewalk play NAME.npz"
+        )
     if run.motion == "gait":
         raise InputError(f"run {run.name}: a gait is run by: snakewalk gait run NAME")
     if run.motion == "playback":

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -130,7 +131,7 @@ def prepare_case(
 
 def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> WalkRun | GaitRun:
     robot = {"robot": case.robot} if case.robot is not None else {}
-    options = dict(changes) | robot
+    options: dict[str, Any] = dict(changes) | robot
     seconds = options.pop("seconds", None)
     if not case.is_gait:
         options |= {"motion": case.motion, "seed": seed}

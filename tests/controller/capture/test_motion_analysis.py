@@ -59,6 +59,42 @@ def test_two_speeds_along_one_body_are_told_apart() -> None:
     assert np.nanmedian(found[:, 62:90]) == pytest.approx(4.0, abs=0.05)
 
 
+def _in_place(angles_rad: np.ndarray) -> Track:
+    """A body of these angles (T, 100) whose head stays."""
+    step = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1) / 100.0
+    points = np.concatenate([np.zeros((len(step), 1, 2)), -step.cumsum(axis=1)], axis=1)
+    return track_from_points("made", points, 25.0)
+
+
+def test_one_speed_for_the_body_leaves_an_error_by_the_slope() -> None:
+    """[PT] Fig. 5(a): ``abs(Theta_e - Theta)`` goes with ``abs(Theta_n)`` where speeds differ."""
+    even = measure_pulse_speed(travelling(2.6), np.arange(60))
+    np.testing.assert_allclose(even.body_points_per_frame, 2.6, atol=0.02)
+    assert np.nanmax(np.abs(even.body_error_rad)) < 3e-3
+    assert np.isnan(even.body_error_rad[:, :2]).all()  # what comes from beyond the head
+
+    shift = np.where(N < 50, 2.0, 4.0)
+    wave = 0.5 * np.sin(0.35 * N)
+    moved = 0.5 * np.sin(0.35 * (N - shift))
+    found = measure_pulse_speed(np.stack([wave, moved]), np.arange(2))
+    one = float(found.body_points_per_frame[0])
+    assert one == pytest.approx(3.0, abs=0.15)
+    model = 0.5 * np.sin(0.35 * (N - one))
+    seen = np.isfinite(found.body_error_rad[0])
+    np.testing.assert_allclose(found.body_error_rad[0][seen], (model - moved)[seen], atol=0.01)
+    inside = seen & (np.abs(N - 50) > 8)  # nine neighbours with one shift
+    error, slope = np.abs(found.body_error_rad[0]), np.abs(np.gradient(moved))
+    assert np.corrcoef(error[inside], slope[inside])[0, 1] > 0.9
+
+
+def test_the_error_does_not_follow_the_slope_where_amplitudes_grow() -> None:
+    """No shift makes a wave larger: the error is greatest at its crests, where the slope is 0."""
+    wave = np.sin(0.15 * (N - np.arange(80)[:, None]))
+    grows = analyse(_in_place((0.2 + 0.9 * N / 100.0) * wave)).error_slope
+    assert grows is not None
+    assert grows[1] < 0.0
+
+
 def test_noise_of_one_degree_moves_the_median_little() -> None:
     rng = np.random.default_rng(0)
     noise = rng.normal(0.0, np.radians(1.0), (60, 100))

@@ -90,6 +90,8 @@ def _show(facts: dict[str, Any]) -> None:
         "pulse speed": f"{facts['pulse_body_lengths_s']} body lengths/s (half of it {low} to "
         f"{high}), {facts['pulse_points_per_frame']} points a frame; known at "
         f"{facts['pulse_measured_share']:.0%} of body and time",
+        "one pulse speed for the body": f"leaves {facts['one_pulse_error_rad']} rad; goes with the "
+        f"slope along the body by {facts['one_pulse_error_correlation']}",
         "frequency x wavelength": f"{facts['wave_speed_body_lengths_s']} body lengths/s",
         "travel": "places are not recorded"
         if travel is None

@@ -28,6 +28,7 @@ from snakewalk.controller.capture.analysis import Analysis
 from snakewalk.controller.capture.undulation import even_points
 
 _BODIES = 60  # drawn under the paths
+_BINS = 20
 
 
 def draw_analysis(found: Analysis, file: Path) -> None:
@@ -42,9 +43,9 @@ def draw_analysis(found: Analysis, file: Path) -> None:
     scale = track.rate_hz / track.angles_rad.shape[1]
     usual = abs(pulse.typical) * scale
     with style():
-        figure = Figure(figsize=(10.5, 5.4), layout="constrained", dpi=76)
-        (tracks, angles), (swings, speeds) = figure.subplots(
-            2, 2, gridspec_kw={"width_ratios": [1.0, 1.7]}
+        figure = Figure(figsize=(10.5, 8.1), layout="constrained", dpi=76)
+        (tracks, angles), (swings, speeds), (against, errors) = figure.subplots(
+            3, 2, gridspec_kw={"width_ratios": [1.0, 1.7]}
         )
         _tracks(tracks, found)
         swing = track.angles_rad - track.angles_rad.mean(axis=1, keepdims=True)
@@ -63,6 +64,9 @@ def draw_analysis(found: Analysis, file: Path) -> None:
             limit=max(1e-9, min(max(most, usual), 3.0 * usual)),
         )
         speeds.set_title("pulse speed, positive towards the tail; grey: not known")
+        body_map(figure, errors, track, pulse.body_error_rad, "rad", kept=pulse.frame)
+        errors.set_title("error of one pulse speed for the whole body")
+        _error_by_slope(against, found)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
@@ -86,6 +90,29 @@ def _tracks(axes: Axes, found: Analysis) -> None:
     axes.legend(loc="best", fontsize=8, handlelength=1.2)
     axes.set_xlabel("body lengths")
     axes.set_title("tracks of head, middle and tail")
+
+
+def _error_by_slope(axes: Axes, found: Analysis) -> None:
+    """Draw the absolute error against the slope along the body, in bins of equal counts."""
+    error, slope = np.abs(found.pulse.body_error_rad), found.slope_rad
+    seen = np.isfinite(error)
+    order = np.argsort(slope[seen])
+    parts = [np.array_split(values[seen][order], _BINS) for values in (slope, error)]
+    x, (low, middle, high) = (
+        np.array([part.mean() for part in parts[0]]),
+        np.array([np.percentile(part, [25.0, 50.0, 75.0]) for part in parts[1]]).T,
+    )
+    axes.fill_between(x, low, high, color=PALE)
+    axes.plot(x, middle, color=BLUE, label="median, and half of all")
+    fit = found.error_slope
+    if fit is not None:
+        axes.plot(x, fit[0] * x, color=INK, linestyle="--", label=f"{fit[0]:.2f} points")
+    axes.set_xlim(0.0, float(x[-1]))
+    axes.set_ylim(0.0, None)
+    axes.set_xlabel("slope along the body, rad a point")
+    axes.set_ylabel("rad")
+    axes.legend(loc="upper left", fontsize=8)
+    axes.set_title("that error by the slope")
 
 
 def _swings(axes: Axes, found: Analysis) -> None:

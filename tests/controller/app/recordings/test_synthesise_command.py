@@ -3,15 +3,22 @@
 import json
 from pathlib import Path
 
+import mujoco
 import numpy as np
+import pygltflib
 import pytest
+from scipy.spatial.transform import Rotation
 
 from snakewalk.config.ground import build_ground
 from snakewalk.config.loader import load_world
+from snakewalk.controller.app.recordings.body_look import bone_look
 from snakewalk.controller.app.recordings.snake_synthesis import SnakeSynthesis, SynthesisedWalk
+from snakewalk.controller.app.recordings.synthesis_skin import FILM_SEGMENTS, SynthesisSkin
 from snakewalk.controller.app.runs.factory import prepare_playback, prepare_walk
 from snakewalk.controller.capture.mesh.body_model import read_silhouettes
+from snakewalk.controller.capture.mesh.skin import posed_m
 from snakewalk.controller.capture.readers.load import load_track
+from snakewalk.sim.rendering.looks import dressed_model
 from tests.helpers.in_process import snakewalk
 
 BEHAVIOUR = """
@@ -114,5 +121,75 @@ def test_what_is_not_a_walk_is_refused(tmp_path: Path) -> None:
         "synthesise", "flat-square", "--motion", "serpenoid", "-o", str(tmp_path / "x")
     )
     assert done.returncode == 2
-    assert "--motion serpenoid: walk or walk-printed" in done.stderr
+    assert "--motion serpenoid: walk, walk-printed, kp" in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_the_bones_lie_on_the_skeleton_and_the_film_draws_the_posed_skin(
+    traverse: SynthesisedWalk,
+) -> None:
+    prepared = prepare_walk("jacksboro-traverse")
+    worn = SynthesisSkin.of("animal", prepared.run.track, prepared.robot)
+    bones = traverse.bones(FILM_SEGMENTS)
+    points = traverse.skeleton.points_m
+    ends = bones.front_m + bones.bone_m[:, None] * bones.rotation[..., 0] * -1.0
+    np.testing.assert_allclose(bones.front_m, points[:, :-1:FILM_SEGMENTS])
+    np.testing.assert_allclose(ends, points[:, FILM_SEGMENTS::FILM_SEGMENTS], atol=2e-3)  # bent
+
+    look = bone_look(worn.dressed, worn.skin, bones.bone_m)
+    model = dressed_model(prepared.robot, prepared.world, prepared.ground, look=look)
+    assert model.nbody == 1 + len(bones.bone_m)  # the robot's links are gone
+    data, scene = mujoco.MjData(model), mujoco.MjvScene(model, maxgeom=1000)
+    frame = 300
+    turns = Rotation.from_matrix(bones.rotation[frame]).as_quat(scalar_first=True)
+    data.qpos[:] = np.hstack([bones.front_m[frame], turns]).ravel()
+    mujoco.mj_kinematics(model, data)
+    option, camera = mujoco.MjvOption(), mujoco.MjvCamera()
+    mujoco.mjv_updateScene(model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
+    drawn = np.array(scene.skinvert).reshape(-1, 3)
+    np.testing.assert_allclose(drawn, posed_m(worn.skin, bones, frame), atol=3e-6)
+
+
+def test_rings_turn_green_when_the_mass_centre_is_there(traverse: SynthesisedWalk) -> None:
+    run = prepare_walk("jacksboro-traverse").run
+    times = traverse.reached_s()
+    assert len(times) == 4
+    assert times == sorted(times)
+    for time_s, waypoint in zip(times, run.waypoints_m, strict=True):
+        centre = traverse.plan.points_m[round(time_s * traverse.rate_hz)].mean(axis=0)
+        assert np.hypot(*(centre - waypoint)) < run.waypoint_radius_m
+
+
+def test_film_and_skin_are_written_beside_the_recording(tmp_path: Path) -> None:
+    words = ["synthesise", "jacksboro-traverse", "--frames", "4", "-o", str(tmp_path / "out")]
+    wrong = snakewalk(*words, "--look", "shark")
+    assert wrong.returncode == 2
+    assert "--look shark: is for --film and --glb" in wrong.stderr
+    unknown = snakewalk(*words, "--glb", "--look", "unicorn")
+    assert unknown.returncode == 2
+    assert not list(tmp_path.iterdir())  # refused before any work
+    done = snakewalk(*words, "--film", "--glb", "--look", "eel", "--json")
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert Path(facts["film"]).read_bytes()[4:8] == b"ftyp"
+    skin = Path(facts["skin"])
+    assert skin.read_bytes().startswith(b"glTF")
+    held = pygltflib.GLTF2().load(str(skin))
+    assert len(held.skins[0].joints) >= 100
+    assert held.accessors[held.animations[0].samplers[0].input].count == 4
+
+
+def test_the_older_graph_of_states_keeps_the_snake_on_its_path() -> None:
+    prepared = prepare_walk("jacksboro-traverse", motion="kp", on_paper=True)
+    made = SnakeSynthesis(prepared).synthesise()
+    assert made.complete
+    centre = made.plan.points_m[::10].mean(axis=1)
+    way = made.path.position(np.linspace(0.0, made.path.length_m, 3000))
+    assert np.linalg.norm(centre[:, None] - way, axis=2).min(axis=1).max() < 2e-3
+    assert made.facts()["bend_k_rad"] > 0.3  # type: ignore[operator]
+
+
+def test_a_motion_on_paper_is_refused_as_a_run() -> None:
+    done = snakewalk("run", "jacksboro-traverse", "--motion", "kp")
+    assert done.returncode == 2
+    assert "kp is a motion on paper: snakewalk synthesise" in done.stderr

@@ -1,0 +1,74 @@
+"""The skin of a synthesised motion: as an animated glTF, and in a film on the world's ground."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from snakewalk.config.extras import require_extra
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.app.progress import ProgressBar
+from snakewalk.controller.app.recordings.body_look import ANIMAL, animal, bone_look
+from snakewalk.controller.app.recordings.body_motion import robot_skin
+from snakewalk.controller.app.recordings.body_skin import BodySkin, body_skin
+from snakewalk.controller.app.recordings.snake_synthesis import SynthesisedWalk
+from snakewalk.controller.app.report.film import film_motion
+from snakewalk.controller.app.result_files import atomic_write
+from snakewalk.controller.app.runs.walk_run import WalkRun
+from snakewalk.controller.capture.mesh.skin import Skin
+
+FILM_SEGMENTS = 5
+"""Segments of the skeleton that are one bone in the film; the file has a bone a segment."""
+
+
+@dataclass(frozen=True, slots=True)
+class SynthesisSkin:
+    """A skin of the robot's size, and what it wears."""
+
+    dressed: BodySkin
+    skin: Skin
+
+    @classmethod
+    def of(cls, look: str, track: str, robot: RobotConfig) -> "SynthesisSkin":
+        """Take ``animal``, which is the recording's own body or a plain snake, or a BODY.
+
+        Raises:
+            InputError: no such body, or an extra is missing.
+
+        """
+        require_extra("a skin needs", "trimesh", "pygltflib")
+        dressed = body_skin(animal(track) if look == ANIMAL else look)
+        return cls(dressed, robot_skin(dressed.skin, robot))
+
+    def write(self, made: SynthesisedWalk, file: Path) -> None:
+        """Write the animated glTF, ``file`` ends in .glb."""
+        from snakewalk.controller.capture.mesh.skin_file import write_skin  # noqa: PLC0415  an extra
+
+        worn = self.dressed
+        with atomic_write(file) as part:
+            write_skin(
+                part, self.skin, made.bones(), worn.texture, worn.name, both_sides=worn.both_sides
+            )
+
+    def film(self, made: SynthesisedWalk, prepared: WalkRun, file: Path) -> int:
+        """Draw the film, ``file`` ends in .mp4; shows progress on standard error.
+
+        Raises:
+            InputError: the simulator or PyAV is not installed, or nothing draws here.
+
+        """
+        bones = made.bones(FILM_SEGMENTS)
+        run = prepared.run
+        with atomic_write(file) as part, ProgressBar("film", transient=True) as bar:
+            return film_motion(
+                bones,
+                part,
+                look=bone_look(self.dressed, self.skin, bones.bone_m),
+                robot=prepared.robot,
+                world=prepared.world,
+                ground=prepared.ground,
+                waypoints_m=run.waypoints_m,
+                waypoint_radius_m=run.waypoint_radius_m,
+                reached_s=made.reached_s(),
+                paths=made.targets.paths(made.rate_hz),
+                title=run.name,
+                on_progress=bar.update,
+            )
