@@ -9,7 +9,7 @@ and speed that each cycle reads, over the integrated one; the highest current of
 and of all physics steps; and the lag of the joints.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -25,8 +25,8 @@ from snakewalk.controller.app.runs.prepared_run import PreparedRun
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.metrics.effort import energy_track, sampled_energy
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import configure
-from snakewalk.drivers.protocol.registers import ServoUnits
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.plant import ServoDrive
 
@@ -99,14 +99,16 @@ def profiles() -> Iterator[None]:
     def with_profile(
         bus: DynamixelBus,
         robot: RobotConfig,
-        units: ServoUnits,
+        units: JointUnits,
         joints: Iterable[int] | None = None,
-    ) -> None:
+        on_event: Callable[[str], None] = lambda line: None,
+    ) -> dict[int, dict[str, int]]:
         some = list(range(robot.joint_count) if joints is None else joints)
-        configure(bus, robot, units, some)
+        values = configure(bus, robot, units, some, on_event)
         for joint in some:
             bus.write_verified(robot.servo_ids[joint], "Drive Mode", TIME_BASED)
             bus.write_verified(robot.servo_ids[joint], "Profile Velocity", PROFILE_MS)
+        return values
 
     with patch("snakewalk.drivers.chain.servo_chain.configure", with_profile):
         yield

@@ -75,7 +75,11 @@ def _tables(title: str, model: type[BaseModel]) -> list[str]:
     inner: list[str] = []
     for name, field in model.model_fields.items():
         nested = _models(field.annotation)
-        if nested:
+        row = _row_model(field.annotation)
+        if row is not None:
+            place = _title(title, name, row, 1).replace("`[", "`[[").replace("]`", "]]`")
+            inner += _tables(place, row)
+        elif nested:
             for one in nested:
                 inner += _tables(_title(title, name, one, len(nested)), one)
             continue
@@ -85,6 +89,13 @@ def _tables(title: str, model: type[BaseModel]) -> list[str]:
             f"| `{name}` | {_kind(field.annotation)}{_bounds(field)} | {default} | {description} |"
         )
     return [*lines, "", *inner]
+
+
+def _row_model(annotation: Any) -> type[BaseModel] | None:
+    """Schema of the rows where a key is a list of tables."""
+    if get_origin(annotation) is not tuple:
+        return None
+    return next(iter(_models(get_args(annotation)[0])), None)
 
 
 def _title(title: str, name: str, model: type[BaseModel], choices: int) -> str:

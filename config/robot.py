@@ -1,11 +1,14 @@
 """What the robot is: links, joints and servos of one chain, head first."""
 
-from typing import Literal, Self
+import math
+from collections import Counter
+from typing import Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Name, Strict
 
+N = TypeVar("N", int, float)
 Baud = Literal[9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000]
 
 
@@ -80,12 +83,61 @@ class BellyConfig(Strict):
         return self
 
 
+class JointConfig(Strict):
+    """What one joint has of its own, `[[joints]]` from the head; the rest is the chain's."""
+
+    axis: Literal["y", "p"] | None = Field(
+        None, description="y = yaw, p = pitch; in every joint, unless joint_axes says it"
+    )
+    id: int | None = Field(
+        None, ge=0, le=252, description="of its servo; default: counted from servo.first_id"
+    )
+    model: str | None = Field(None, description="default: servo.model")
+    sign: Literal[1, -1] = Field(
+        1, description="-1: its servo is mounted the other way round, and counts backwards"
+    )
+    zero_rad: float = Field(
+        0.0,
+        ge=-math.pi,
+        le=math.pi,
+        description="where its servo stands, from its own zero, when the joint is straight; taken "
+        "to the nearest position that the servo knows",
+    )
+    limit_rad: float | None = Field(
+        None, gt=0.05, le=3.1, description="default: yaw_limit_rad or pitch_limit_rad"
+    )
+    position_p_gain: int | None = Field(
+        None, ge=0, le=16383, description="default: servo.position_p_gain or servo.pitch_p_gain"
+    )
+    position_i_gain: int | None = Field(
+        None, ge=0, le=16383, description="default: servo.position_i_gain"
+    )
+    position_d_gain: int | None = Field(
+        None, ge=0, le=16383, description="default: servo.position_d_gain"
+    )
+    current_limit_a: float | None = Field(
+        None, gt=0.0, description="of a pitch joint; default: servo.pitch_current_limit_a"
+    )
+    armature_kg_m2: float | None = Field(
+        None, ge=0.0, le=1.0, description="default: servo.armature_kg_m2"
+    )
+    gear_drag_n_m_s: float | None = Field(
+        None, ge=0.0, le=10.0, description="default: servo.gear_drag_n_m_s"
+    )
+
+
 class RobotConfig(Strict):
     """A chain of links joined by servos; lengths in metres, index 0 is the head."""
 
     name: Name
     joint_axes: str = Field(
-        pattern=r"^[yp]+$", description="one letter a joint from the head: y = yaw, p = pitch"
+        "",
+        pattern=r"^[yp]*$",
+        description="required, unless every joint of `[[joints]]` has its axis: one letter a joint "
+        "from the head, y = yaw, p = pitch",
+    )
+    joints: tuple[JointConfig, ...] = Field(
+        (), description="one for each joint, or none: then all are alike"
     )
     link_length_m: float = Field(0.07, gt=0.005, le=1.0, description="joint axis to joint axis")
     body_radius_m: float = Field(0.03, gt=0.002, le=0.5)
@@ -106,10 +158,59 @@ class RobotConfig(Strict):
     servo: ServoConfig = ServoConfig()
 
     @model_validator(mode="after")
+    def _axes_of_the_joints(self) -> Self:
+        """Take ``joint_axes`` from the joints where the file does not say them."""
+        if not self.joint_axes:
+            axes = [joint.axis for joint in self.joints]
+            known = "".join(axis for axis in axes if axis is not None)
+            if not known or len(known) < len(axes):
+                raise ValueError(
+                    "joint_axes: is required: a letter for each joint, or axis in each of joints"
+                )
+            object.__setattr__(self, "joint_axes", known)  # frozen from here on
+        return self
+
+    @model_validator(mode="after")
+    def _joints_are_the_chains(self) -> Self:
+        if not self.joints:
+            return self
+        if len(self.joints) != self.joint_count:
+            raise ValueError(
+                f"joints: {len(self.joints)} of them, but joint_axes has {self.joint_count}"
+            )
+        for number, (joint, axis) in enumerate(zip(self.joints, self.joint_axes, strict=True), 1):
+            if joint.axis not in (None, axis):
+                raise ValueError(
+                    f"joints: axis of joint {number} is {joint.axis}, joint_axes says {axis}"
+                )
+            if joint.current_limit_a is not None and axis == "y":
+                raise ValueError(
+                    f"joints: current_limit_a of joint {number}: only pitch joints have one"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _ids_fit_the_bus(self) -> Self:
-        last = self.servo.first_id + self.joint_count - 1
-        if last > 252:
-            raise ValueError(f"servo IDs would run to {last}; the bus has 0 to 252")
+        ids = self.servo_ids
+        if max(ids) > 252:
+            raise ValueError(f"servo IDs would run to {max(ids)}; the bus has 0 to 252")
+        twice = sorted(each for each, count in Counter(ids).items() if count > 1)
+        if twice:
+            raise ValueError(f"joints: ID {', '.join(map(str, twice))} is of more than one joint")
+        return self
+
+    @model_validator(mode="after")
+    def _ranges_are_within_a_turn(self) -> Self:
+        """In position mode a servo knows one turn: positions 0 to 4095 of 4096."""
+        most_rad = math.pi - math.tau / 4096
+        for joint, limit_rad in enumerate(self.limit_rad):
+            beyond = limit_rad + abs(self.zeros_rad[joint])
+            if beyond > most_rad:
+                raise ValueError(
+                    f"{self.joint_name(joint)}: zero_rad {self.zeros_rad[joint]:g} with a limit of "
+                    f"{limit_rad:g} rad leaves the servo's turn by {beyond - most_rad:.3f} rad: "
+                    "mount the horn nearer to the servo's centre, or lower limit_rad"
+                )
         return self
 
     @model_validator(mode="after")
@@ -149,7 +250,72 @@ class RobotConfig(Strict):
     @property
     def servo_ids(self) -> tuple[int, ...]:
         """Bus IDs, head first."""
-        return tuple(range(self.servo.first_id, self.servo.first_id + self.joint_count))
+        first = self.servo.first_id
+        if not self.joints:
+            return tuple(range(first, first + self.joint_count))
+        return tuple(first + k if j.id is None else j.id for k, j in enumerate(self.joints))
+
+    @property
+    def servo_models(self) -> tuple[str, ...]:
+        """Model of each joint's servo, head first."""
+        if not self.joints:
+            return (self.servo.model,) * self.joint_count
+        return tuple(joint.model or self.servo.model for joint in self.joints)
+
+    @property
+    def models_by_id(self) -> dict[int, str]:
+        """Model of each servo by its bus ID."""
+        return dict(zip(self.servo_ids, self.servo_models, strict=True))
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """-1 where a joint's servo is mounted the other way round, else 1; head first."""
+        return tuple(j.sign for j in self.joints) or (1,) * self.joint_count
+
+    @property
+    def zeros_rad(self) -> tuple[float, ...]:
+        """Where each servo stands, from its own zero, when its joint is straight; head first."""
+        return tuple(j.zero_rad for j in self.joints) or (0.0,) * self.joint_count
+
+    @property
+    def position_p_gains(self) -> tuple[int, ...]:
+        """Register 84 of each joint, head first."""
+        usual = {"y": self.servo.position_p_gain, "p": self.servo.pitch_p_gain}
+        return self._own("position_p_gain", tuple(usual[axis] for axis in self.joint_axes))
+
+    @property
+    def position_i_gains(self) -> tuple[int, ...]:
+        """Register 82 of each joint, head first."""
+        return self._own("position_i_gain", (self.servo.position_i_gain,) * self.joint_count)
+
+    @property
+    def position_d_gains(self) -> tuple[int, ...]:
+        """Register 80 of each joint, head first."""
+        return self._own("position_d_gain", (self.servo.position_d_gain,) * self.joint_count)
+
+    @property
+    def current_limits_a(self) -> tuple[float, ...]:
+        """Goal current of each joint, head first; infinite at the yaw joints, which have none."""
+        pitch_a = self.servo.pitch_current_limit_a
+        usual = tuple(pitch_a if axis == "p" else math.inf for axis in self.joint_axes)
+        return self._own("current_limit_a", usual)
+
+    @property
+    def armatures_kg_m2(self) -> tuple[float, ...]:
+        """Inertia of rotor and gears at each joint's shaft, head first."""
+        return self._own("armature_kg_m2", (self.servo.armature_kg_m2,) * self.joint_count)
+
+    @property
+    def gear_drags_n_m_s(self) -> tuple[float, ...]:
+        """Viscous loss of the gears at each joint's shaft, head first."""
+        return self._own("gear_drag_n_m_s", (self.servo.gear_drag_n_m_s,) * self.joint_count)
+
+    def _own(self, key: str, usual: tuple[N, ...]) -> tuple[N, ...]:
+        """Values of a key of the joints, ``usual`` where a joint has none of its own."""
+        if not self.joints:
+            return usual
+        own = (getattr(joint, key) for joint in self.joints)
+        return tuple(u if o is None else o for o, u in zip(own, usual, strict=True))
 
     def joint_name(self, joint: int) -> str:
         """Name of a joint in all messages: its place, counted from 1 at the head, and servo ID."""
@@ -168,6 +334,5 @@ class RobotConfig(Strict):
     @property
     def limit_rad(self) -> tuple[float, ...]:
         """Half range of each joint, rad, head first."""
-        return tuple(
-            self.yaw_limit_rad if axis == "y" else self.pitch_limit_rad for axis in self.joint_axes
-        )
+        usual = {"y": self.yaw_limit_rad, "p": self.pitch_limit_rad}
+        return self._own("limit_rad", tuple(usual[axis] for axis in self.joint_axes))

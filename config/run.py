@@ -122,13 +122,11 @@ class SafetyConfig(Strict):
         an honest lag can need; twice of it is the limit, but at least ``following_limit_rad``. A
         pitch joint has ``following_limit_rad``: its current tells whether the ground holds it off.
         """
-        full_rad = _FULL_OUTPUT_RAD / max(robot.servo.position_p_gain, 1)
-        yaw_rad = max(self.following_limit_rad, 2.0 * full_rad)
-        most_rad = 0.9 * self.goal_lead_rad
-        return tuple(
-            min(yaw_rad if axis == "y" else self.following_limit_rad, most_rad)
-            for axis in robot.joint_axes
-        )
+        most_rad, limits_rad = 0.9 * self.goal_lead_rad, []
+        for axis, gain in zip(robot.joint_axes, robot.position_p_gains, strict=True):
+            full_rad = _FULL_OUTPUT_RAD / max(gain, 1) if axis == "y" else 0.0
+            limits_rad.append(min(max(self.following_limit_rad, 2.0 * full_rad), most_rad))
+        return tuple(limits_rad)
 
     def voltage_limits_v(self, servo: ServoConfig) -> tuple[float, float]:
         """Least and greatest supply of servos of this kind: the run's, else the robot's."""

@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
 
 _ENERGIES = ("drawn_j", "returned_j", "heat_j", "work_j")
 
@@ -70,6 +71,21 @@ class ServoDrive:
             *(self.current_limit_a, self.current_a, self.torque_n_m, self.pwm),
             *(self.drawn_j, self.returned_j, self.heat_j, self.work_j),
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Mounting:
+    """How S servos sit on the plant's shafts: ``servo angle = sign * shaft angle + zero``."""
+
+    sign: Floats
+    """(S,) -1 where a servo turns the other way round than its shaft, else 1."""
+    zero_rad: Floats
+    """(S,) where the servo stands, from its own zero, when the shaft is at 0."""
+
+    @staticmethod
+    def of(robot: RobotConfig) -> "Mounting":
+        """As the robot's file says."""
+        return Mounting(np.array(robot.signs, np.float64), np.array(robot.zeros_rad))
 
 
 def shaft_torque(

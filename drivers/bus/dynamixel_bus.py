@@ -11,7 +11,7 @@ Defects of dynamixel-sdk 4.1.0 that are avoided here:
 The control cycle does not go through the SDK: see ``drivers.bus.control_cycle``.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -21,9 +21,9 @@ from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.bus.probe import Probe, probe
 from snakewalk.drivers.bus.register_io import check_accepted, read_register, write_register
-from snakewalk.drivers.errors import BusError, NoAnswerError
+from snakewalk.drivers.errors import BusError, ControlTableError, NoAnswerError
 from snakewalk.drivers.port.byte_port import BytePort
-from snakewalk.drivers.protocol.control_table import ControlTable, load_control_table
+from snakewalk.drivers.protocol.control_table import ControlTable, Register, load_control_table
 from snakewalk.drivers.protocol.packet import (
     ALERT,
     BROADCAST_ID,
@@ -50,18 +50,35 @@ class PingReply:
 
 
 class DynamixelBus:
-    """Servos of one model on one byte port."""
+    """Servos of one model, or of several, on one byte port."""
 
     def __init__(
         self,
         port: BytePort,
-        model: str = "XM430-W350",
+        model: str | Mapping[int, str] = "XM430-W350",
         *,
         latency_s: float = 0.004,
         tries: int = 3,
     ) -> None:
+        """Prepare; nothing is sent.
+
+        Args:
+            port: the line.
+            model: of all servos, or of each by its ID; servos that are not listed are taken for
+                the first.
+            latency_s: how long adapter and driver may hold bytes back.
+            tries: how often a transaction is begun at most.
+
+        Raises:
+            ControlTableError: a model is not known.
+
+        """
         self.port = port
-        self.table: ControlTable = load_control_table(model)
+        models = {} if isinstance(model, str) else dict(model)
+        self._tables = {servo_id: load_control_table(each) for servo_id, each in models.items()}
+        first = model if isinstance(model, str) else next(iter(models.values()))
+        self.table: ControlTable = load_control_table(first)
+        """Of the model, or of the first one."""
         self.latency_s = latency_s
         """How long adapter and driver may hold bytes back (FTDI: its latency timer)."""
         self._tries = max(1, tries)
@@ -116,7 +133,7 @@ class DynamixelBus:
             ServoError: the servo refused.
 
         """
-        register = self.table.register(name)
+        register = self.table_of(servo_id).register(name)
         data = self._retry(
             lambda: read_register(self.port, servo_id, register, self.latency_s, self._pending)
         )
@@ -131,7 +148,7 @@ class DynamixelBus:
             ServoError: the servo refused.
 
         """
-        register = self.table.register(name)
+        register = self.table_of(servo_id).register(name)
         data = register.encode(value)
         self._retry(
             lambda: write_register(
@@ -147,7 +164,7 @@ class DynamixelBus:
             ControlTableError: no such register, or the value does not fit it.
 
         """
-        register = self.table.register(name)
+        register = self._shared(servo_ids, name)
         data = register.encode(value)
         params = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
         params += b"".join(bytes([servo_id]) + data for servo_id in servo_ids)
@@ -205,17 +222,38 @@ class DynamixelBus:
             ControlTableError: the model lacks one of the registers.
 
         """
-        start, end = self.table[first].address, self.table[last].address + self.table[last].size
+        end = self._shared(servo_ids, last)
+        start, end_address = self._shared(servo_ids, first).address, end.address + end.size
         return ControlCycle(
             self.port,
             servo_ids,
-            goal_address=self.table["Goal Position"].address,
+            goal_address=self._shared(servo_ids, "Goal Position").address,
             read_address=start,
-            read_bytes=end - start,
+            read_bytes=end_address - start,
             fast=fast,
             latency_s=self.latency_s,
             pending=self._pending,
         )
+
+    def table_of(self, servo_id: int) -> ControlTable:
+        """Control table of one servo's model."""
+        return self._tables.get(servo_id, self.table)
+
+    def _shared(self, servo_ids: Sequence[int], name: str) -> Register:
+        """A register that all servos of a group have, at one place.
+
+        Raises:
+            ControlTableError: a model lacks it, or has it elsewhere.
+
+        """
+        tables = {self.table_of(servo_id).model: servo_id for servo_id in servo_ids}
+        registers = {m: self.table_of(i).register(name) for m, i in tables.items()}
+        if len(set(registers.values())) > 1:
+            places = ", ".join(f"{m} at {r.address}" for m, r in registers.items())
+            raise ControlTableError(
+                f"{name} lies apart ({places}): such servos cannot share a group packet"
+            )
+        return next(iter(registers.values()), self.table.register(name))
 
     def _retry(self, once: Callable[[], T], tries: int | None = None) -> T:
         """Run a transaction, and again after silence or damage; a refusal is final."""

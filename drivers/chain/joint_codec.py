@@ -1,6 +1,12 @@
-"""Joint goals (rad) to raw goal positions, and raw state blocks to a ``JointState`` (SI units)."""
+"""Joint goals (rad) to raw goal positions, and raw state blocks to a ``JointState`` (SI units).
 
-from collections.abc import Sequence
+Here, and nowhere else, joints become servos: ``JointUnits`` has each servo's scales, the sign of
+its mounting and the place of its zero. What is above knows joints only.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -8,6 +14,7 @@ from numba import boolean, float64, int32, int64, types, uint8, void
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools, Bytes, Floats, Int32s
+from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.group_read import GroupReadReply
 from snakewalk.drivers.compiling import compiled
 from snakewalk.drivers.errors import ControlTableError
@@ -21,13 +28,54 @@ _BLOCKS = types.Array(uint8, 2, "A", readonly=True)
 _GOALS = types.Array(float64, 1, "A", readonly=True)
 
 
+@dataclass(frozen=True, slots=True)
+class JointUnits:
+    """Between J joints and their servos; a scale is negative where the servo counts backwards."""
+
+    zero_position: Int32s
+    """(J,) raw position of a straight joint."""
+    rad_per_position: Floats
+    """(J,)"""
+    rad_s_per_velocity: Floats
+    """(J,)"""
+    a_per_current: Floats
+    """(J,)"""
+    limits_raw: Int32s
+    """(J, 2) least and greatest raw goal; in position mode the servo checks them."""
+
+    @staticmethod
+    def of(robot: RobotConfig, servos: Sequence[ServoUnits]) -> "JointUnits":
+        """Units of a robot's joints, with the scales of their servos (J)."""
+        sign = np.array(robot.signs, np.float64)
+        step_rad = np.array([servo.rad_per_position for servo in servos])
+        places = zip(robot.zeros_rad, servos, strict=True)
+        zero = [s.zero_position + round(z / s.rad_per_position) for z, s in places]
+        half = [
+            math.floor(limit / step) for limit, step in zip(robot.limit_rad, step_rad, strict=True)
+        ]
+        return JointUnits(
+            np.array(zero, np.int32),
+            sign * step_rad,
+            sign * np.array([servo.rad_s_per_velocity for servo in servos]),
+            sign * np.array([servo.a_per_current for servo in servos]),
+            np.array([(z - h, z + h) for z, h in zip(zero, half, strict=True)], np.int32),
+        )
+
+    def position_rad(self, joint: int, raw: int) -> float:
+        """Angle of one joint, rad; 0 is straight."""
+        return float((raw - self.zero_position[joint]) * self.rad_per_position[joint])
+
+    def current_raw(self, joint: int, current_a: float) -> int:
+        """Nearest raw value of a limit of one joint's current."""
+        return round(current_a / abs(float(self.a_per_current[joint])))
+
+
 class GoalEncoder:
     """Nearest raw goal positions of J goals, clamped to the joint limits."""
 
-    def __init__(self, units: ServoUnits, limits: Int32s) -> None:
-        """Take the raw limits (J, 2)."""
-        self._low, self._high = np.ascontiguousarray(limits.T, np.int32)
-        self._scale = np.array([units.rad_per_position, float(units.zero_position)])
+    def __init__(self, units: JointUnits) -> None:
+        self._low, self._high = np.ascontiguousarray(units.limits_raw.T, np.int32)
+        self._scale = np.stack([units.rad_per_position, units.zero_position.astype(np.float64)])
 
     def encode(self, goal_rad: Floats) -> Int32s:
         """(J,) raw goals, a new array.
@@ -44,16 +92,17 @@ class GoalEncoder:
         return raw
 
 
-@compiled(boolean(_GOALS, float64[::1], int32[::1], int32[::1], int32[::1]))
+@compiled(boolean(_GOALS, float64[:, ::1], int32[::1], int32[::1], int32[::1]))
 def encode_goals(goal_rad: Floats, scale: Floats, low: Int32s, high: Int32s, raw: Int32s) -> bool:
     """Nearest positions of goals (J,) within ``low`` to ``high``; False if a goal is not finite.
 
-    ``scale`` is rad per position and the position of 0 rad.
+    ``scale`` (2, J) is rad per position and the position of 0 rad. The position is rounded before
+    the zero is added, so that a servo that counts backwards gets the mirror image to the bit.
     """
     for joint in range(len(goal_rad)):
         if not np.isfinite(goal_rad[joint]):
             return False
-        nearest = np.rint(goal_rad[joint] / scale[0] + scale[1])
+        nearest = np.rint(goal_rad[joint] / scale[0, joint]) + scale[1, joint]
         raw[joint] = int(min(max(nearest, float(low[joint])), float(high[joint])))
     return True
 
@@ -61,21 +110,22 @@ def encode_goals(goal_rad: Floats, scale: Floats, low: Int32s, high: Int32s, raw
 class StateDecoder:
     """Present Current, Velocity and Position of all servos at once, from their state blocks."""
 
-    def __init__(self, table: ControlTable, units: ServoUnits) -> None:
-        """Check the layout of the registers.
+    def __init__(self, tables: Iterable[ControlTable], units: JointUnits) -> None:
+        """Check the layout of the registers in the servos' tables.
 
         Raises:
             ControlTableError: the registers do not lie as in every model of Protocol 2.0.
 
         """
-        registers = [table[f"Present {name}"] for name in ("Current", "Velocity", "Position")]
-        start = registers[0].address
-        if [(r.address - start, r.size) for r in registers] != [(0, 2), (2, 4), (6, 4)]:
-            raise ControlTableError(
-                [f"{table.model}: Present Current, Velocity and Position do not lie in a row"]
-            )
-        self._zero = np.array([0.0, 0.0, float(units.zero_position)])
-        self._scale = np.array(
+        for table in tables:
+            registers = [table[f"Present {name}"] for name in ("Current", "Velocity", "Position")]
+            start = registers[0].address
+            if [(r.address - start, r.size) for r in registers] != [(0, 2), (2, 4), (6, 4)]:
+                raise ControlTableError(
+                    [f"{table.model}: Present Current, Velocity and Position do not lie in a row"]
+                )
+        self._zero = units.zero_position.astype(np.float64)
+        self._scale = np.stack(
             [units.a_per_current, units.rad_s_per_velocity, units.rad_per_position]
         )
 
@@ -93,20 +143,25 @@ def _signed(data: Bytes, row: int, at: int, size: int) -> int:
     return value - 2 * half if value >= half else value
 
 
-@compiled(void(_BLOCKS, float64[::1], float64[::1], float64[:, ::1]))
+@compiled(void(_BLOCKS, float64[::1], float64[:, ::1], float64[:, ::1]))
 def decode_state(data: Bytes, zero: Floats, scale: Floats, out: Floats) -> None:
-    """Current, velocity and position of blocks (J, 10) into ``out`` (3, J)."""
+    """Current, velocity and position of blocks (J, 10) into ``out`` (3, J).
+
+    ``scale`` (3, J) is of one unit each; ``zero`` (J,) the position of 0 rad.
+    """
     for row in range(len(data)):
-        out[0, row] = (_signed(data, row, 0, 2) - zero[0]) * scale[0]
-        out[1, row] = (_signed(data, row, 2, 4) - zero[1]) * scale[1]
-        out[2, row] = (_signed(data, row, 6, 4) - zero[2]) * scale[2]
+        # 0 times a negative scale is -0; adding 0 makes it 0
+        out[0, row] = _signed(data, row, 0, 2) * scale[0, row] + 0.0
+        out[1, row] = _signed(data, row, 2, 4) * scale[1, row] + 0.0
+        out[2, row] = (_signed(data, row, 6, 4) - zero[row]) * scale[2, row] + 0.0
 
 
 class Readings:
     """Newest value of every quantity of J joints; NaN before the first."""
 
-    def __init__(self, joints: int, table: ControlTable, units: ServoUnits) -> None:
-        self._decoder = StateDecoder(table, units)
+    def __init__(self, tables: Iterable[ControlTable], units: JointUnits) -> None:
+        self._decoder = StateDecoder(tables, units)
+        joints = len(units.zero_position)
         self._numbers = np.full((7, joints), np.nan)
         self._motion = self._numbers[:3]
         self._temperature, self._voltage = self._numbers[3:5]

@@ -9,9 +9,9 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import Inspection, inspect
 from snakewalk.drivers.errors import ChainFault, FaultCause
-from snakewalk.drivers.protocol.registers import ServoUnits
 
 MOVED_RAD = 0.3
 """A joint found farther from its last position was bent, or has lost its turn count (ours)."""
@@ -41,7 +41,7 @@ class Recheck:
 def recheck(
     bus: DynamixelBus,
     robot: RobotConfig,
-    units: ServoUnits,
+    units: JointUnits,
     before: Inspection | None,
     configured: Mapping[int, Mapping[str, int]],
     position_rad: Floats,
@@ -51,7 +51,7 @@ def recheck(
     Args:
         bus: where the servos are.
         robot: whose they are.
-        units: of their model.
+        units: of its joints.
         before: as found at the start; None: nothing to compare with.
         configured: values of RAM registers as they were set, by joint.
         position_rad: (J,) where the joints were last seen.
@@ -75,8 +75,8 @@ def recheck(
                 "another servo?"
             )
             faults.append(ChainFault(FaultCause.OTHER_FIRMWARE, text))
-        raw = np.array([bus.read(servo.servo_id, "Present Position")])
-        moved[joint] = units.position_rad(raw)[0] - position_rad[joint]
+        raw = bus.read(servo.servo_id, "Present Position")
+        moved[joint] = units.position_rad(joint, raw) - position_rad[joint]
         name = robot.joint_name(joint)
         turns = round(moved[joint] / math.tau) if np.isfinite(moved[joint]) else 0
         if turns:

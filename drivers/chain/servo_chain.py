@@ -11,14 +11,13 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.budget import WireBudget, chain_budget
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, ControlCycle, CycleCounters
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.chain.joint_codec import GoalEncoder, Readings
+from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Readings
 from snakewalk.drivers.chain.recheck import Recheck, recheck
 from snakewalk.drivers.chain.start_up import (
     RAM_SETTINGS,
     Inspection,
     check_pose,
     configure,
-    goal_limits_raw,
     inspect,
     let_reply,
 )
@@ -65,13 +64,14 @@ class ServoChain:
         """Prepare; nothing is sent before ``enable``.
 
         Args:
-            bus: servos of the robot's model.
+            bus: servos of the robot's models.
             robot: ids, limits, gains.
             watchdog_s: after so long without an instruction the servos stop by themselves.
             rate_hz: control cycles a second, checked against what the wire allows; None: unchecked.
 
         Raises:
-            ControlTableError: the model lacks a register or a unit that the cycle needs.
+            ControlTableError: a model lacks a register or a unit that the cycle needs, or has it
+                elsewhere than the others.
 
         """
         self.robot = robot
@@ -82,7 +82,8 @@ class ServoChain:
         are given up."""
         self._bus = bus
         self._clock = bus.port.clock
-        self._units = ServoUnits.of(bus.table)
+        tables = [bus.table_of(servo_id) for servo_id in robot.servo_ids]
+        self._units = JointUnits.of(robot, [ServoUnits.of(table) for table in tables])
         # rounded up: at least the time that was asked for
         ticks = math.ceil(watchdog_s / WATCHDOG_UNIT_S - 1e-9)
         self._watchdog_ticks = min(WATCHDOG_TICKS_MAX, max(1, ticks))
@@ -90,8 +91,8 @@ class ServoChain:
         self._configured: dict[int, dict[str, int]] = {}
         self._liveness: LivenessCheck | None = None
         self._rate_hz = rate_hz
-        self._goals = GoalEncoder(self._units, goal_limits_raw(robot, self._units))
-        self._readings = Readings(robot.joint_count, bus.table, self._units)
+        self._goals = GoalEncoder(self._units)
+        self._readings = Readings(tables, self._units)
         self._prepare_reads(fast=True)
         self._reads = 0
         self._armed = False

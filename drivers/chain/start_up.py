@@ -4,7 +4,6 @@ The order avoids what users of such buses report: goals not synced before torque
 of 500 us a servo, alarms from before, turn counts lost at a reboot.
 """
 
-import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.errors import BusError, ChainError, ChainFault, FaultCause, ServoError
 from snakewalk.drivers.protocol.control_table import model_numbers
 from snakewalk.drivers.protocol.registers import (
@@ -26,7 +26,6 @@ from snakewalk.drivers.protocol.registers import (
     TIME_PROFILE,
     TORQUE_ON_BY_GOAL,
     VOLTAGE_UNIT_V,
-    ServoUnits,
     alarm_names,
 )
 from snakewalk.drivers.types import LIMIT_SLACK_RAD
@@ -76,7 +75,7 @@ def inspect(bus: DynamixelBus, robot: RobotConfig) -> Inspection:
     if missing:
         text = (
             f"{bus.port.name}: no answer from servo {', '.join(missing)} of "
-            f"{robot.servo_ids[0]} to {robot.servo_ids[-1]} at {bus.port.getBaudRate()} baud: "
+            f"{_ids_in_words(robot.servo_ids)} at {bus.port.getBaudRate()} baud: "
             "power, cable, id or baud rate"
         )
         faults.append(ChainFault(FaultCause.NO_ANSWER, text))
@@ -84,8 +83,9 @@ def inspect(bus: DynamixelBus, robot: RobotConfig) -> Inspection:
     for servo_id, servo in found.items():
         joint = robot.joint_name(robot.servo_ids.index(servo_id))
         name = model_numbers().get(servo.model_number, f"number {servo.model_number}")
-        if servo.model_number != bus.table.model_number:
-            text = f"{joint}: is a {name}, not a {bus.table.model}"
+        table = bus.table_of(servo_id)
+        if servo.model_number != table.model_number:
+            text = f"{joint}: is a {name}, not a {table.model}"
             faults.append(ChainFault(FaultCause.OTHER_MODEL, text))
             continue
         report = _report(bus, servo_id, name)
@@ -126,21 +126,20 @@ class ChainSetting:
 
 
 def chain_settings(
-    robot: RobotConfig, units: ServoUnits, joint: int, goal_pwm: int
+    robot: RobotConfig, units: JointUnits, joint: int, goal_pwm: int
 ) -> tuple[ChainSetting, ...]:
     """Settings of one joint's servo, in the order in which they are written.
 
     Args:
         robot: limits and gains.
-        units: of its model.
+        units: of its joints.
         joint: index of the joint.
         goal_pwm: the servo's PWM Limit(36): a Goal PWM(100) that another program left below it
             would weaken the joint.
 
     """
-    low, high = goal_limits_raw(robot, units)[joint]
+    low, high = units.limits_raw[joint]
     pitch = robot.joint_axes[joint] == "p"
-    servo = robot.servo
     return (
         ChainSetting("Return Delay Time", 0),
         # before the rest: a new mode resets the gains
@@ -151,9 +150,9 @@ def chain_settings(
         ChainSetting("Shutdown", SHUTDOWN_ALARMS, SHUTDOWN_ALARMS, usual=False),
         ChainSetting("Min Position Limit", int(low)),
         ChainSetting("Max Position Limit", int(high)),
-        ChainSetting("Position P Gain", servo.pitch_p_gain if pitch else servo.position_p_gain),
-        ChainSetting("Position I Gain", servo.position_i_gain),
-        ChainSetting("Position D Gain", servo.position_d_gain),
+        ChainSetting("Position P Gain", robot.position_p_gains[joint]),
+        ChainSetting("Position I Gain", robot.position_i_gains[joint]),
+        ChainSetting("Position D Gain", robot.position_d_gains[joint]),
         ChainSetting("Feedforward 1st Gain", 0, usual=False),
         ChainSetting("Feedforward 2nd Gain", 0, usual=False),
         ChainSetting("Profile Acceleration", 0),
@@ -165,7 +164,7 @@ def chain_settings(
 def configure(
     bus: DynamixelBus,
     robot: RobotConfig,
-    units: ServoUnits,
+    units: JointUnits,
     joints: Iterable[int] | None = None,
     on_event: Callable[[str], None] = lambda line: None,
 ) -> dict[int, dict[str, int]]:
@@ -174,7 +173,7 @@ def configure(
     Args:
         bus: where the servos are.
         robot: the settings.
-        units: of their model.
+        units: of its joints.
         joints: only these; None is all.
         on_event: gets a line for each setting that another program has left behind, and for what
             is unusual and stays.
@@ -202,7 +201,7 @@ def configure(
 def _configure_joint(
     bus: DynamixelBus,
     robot: RobotConfig,
-    units: ServoUnits,
+    units: JointUnits,
     joint: int,
     on_event: Callable[[str], None],
 ) -> dict[str, int]:
@@ -212,7 +211,7 @@ def _configure_joint(
         raise ChainError(f"{name}: PWM Limit is 0: it cannot move; set it to {PWM_FULL}")
     values = {}
     for setting in chain_settings(robot, units, joint, pwm_limit):
-        if setting.register in bus.table:
+        if setting.register in bus.table_of(servo_id):
             values[setting.register] = _apply(bus, robot, joint, setting, on_event)
     if robot.joint_axes[joint] == "p":
         values["Goal Current"] = _limit_current(bus, robot, joint, units)
@@ -222,7 +221,7 @@ def _configure_joint(
         on_event(f"{name}: Drive Mode is reverse: it turns the other way round")
     offset = bus.read(servo_id, "Homing Offset")
     if offset:
-        angle = offset * units.rad_per_position
+        angle = offset * abs(units.rad_per_position[joint])
         on_event(f"{name}: Homing Offset is {offset}: its zero is moved by {angle:+.2f} rad")
     return {register: values[register] for register in RAM_SETTINGS if register in values}
 
@@ -255,14 +254,15 @@ def _apply(
     return value
 
 
-def _limit_current(bus: DynamixelBus, robot: RobotConfig, joint: int, units: ServoUnits) -> int:
-    servo_id, current_a = robot.servo_ids[joint], robot.servo.pitch_current_limit_a
+def _limit_current(bus: DynamixelBus, robot: RobotConfig, joint: int, units: JointUnits) -> int:
+    servo_id, current_a = robot.servo_ids[joint], robot.current_limits_a[joint]
     limit = bus.read(servo_id, "Current Limit")
-    goal = max(1, units.current_raw(current_a))
+    goal = max(1, units.current_raw(joint, current_a))
     if goal > limit:
+        own = bool(robot.joints) and robot.joints[joint].current_limit_a is not None
         raise ChainError(
-            f"{robot.joint_name(joint)}: pitch_current_limit_a = {current_a:g}: the servo's "
-            f"Current Limit is {limit * units.a_per_current:.2f} A"
+            f"{robot.joint_name(joint)}: {'' if own else 'pitch_'}current_limit_a = {current_a:g}: "
+            f"the servo's Current Limit is {limit * abs(units.a_per_current[joint]):.2f} A"
         )
     bus.write_verified(servo_id, "Goal Current", goal)
     return goal
@@ -275,15 +275,15 @@ def let_reply(bus: DynamixelBus, robot: RobotConfig) -> None:
     is sent without waiting for a reply, and only to servos of the robot's model.
     """
     found = bus.find(robot.servo_ids)
-    right = [i for i, servo in found.items() if servo.model_number == bus.table.model_number]
+    right = [i for i, s in found.items() if s.model_number == bus.table_of(i).model_number]
     if right:
         bus.sync_write(right, "Status Return Level", ALL_REPLY)
 
 
-def goal_limits_raw(robot: RobotConfig, units: ServoUnits) -> NDArray[np.int32]:
-    """(J, 2) least and greatest raw goal of each joint; in position mode the servo checks them."""
-    half = [math.floor(limit / units.rad_per_position) for limit in robot.limit_rad]
-    return np.array([(units.zero_position - h, units.zero_position + h) for h in half], np.int32)
+def _ids_in_words(ids: tuple[int, ...]) -> str:
+    if ids == tuple(range(ids[0], ids[-1] + 1)):
+        return f"{ids[0]} to {ids[-1]}"
+    return ", ".join(map(str, ids))
 
 
 def check_pose(robot: RobotConfig, position_rad: NDArray[np.float64]) -> None:

@@ -54,7 +54,6 @@ class SafetyLimits:
     def from_config(robot: RobotConfig, safety: SafetyConfig) -> "SafetyLimits":
         """Limits from the robot's and the run's configuration."""
         voltage_min_v, voltage_max_v = safety.voltage_limits_v(robot.servo)
-        effort_a = EFFORT_SHARE * robot.servo.pitch_current_limit_a
         return SafetyLimits(
             joint_names=tuple(map(robot.joint_name, range(robot.joint_count))),
             limit_rad=np.array(robot.limit_rad),
@@ -69,9 +68,7 @@ class SafetyLimits:
             stale_limit_s=safety.stale_limit_s,
             slow_stale_limit_s=safety.slow_stale_limit_s,
             following_limit_rad=np.array(safety.following_limits_rad(robot)),
-            following_effort_a=np.array(
-                [np.inf if axis == "y" else effort_a for axis in robot.joint_axes]
-            ),
+            following_effort_a=EFFORT_SHARE * np.array(robot.current_limits_a),
             following_time_s=safety.following_time_s,
             step_rate_rad_s=STEP_RATE * safety.goal_rate_rad_s,
         )

@@ -13,7 +13,7 @@ from snakewalk.sim.line.group_fast_path import GroupFastPath
 from snakewalk.sim.line.id_directory import IdDirectory
 from snakewalk.sim.line.instruction_handler import InstructionHandler
 from snakewalk.sim.line.wire import Wire
-from snakewalk.sim.plant import Plant
+from snakewalk.sim.plant import Mounting, Plant
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.firmware import Firmware
 from snakewalk.sim.servo.protection import SupplyAndAmbient
@@ -37,11 +37,12 @@ class SimLine(Wire):
         baud: int = 1_000_000,
         *,
         supply_and_ambient: SupplyAndAmbient | None = None,
+        mounting: Mounting | None = None,
         tamper: Tamper | None = None,
         usb_latency_s: float = 0.0,
     ) -> None:
         super().__init__(clock if clock is not None else SimClock(plant.time_s), usb_latency_s)
-        self.firmware = Firmware(bank, plant, supply_and_ambient)
+        self.firmware = Firmware(bank, plant, supply_and_ambient, mounting)
         self.bank = bank
         self.tamper = tamper
         self._handler = InstructionHandler(self.firmware, baud)

@@ -145,7 +145,7 @@ def mjcf(
     {options}/>
   <asset>{asset}</asset>
   <default>
-    <joint type="hinge" armature="{robot.servo.armature_kg_m2!r}"/>
+    <joint type="hinge"/>
     <geom condim="1" {soft}/>
   </default>
   <worldbody>
@@ -215,7 +215,8 @@ def _links_behind(robot: RobotConfig, *, balls: bool) -> str:
         back = robot.link_length_m / (2.0 if j == 0 else 1.0)
         text = (
             f'<body name="link{j + 1}" pos="{-back!r} 0 0">'
-            f'<joint name="joint{j}" axis="{axis}" range="{-stop!r} {stop!r}"/>'
+            f'<joint name="joint{j}" axis="{axis}" range="{-stop!r} {stop!r}" '
+            f'armature="{robot.armatures_kg_m2[j]!r}"/>'
             f"{_link(robot, j + 1, balls=balls)}{text}</body>"
         )
     return text

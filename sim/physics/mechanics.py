@@ -31,8 +31,8 @@ class Mechanics:
     """Coefficients of friction: sliding forward, across and back."""
     link_mass_kg: float
     radius_m: float
-    gear_drag_n_m_s: float
-    """Viscous loss of a gearbox, powered or not."""
+    gear_drag_n_m_s: Floats
+    """(J,) viscous loss of each gearbox, powered or not."""
     planes: TangentPlanes
     """What bears the body on a height field."""
     is_ground: NDArray[np.int32]
@@ -66,7 +66,7 @@ class Mechanics:
         is_ground = np.zeros(model.ngeom, dtype=np.int32)
         is_ground[model.geom("ground").id] = 1
         is_ground[planes.planes] = 1
-        about = mass, radius, robot.servo.gear_drag_n_m_s
+        about = mass, radius, np.array(robot.gear_drags_n_m_s)
         return cls(model, data, grip, *about, planes, is_ground, load, before, water)
 
     @property

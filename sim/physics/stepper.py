@@ -193,7 +193,7 @@ def _steps(
     geoms: tuple[NDArray[np.int32], ...],
     ground: tuple[Any, ...],
     law: tuple[float, ...],
-    gear_drag: float,
+    gear_drag: Floats,
     drive: tuple[Floats, ...],
     load: Floats,
     totals: Floats,
@@ -240,7 +240,7 @@ def _steps(
                 k_e[j],
                 current_limit[j],
             )
-            qfrc[6 + j] = torque[j] - gear_drag * qvel[6 + j]
+            qfrc[6 + j] = torque[j] - gear_drag[j] * qvel[6 + j]
         count = ncon[0]
         address = pointer(contact_list[0])
         contacts = (
@@ -260,7 +260,7 @@ def _steps(
             returned_j[j] -= min(input_w, 0.0) * step_s
             heat_j[j] += heat_w * step_s
             work_j[j] += torque[j] * middle * step_s
-            totals[2] += gear_drag * speed[j] * middle * step_s
+            totals[2] += gear_drag[j] * speed[j] * middle * step_s
         load[:] = 0.0
         force_n = carray(pointer(force_list[0]), (1 << 30,), np.float64)
         _weigh(load, contacts, force_n, geoms)
@@ -302,7 +302,7 @@ def _run(
         carray(pointer(arrays[16]), (geom_count, 3), np.float64),
         carray(pointer(arrays[17]), (ball_count,), np.int32),
         carray(pointer(arrays[18]), (sizes[4], sizes[5]), np.float64),
-        (constants[13], constants[14], constants[15]),
+        (constants[12], constants[13], constants[14]),
         carray(pointer(arrays[19]), (ball_count, PLANES), np.int32),
         carray(pointer(arrays[20]), (geom_count, 3), np.float64),
         carray(pointer(arrays[21]), (geom_count, 4), np.float64),
@@ -325,11 +325,12 @@ def _run(
         carray(pointer(arrays[36]), (joints,), np.float64),
         carray(pointer(arrays[37]), (joints,), np.float64),
     )
+    gear_drag = carray(pointer(arrays[38]), (joints,), np.float64)
     law = (constants[0], constants[1], constants[2], constants[3], constants[4], constants[5])
     state = (at, rate, force)
     _steps(
-        *(steps, where, state, chain, work, geoms, ground, law, constants[6], drive, load, totals),
-        constants[7:13],
+        *(steps, where, state, chain, work, geoms, ground, law, gear_drag, drive, load, totals),
+        constants[6:12],
     )
 
 
@@ -403,7 +404,7 @@ class CompiledSteps:
         self._constants = np.array(
             [
                 *(*m.mu, m.link_mass_kg, m.radius_m, m.step_s),
-                *(m.gear_drag_n_m_s, *m.water, *m.planes.corner_m),
+                *(*m.water, *m.planes.corner_m),
             ]
         )
         self._drive: ServoDrive | None = None
@@ -413,6 +414,6 @@ class CompiledSteps:
         """Advance ``steps`` steps."""
         if drive is not self._drive:
             self._drive = drive
-            arrays = (*self._arrays, *drive.columns())
+            arrays = (*self._arrays, *drive.columns(), self._m.gear_drag_n_m_s)
             self._addresses = np.array([each.ctypes.data for each in arrays], dtype=np.int64)
         run_steps(steps, self._where, self._addresses, self._sizes, self._constants)

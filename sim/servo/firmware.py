@@ -17,7 +17,7 @@ from snakewalk.drivers.protocol.registers import (
     TORQUE_ON_BY_GOAL,
     WATCHDOG_TRIPPED,
 )
-from snakewalk.sim.plant import Plant
+from snakewalk.sim.plant import Mounting, Plant
 from snakewalk.sim.servo.bank import TABLE_BYTES, ServoBank
 from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 from snakewalk.sim.servo.control_loops import CONTROL_S, ControlLoops
@@ -50,9 +50,17 @@ class Firmware:
     """Servos of ``bank`` on the shafts of ``plant``, in the order of the bank's rows."""
 
     def __init__(
-        self, bank: ServoBank, plant: Plant, supply_and_ambient: SupplyAndAmbient | None = None
+        self,
+        bank: ServoBank,
+        plant: Plant,
+        supply_and_ambient: SupplyAndAmbient | None = None,
+        mounting: Mounting | None = None,
     ) -> None:
         joints = len(bank)
+        mounted = mounting or Mounting(np.ones(joints), np.zeros(joints))
+        self._mounted_sign = mounted.sign
+        # a whole number of positions, so that a mirrored servo's numbers are mirrored to the bit
+        self._mounted_ticks = np.rint(mounted.zero_rad * TICKS_PER_RAD)
         self.bank = bank
         self.plant = plant
         motors = [MOTORS[model] for model in bank.models]
@@ -135,12 +143,14 @@ class Firmware:
             bank.switch_mode(switched)
         on &= self.powered
         restarted = (mode == POSITION_MODE) & ((on & ~self._last_on) | (mode != self._last_mode))
-        self._sign = np.where(bank["Drive Mode"] & REVERSE, -1.0, 1.0)
+        reverse = np.where(bank["Drive Mode"] & REVERSE, -1.0, 1.0)
+        self._sign = reverse * self._mounted_sign
+        self._centre = CENTRE_TICKS + reverse * self._mounted_ticks
         if restarted.any():
             self._reset_turns(restarted)
         offset = bank["Homing Offset"].astype(np.int64)
         offset[(mode == POSITION_MODE) & (np.abs(offset) > HOMING_LIMIT_TICKS)] = 0
-        self._zero = CENTRE_TICKS + offset - TICKS_PER_REV * self._turns
+        self._zero = self._centre + offset - TICKS_PER_REV * self._turns
         self._frame = np.stack([self._sign, self._zero])
         self._last_on, self._last_mode = on, mode.copy()
         self._enabled_by_goals = bool((bank["Drive Mode"] & TORQUE_ON_BY_GOAL).any())
@@ -301,7 +311,7 @@ class Firmware:
         self.blocked_shaft.hold(updated)
 
     def _reset_turns(self, which: NDArray[np.bool_]) -> None:
-        ticks = np.rint(self.plant.position_rad * self._sign * TICKS_PER_RAD) + CENTRE_TICKS
+        ticks = np.rint(self.plant.position_rad * self._sign * TICKS_PER_RAD) + self._centre
         self._turns[which] = np.floor(ticks / TICKS_PER_REV)[which]
 
     def _hold(self, late: NDArray[np.bool_]) -> None:

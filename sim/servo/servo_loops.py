@@ -58,7 +58,7 @@ def write_motion(
         shown = np.rint(current_a[row] * (sign / ampere))
         write_le(table[row], at_current, int(min(max(shown, -limit), limit)), 2)
         write_le(table[row], at_velocity, int(np.rint(velocity_rad_s[row] * (sign / rad_s))), 4)
-        ticks = np.rint(position_rad[row] * (sign * ticks_per_rad) + zero)
+        ticks = np.rint(position_rad[row] * (sign * ticks_per_rad)) + zero
         write_le(table[row], at_position, int(ticks), 4)
 
 

@@ -50,7 +50,7 @@ def add_energies(m: Mechanics, drive: ServoDrive, before_rad_s: Floats) -> None:
     drive.returned_j[:] += np.where(input_w < 0.0, -input_w, 0.0) * step_s
     drive.heat_j[:] += drive.resistance_ohm * amps**2 * step_s
     drive.work_j[:] += drive.torque_n_m * middle * step_s
-    m.totals[2] += m.gear_drag_n_m_s * float(before_rad_s @ middle) * step_s
+    m.totals[2] += float((m.gear_drag_n_m_s * before_rad_s) @ middle) * step_s
 
 
 def friction_forces(m: Mechanics) -> Floats:

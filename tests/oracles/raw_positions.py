@@ -15,4 +15,4 @@ def raw_positions(units: ServoUnits, angle_rad: Floats) -> Int32s:
     """
     if not np.isfinite(angle_rad).all():
         raise ValueError("an angle is not finite")
-    return np.rint(angle_rad / units.rad_per_position + units.zero_position).astype(np.int32)
+    return (np.rint(angle_rad / units.rad_per_position) + units.zero_position).astype(np.int32)

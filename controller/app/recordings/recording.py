@@ -126,14 +126,14 @@ def _pace(track: Track, shapes: Floats, wave_hz: float, robot: RobotConfig) -> P
     demand = joint_demand(joints, track.time_s, track.rate_hz, wave_hz)
     slow = slowing(demand, robot.joint_speed_limit_rad_s, robot.joint_acceleration_limit_rad_s2)
     fastest = float(demand.speed_rad_s.max())
-    motor = MOTORS.get(robot.servo.model)
+    no_load = [MOTORS[m].no_load_rad_s for m in robot.servo_models if m in MOTORS]
     return PaceFacts(
         joint_speed_rad_s=round(fastest, 2),
         joint_speed_95_rad_s=round(float(np.percentile(demand.speed_rad_s, 95.0)), 2),
         joint_speed_unsmoothed_rad_s=round(demand.raw_speed_rad_s, 2),
         joint_acceleration_rad_s2=round(float(demand.acceleration_rad_s2.max(initial=0.0)), 1),
         joint_speed_limit_rad_s=robot.joint_speed_limit_rad_s,
-        times_no_load_speed=None if motor is None else round(fastest / motor.no_load_rad_s, 2),
+        times_no_load_speed=round(fastest / min(no_load), 2) if no_load else None,
         slowed_by=round(slow.throughout, 2),
         slowed_by_for_speed=round(slow.by_speed, 2),
         slowed_by_for_acceleration=round(slow.by_acceleration, 2),

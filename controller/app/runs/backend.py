@@ -57,6 +57,7 @@ def simulated(
     require_extra("simulated runs need", "mujoco")
     from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
     from snakewalk.sim.physics.plant import MujocoPlant  # noqa: PLC0415
+    from snakewalk.sim.plant import Mounting  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
     from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
@@ -64,13 +65,14 @@ def simulated(
     plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
     servo = robot.servo
     line = SimLine(
-        ServoBank(robot.servo_ids, servo.model, servo.baud),
+        ServoBank(robot.servo_ids, robot.servo_models, servo.baud),
         plant,
         baud=servo.baud,
+        mounting=Mounting.of(robot),
         supply_and_ambient=SupplyAndAmbient(supply_v=servo.supply_v),
     )
     chain = ServoChain(
-        DynamixelBus(line, servo.model),
+        DynamixelBus(line, robot.models_by_id),
         robot,
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
@@ -96,7 +98,7 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
     """
     serial = SerialPort(port, robot.servo.baud)
     chain = ServoChain(
-        DynamixelBus(serial, robot.servo.model, latency_s=serial.latency_s),
+        DynamixelBus(serial, robot.models_by_id, latency_s=serial.latency_s),
         robot,
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,

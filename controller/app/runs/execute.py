@@ -75,7 +75,7 @@ def execute(
         backend = metal(prepared.run, prepared.robot, port or "")
     log_path = folder / LOG
     clear_run(folder)
-    torque_constant_n_m_a, winding = _motor(prepared.robot.servo.model)
+    torque_constant_n_m_a, winding = _motor(prepared.robot)
     with RunLog(log_path) as log:
         log.config(
             prepared.run,
@@ -161,22 +161,27 @@ def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
 
 
 def _current_gain_a_rad(robot: RobotConfig) -> float:
-    """Current of the stiffer joints per radian of lead; 0 where the motor is not known."""
+    """Current of the stiffest joint per radian of lead; 0 where no motor is known."""
     from snakewalk.sim.servo.motor import MOTORS, p_gain_per_rad  # noqa: PLC0415  figures only
 
-    servo = robot.servo
-    motor = MOTORS.get(servo.model)
-    if motor is None:
-        return 0.0
-    gain = float(p_gain_per_rad(max(servo.position_p_gain, servo.pitch_p_gain), motor))
-    return gain * servo.supply_v / motor.resistance_ohm
+    gains_a_rad = [0.0]
+    for model, gain in zip(robot.servo_models, robot.position_p_gains, strict=True):
+        motor = MOTORS.get(model)
+        if motor is not None:
+            per_rad = float(p_gain_per_rad(gain, motor))
+            gains_a_rad.append(per_rad * robot.servo.supply_v / motor.resistance_ohm)
+    return max(gains_a_rad)
 
 
-def _motor(model: str) -> tuple[float, Winding | None]:
-    """Torque constant (N m/A) and winding; NaN and None where the simulator has no such model."""
+def _motor(robot: RobotConfig) -> tuple[float, Winding | None]:
+    """Torque constant (N m/A) and winding of the robot's servos.
+
+    NaN and None where the simulator has no such model, or the servos are of several.
+    """
     from snakewalk.sim.servo.motor import MOTORS  # noqa: PLC0415  only for these figures
 
-    motor = MOTORS.get(model)
-    if motor is None:
+    models = set(robot.servo_models)
+    motor = MOTORS.get(models.pop())
+    if motor is None or models:
         return float("nan"), None
     return motor.torque_constant_n_m_a, Winding(motor.resistance_ohm, motor.back_emf_v_s)

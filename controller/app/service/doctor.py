@@ -34,7 +34,7 @@ def examine(
         PortError: the port vanished.
 
     """
-    bus = DynamixelBus(port, robot.servo.model, latency_s=latency_s)
+    bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s)
     findings = [adapter.latency_timer(latency_timer_ms, port.name)]
     on_progress("who answers")
     expected, baud = robot.servo_ids, port.getBaudRate()
@@ -90,7 +90,9 @@ def _reports(
         findings.append(Finding("registers", "fail", str(error), "run it again; then the cables"))
         return ()
     wrong = [str(f) for f in inspection.faults if f.cause is FaultCause.OTHER_MODEL]
-    findings.append(servos.models(inspection.servos, wrong, bus.table.model))
+    findings.append(
+        servos.models(inspection.servos, wrong, ", ".join(dict.fromkeys(robot.servo_models)))
+    )
     return inspection.servos
 
 

@@ -6,12 +6,20 @@ import numpy as np
 import pytest
 
 from snakewalk.drivers.chain import joint_codec
-from snakewalk.drivers.chain.joint_codec import GoalEncoder, encode_goals
+from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, encode_goals
 from snakewalk.drivers.protocol.registers import ServoUnits
 from tests.oracles.raw_positions import raw_positions
 
 UNITS = ServoUnits(2048, 2.0 * np.pi / 4096, 0.02, 0.00269)
 LIMITS = np.array([[1024, 3072], [1500, 2600], [0, 4095]], np.int32)
+ONES = np.ones(3)
+JOINTS = JointUnits(
+    np.full(3, UNITS.zero_position, np.int32),
+    ONES * UNITS.rad_per_position,
+    ONES * UNITS.rad_s_per_velocity,
+    ONES * UNITS.a_per_current,
+    LIMITS,
+)
 both_ways = pytest.mark.parametrize(
     "loop", [encode_goals, encode_goals.py_func], ids=["compiled", "interpreted"]
 )
@@ -22,7 +30,7 @@ def test_goals_are_the_nearest_positions_also_at_halves(
     loop: Callable[..., bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(joint_codec, "encode_goals", loop)
-    encoder = GoalEncoder(UNITS, LIMITS)
+    encoder = GoalEncoder(JOINTS)
     rng = np.random.default_rng(5)
     halves = (rng.integers(-3000, 3000, (500, 3)) + 0.5) * UNITS.rad_per_position
     for goal in (*rng.normal(0.0, 1.5, (500, 3)), *halves, np.array([1e300, -1e300, 1e12])):
@@ -40,7 +48,7 @@ def test_goals_that_are_not_finite_or_too_few_are_refused(
     bad: float, loop: Callable[..., bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(joint_codec, "encode_goals", loop)
-    encoder = GoalEncoder(UNITS, LIMITS)
+    encoder = GoalEncoder(JOINTS)
     with pytest.raises(ValueError, match="not finite"):
         encoder.encode(np.array([0.0, bad, 0.0]))
     with pytest.raises(ValueError, match="3 joints"):

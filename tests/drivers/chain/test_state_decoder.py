@@ -1,14 +1,16 @@
 """Bytes of the state block to SI units, register by register."""
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from snakewalk.config.robot import JointConfig, RobotConfig
 from snakewalk.drivers.chain import joint_codec
-from snakewalk.drivers.chain.joint_codec import StateDecoder, decode_state
+from snakewalk.drivers.chain.joint_codec import JointUnits, StateDecoder, decode_state
 from snakewalk.drivers.protocol.control_table import load_control_table
 from snakewalk.drivers.protocol.registers import ServoUnits
 
@@ -22,9 +24,12 @@ large = st.integers(-(2**31), 2**31 - 1)
 )
 @pytest.mark.parametrize("model", MODELS)
 @settings(deadline=None)  # interpreted loops are slow
-@given(raw=st.lists(st.tuples(small, large, large), min_size=1, max_size=5))
+@given(
+    sign=st.sampled_from([1, -1]),
+    raw=st.lists(st.tuples(small, large, large), min_size=1, max_size=5),
+)
 def test_every_raw_value_is_scaled_by_its_unit(
-    model: str, loop: Callable[..., None], raw: list[tuple[int, int, int]]
+    model: str, loop: Callable[..., None], sign: Literal[1, -1], raw: list[tuple[int, int, int]]
 ) -> None:
     table = load_control_table(model)
     units = ServoUnits.of(table)
@@ -37,7 +42,12 @@ def test_every_raw_value_is_scaled_by_its_unit(
     found = np.zeros((3, len(raw)))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(joint_codec, "decode_state", loop)
-        StateDecoder(table, units).decode(data, found)
-    assert found[0].tolist() == units.current_a(current).tolist()
-    assert found[1].tolist() == units.velocity_rad_s(velocity).tolist()
-    assert found[2].tolist() == units.position_rad(position).tolist()
+        count = len(raw)
+        robot = RobotConfig(
+            name="some", joint_axes="y" * count, joints=(JointConfig(sign=sign),) * count
+        )
+        StateDecoder([table], JointUnits.of(robot, [units] * count)).decode(data, found)
+    assert found[0].tolist() == (sign * units.current_a(current)).tolist()
+    assert found[1].tolist() == (sign * units.velocity_rad_s(velocity)).tolist()
+    assert found[2].tolist() == (sign * units.position_rad(position)).tolist()
+    assert not np.signbit(found[found == 0.0]).any()

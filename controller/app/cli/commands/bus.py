@@ -164,12 +164,14 @@ def _robot_line(name: str, baud: int | None) -> "SimLine":
     from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415
     from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
     from snakewalk.sim.physics.plant import MujocoPlant  # noqa: PLC0415
+    from snakewalk.sim.plant import Mounting  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
 
     robot = load_robot(name)
     rate = baud or robot.servo.baud
-    bank = ServoBank(robot.servo_ids, robot.servo.model, rate)
-    return SimLine(bank, MujocoPlant(robot, load_world("flat")), baud=rate)
+    bank = ServoBank(robot.servo_ids, robot.servo_models, rate)
+    plant = MujocoPlant(robot, load_world("flat"))
+    return SimLine(bank, plant, baud=rate, mounting=Mounting.of(robot))
 
 
 def _announce(server: "PtyServer", what: "ChainSpec", line: "Wire", as_json: bool) -> None:

@@ -14,8 +14,9 @@ def list_(as_json: Json = False) -> None:
     rows = {
         "runs": [[n, f"{(r := load_run(n)).robot} on {r.world}"] for n in shipped("runs")],
         "robots": [
-            [n, f"{(b := load_robot(n)).joint_count} {b.servo.model}, {b.length_m:.2f} m"]
+            [n, f"{b.joint_count} {', '.join(dict.fromkeys(b.servo_models))}, {b.length_m:.2f} m"]
             for n in shipped("robots")
+            for b in [load_robot(n)]
         ],
         "worlds": [[n, load_world(n).ground.kind] for n in shipped("worlds")],
     }
