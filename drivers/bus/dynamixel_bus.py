@@ -33,6 +33,7 @@ from snakewalk.drivers.protocol.packet import (
 )
 
 T = TypeVar("T")
+_PROBES = 5
 _PING_BYTES = 3
 """Model number and firmware."""
 
@@ -120,9 +121,18 @@ class DynamixelBus:
             for servo_id, (number, firmware) in sorted(replies.items())
         }
 
-    def probe(self, servo_id: int, pings: int = 5) -> Probe:
-        """Ping several times until quiet: finds two servos of one ID, which a ping does not."""
-        return probe(self.port, servo_id, pings, self.latency_s)
+    def probe(self, servo_id: int, block: tuple[str, str] | None = None) -> Probe:
+        """Ping 5 times until quiet, or read from the first to the last register of a block.
+
+        Finds two servos of one ID, which a ping does not.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        table = self.table_of(servo_id)
+        ends = None if block is None else (table[block[0]], table[block[1]])
+        return probe(self.port, servo_id, _PROBES, self.latency_s, ends)
 
     def read(self, servo_id: int, name: str) -> int:
         """Value of a register by its name.

@@ -1,13 +1,14 @@
-"""Pings that receive until the line is quiet: which servos share an ID, whose replies are damaged.
+"""Requests that receive until the line is quiet: what one strict reply would not show.
 
 Servos with the same ID reply at the same time. Their bytes collide, or both replies arrive where
-return delays or clocks differ; one strict ping would show neither.
+return delays or clocks differ. Another master's packets come unasked.
 """
 
 from dataclasses import dataclass
 
 from snakewalk.drivers.bus.budget import STATUS_BYTES
 from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.control_table import Register
 from snakewalk.drivers.protocol.packet import (
     BITS_PER_BYTE,
     Instruction,
@@ -17,45 +18,100 @@ from snakewalk.drivers.protocol.packet import (
 )
 from snakewalk.drivers.protocol.parser import PacketParser
 
-_REPLY_BYTES = STATUS_BYTES + 3
+_PING_BYTES = 3
 _SETTLE_S = 2e-3
 """Longer than the longest return delay (0.508 ms)."""
+_OVERHEARD_BYTES = 1 << 16
+"""Bytes that are enough to know who talks."""
 
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """Result of pinging one ID several times."""
+    """Result of asking one ID several times."""
 
     servo_id: int
-    pings: int
+    requests: int
     answered: int
-    """Pings with at least one good reply."""
+    """Requests with at least one good reply."""
     doubled: int
-    """Good replies beyond one a ping: two servos; a late reply makes up for a missing one."""
+    """Good replies beyond one a request: two servos; a late reply makes up for a missing one."""
     damaged: int
-    """Pings after which bytes arrived that are no packet: two servos, or a bad line."""
+    """Requests after which bytes arrived that are no packet: two servos, or a bad line."""
+    late_s: tuple[float, ...]
+    """How much later than the wire and the return delay allow each reply was complete."""
 
 
-def probe(port: BytePort, servo_id: int, pings: int, latency_s: float) -> Probe:
-    """Ping ``servo_id`` ``pings`` times, each time until the line has fallen quiet.
+def probe(
+    port: BytePort,
+    servo_id: int,
+    requests: int,
+    latency_s: float,
+    block: tuple[Register, Register] | None = None,
+) -> Probe:
+    """Ping ``servo_id`` several times, or read from it, each time until the line is quiet.
+
+    Args:
+        port: the line.
+        servo_id: who is asked.
+        requests: how often.
+        latency_s: how long adapter and driver may hold bytes back, at most.
+        block: first and last register of a block to read; None: ping.
 
     Raises:
         PortError: the port is gone.
 
     """
-    packet = encode_instruction(InstructionPacket(servo_id, Instruction.PING))
+    kind, span, data_bytes = Instruction.PING, b"", _PING_BYTES
+    if block is not None:
+        kind, address = Instruction.READ, block[0].address
+        data_bytes = block[1].address + block[1].size - address
+        span = address.to_bytes(2, "little") + data_bytes.to_bytes(2, "little")
+    packet = encode_instruction(InstructionPacket(servo_id, kind, span))
+    reply_bytes = STATUS_BYTES + data_bytes
+    byte_s = BITS_PER_BYTE / port.getBaudRate()
     answered = total = damaged = 0
-    wait_s = (len(packet) + 2 * _REPLY_BYTES) * BITS_PER_BYTE / port.getBaudRate()
-    for _ in range(pings):
+    late_s: list[float] = []
+    for _ in range(requests):
         port.clearPort()
+        sent_s = port.clock.now_s()
         port.write(packet)
-        deadline_s = port.clock.now_s() + wait_s + _SETTLE_S + latency_s
+        deadline_s = sent_s + (len(packet) + 2 * reply_bytes) * byte_s + _SETTLE_S + latency_s
         reader = PacketParser()
         replies = 0
-        while data := port.read_until(_REPLY_BYTES, deadline_s):
+        while data := port.read_until(reply_bytes, deadline_s):
             for reply in reader.feed(data):
                 replies += isinstance(reply, StatusPacket) and reply.servo_id == servo_id
+            if replies == 1 and len(late_s) == answered:
+                least_s = (len(packet) + reply_bytes) * byte_s
+                late_s.append(port.clock.now_s() - sent_s - least_s)
         answered += replies > 0
         total += replies
         damaged += reader.dropped_bytes + reader.pending > 0
-    return Probe(servo_id, pings, answered, max(0, total - pings), damaged)
+    doubled = max(0, total - requests)
+    return Probe(servo_id, requests, answered, doubled, damaged, tuple(late_s))
+
+
+@dataclass(frozen=True, slots=True)
+class Overheard:
+    """What came unasked."""
+
+    instructions: int
+    """Instruction packets: only another master sends them."""
+    replies: int
+    """Status packets: replies to somebody else."""
+    noise_bytes: int
+
+
+def overhear(port: BytePort, seconds: float) -> Overheard:
+    """Send nothing for some time, and count what arrives.
+
+    Raises:
+        PortError: the port is gone.
+
+    """
+    data = port.read_until(_OVERHEARD_BYTES, port.clock.now_s() + seconds)
+    reader = PacketParser()
+    packets = reader.feed(data)
+    replies = sum(isinstance(packet, StatusPacket) for packet in packets)
+    noise_bytes = reader.dropped_bytes + reader.pending
+    return Overheard(len(packets) - replies, replies, noise_bytes)

@@ -4,7 +4,7 @@ The order avoids what users of such buses report: goals not synced before torque
 of 500 us a servo, alarms from before, turn counts lost at a reboot.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,11 +67,14 @@ class Inspection:
         return all(servo.firmware >= FAST_READ_FIRMWARE for servo in self.servos)
 
 
-def inspect(bus: DynamixelBus, robot: RobotConfig) -> Inspection:
-    """Read identity and state of every servo of the robot; changes nothing."""
-    found = bus.find(robot.servo_ids)
+def inspect(
+    bus: DynamixelBus, robot: RobotConfig, servo_ids: Collection[int] | None = None
+) -> Inspection:
+    """Read identity and state of every servo of the robot, or of some; changes nothing."""
+    asked = robot.servo_ids if servo_ids is None else servo_ids
+    found = bus.find(asked)
     faults: list[ChainFault] = []
-    missing = [str(servo_id) for servo_id in robot.servo_ids if servo_id not in found]
+    missing = [str(servo_id) for servo_id in asked if servo_id not in found]
     if missing:
         text = (
             f"{bus.port.name}: no answer from servo {', '.join(missing)} of "
@@ -293,12 +296,17 @@ def check_pose(robot: RobotConfig, position_rad: NDArray[np.float64]) -> None:
         ChainError: a joint stands well beyond its limit.
 
     """
-    faults = [
+    faults = pose_faults(robot, position_rad)
+    if faults:
+        raise ChainError(faults)
+
+
+def pose_faults(robot: RobotConfig, position_rad: NDArray[np.float64]) -> list[str]:
+    """Joints that stand well beyond their limits, one line each."""
+    return [
         f"{robot.joint_name(joint)}: stands at {angle:.2f} rad, beyond its "
         f"limit of {limit:g}: bend it back by hand; if it is straight, its turn count or zero "
         "position is wrong: reboot it, check Homing Offset"
         for joint, (angle, limit) in enumerate(zip(position_rad, robot.limit_rad, strict=True))
         if not abs(angle) <= limit + LIMIT_SLACK_RAD
     ]
-    if faults:
-        raise ChainError(faults)

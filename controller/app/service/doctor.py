@@ -1,21 +1,26 @@
-"""Reads a bus and puts the checks in order; writes nothing to a servo."""
+"""Reads a bus and puts the checks in order; writes nothing to a servo unless the joints wiggle."""
 
 from collections.abc import Callable, Sequence
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
-from snakewalk.controller.app.service import adapter
+from snakewalk.controller.app.service import adapter, line_checks
 from snakewalk.controller.app.service import servo_checks as servos
-from snakewalk.controller.app.service.finding import Finding
-from snakewalk.controller.app.service.scan import has_baud, scan
+from snakewalk.controller.app.service.finding import Finding, worst
+from snakewalk.controller.app.service.register_checks import read_registers, register_findings
+from snakewalk.controller.app.service.scan import scan
+from snakewalk.controller.app.service.supply_check import supply_under_load
 from snakewalk.drivers.bus.budget import chain_budget
-from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.probe import overhear
+from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import FAST_READ_FIRMWARE, ServoReport, inspect
-from snakewalk.drivers.errors import BusError, FaultCause
+from snakewalk.drivers.errors import BusError, FaultCause, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.registers import ServoUnits
 
-_TEST_READS = 200
+_MEASURED = ("Realtime Tick", "Present Temperature")
+"""Registers that differ between two servos, however alike they are."""
 
 
 def examine(
@@ -26,9 +31,13 @@ def examine(
     *,
     latency_s: float,
     latency_timer_ms: int | None,
+    wiggle: bool = False,
     on_progress: Callable[[str], None] = lambda step: None,
 ) -> list[Finding]:
     """Findings about the bus, worst causes first.
+
+    With ``wiggle``, where nothing has failed: the chain is set up as in a run, and all joints move
+    by 0.15 rad for 2 s, to measure the supply under load.
 
     Raises:
         PortError: the port vanished.
@@ -36,22 +45,34 @@ def examine(
     """
     bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s)
     findings = [adapter.latency_timer(latency_timer_ms, port.name)]
+    on_progress("who else talks")
+    port.drain_until_quiet(latency_s)  # what an earlier program has asked for
+    findings.append(line_checks.second_master(overhear(port, line_checks.OVERHEAR_S)))
     on_progress("who answers")
     expected, baud = robot.servo_ids, port.getBaudRate()
-    found = bus.find(expected)
+    answering = list(bus.find(expected))
+    on_progress("duplicate IDs")
+    pings = [bus.probe(i) for i in expected]
+    reads = [bus.probe(i, _MEASURED) for i in answering]
+    shared = [p.servo_id for p in (*pings, *reads) if p.doubled or p.damaged == p.requests]
+    found = sorted({*answering, *shared})
     missing = [i for i in expected if i not in found]
-    elsewhere = (
-        _at_other_bauds(port, missing, on_progress) if missing and has_baud(port.name) else {}
-    )
-    findings += servos.presence(expected, list(found), elsewhere, baud, port.name)
+    elsewhere = _at_other_bauds(port, missing, on_progress) if missing else {}
+    findings += servos.presence(expected, found, elsewhere, baud, port.name)
     on_progress("who else is there")
     findings += [f for f in [servos.unexpected_ids(expected, list(bus.scan()))] if f is not None]
     if not found:
         return findings
-    on_progress("duplicate IDs")
-    findings.append(servos.duplicates([bus.probe(i) for i in found]))
+    if findings[1].grade != "fail":  # else their replies are taken for a second servo's
+        findings.append(servos.duplicates(pings, reads))
+    late_s = [late for probe in pings for late in probe.late_s]
+    findings += [f for f in [line_checks.response(late_s, latency_s)] if f is not None]
+    silent = [p.servo_id for p in reads if not p.answered and p.servo_id not in shared]
+    unread = [servo_id for servo_id in silent if not _replies_to_reads(bus, servo_id)]
+    findings += [f for f in [servos.silent_to_reads(unread)] if f is not None]
     on_progress("registers")
-    reports = _reports(bus, robot, findings)
+    readable = [i for i in answering if i not in unread and i not in shared]
+    reports = _reports(bus, robot, readable, findings) if readable else ()
     if reports:
         findings += [
             servos.firmware(reports),
@@ -60,32 +81,37 @@ def examine(
             servos.torque(reports),
             servos.supply(reports, *safety.voltage_limits_v(robot.servo)),
             servos.heat(reports, safety.temperature_limit_c),
+            *_settings(bus, robot, reports),
         ]
         on_progress("group reads")
         fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
-        findings.append(line_quality(bus.cycle([s.servo_id for s in reports], fast=fast)))
+        port.drain_until_quiet(line_checks.PATIENCE_S)  # late replies to what was asked so far
+        patient = DynamixelBus(port, robot.models_by_id, latency_s=line_checks.PATIENCE_S)
+        cycle = patient.cycle([s.servo_id for s in reports], fast=fast)
+        findings.append(line_checks.line_quality(port, cycle, latency_s))
     fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
     findings.append(adapter.wire(chain_budget(robot.joint_count, baud, fast=fast), rate_hz))
+    if wiggle and worst(findings) != "fail":
+        on_progress("supply under load")
+        findings.append(supply_under_load(bus, robot, safety))
     return findings
 
 
-def line_quality(cycle: ControlCycle) -> Finding:
-    """Damaged or missing answers in many group reads, as a run does them."""
-    lost = sum(not cycle.read().valid.all() for _ in range(_TEST_READS))
-    found = f"{lost} of {_TEST_READS} group reads incomplete"
-    remedy = "cables, plugs, termination, a common ground; a lower baud rate"
-    if lost > 0.05 * _TEST_READS:
-        return Finding("line", "fail", found, remedy)
-    if lost:
-        return Finding("line", "warn", found, remedy)
-    return Finding("line", "ok", found)
+def _replies_to_reads(bus: DynamixelBus, servo_id: int) -> bool:
+    try:
+        bus.read(servo_id, "Firmware Version")
+    except ServoError:
+        return True  # a refusal is a reply
+    except BusError:
+        return False
+    return True
 
 
 def _reports(
-    bus: DynamixelBus, robot: RobotConfig, findings: list[Finding]
+    bus: DynamixelBus, robot: RobotConfig, servo_ids: Sequence[int], findings: list[Finding]
 ) -> Sequence[ServoReport]:
     try:
-        inspection = inspect(bus, robot)
+        inspection = inspect(bus, robot, servo_ids)
     except BusError as error:
         findings.append(Finding("registers", "fail", str(error), "run it again; then the cables"))
         return ()
@@ -94,6 +120,17 @@ def _reports(
         servos.models(inspection.servos, wrong, ", ".join(dict.fromkeys(robot.servo_models)))
     )
     return inspection.servos
+
+
+def _settings(
+    bus: DynamixelBus, robot: RobotConfig, reports: Sequence[ServoReport]
+) -> list[Finding]:
+    try:
+        registers = [read_registers(bus, robot, report.servo_id) for report in reports]
+    except BusError as error:
+        return [Finding("registers", "fail", str(error), "run it again; then the cables")]
+    scales = [ServoUnits.of(bus.table_of(servo_id)) for servo_id in robot.servo_ids]
+    return register_findings(registers, robot, JointUnits.of(robot, scales))
 
 
 def _at_other_bauds(

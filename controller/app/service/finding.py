@@ -1,5 +1,6 @@
 """One line of the doctor's report."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Literal
 
@@ -25,3 +26,26 @@ def worst(findings: list[Finding]) -> Grade:
     """Grade of the whole."""
     grades = {finding.grade for finding in findings}
     return "fail" if "fail" in grades else "warn" if "warn" in grades else "ok"
+
+
+def shown_ids(servo_ids: Sequence[int]) -> str:
+    """``servo 3``, ``servos 1 to 4, 7``."""
+    numbers = sorted(servo_ids)
+    spans: list[list[int]] = []
+    for number in numbers:
+        if spans and number == spans[-1][1] + 1:
+            spans[-1][1] = number
+        else:
+            spans.append([number, number])
+    shown = [f"{a}" if a == b else f"{a}, {b}" if b == a + 1 else f"{a} to {b}" for a, b in spans]
+    return f"servo{'s' if len(numbers) > 1 else ''} {', '.join(shown)}"
+
+
+def shown_subject(servo_ids: Sequence[int], verb: str) -> str:
+    """``servo 3 answers``, ``servos 1 to 4 answer``; ``verb`` is the plural."""
+    irregular = {
+        **{"have": "has", "are": "is", "reply": "replies", "switch": "switches"},
+        **{"do not reply": "does not reply", "cannot": "cannot"},
+    }
+    one = irregular.get(verb, f"{verb}s")
+    return f"{shown_ids(servo_ids)} {verb if len(servo_ids) > 1 else one}"

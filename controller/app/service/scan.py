@@ -1,16 +1,16 @@
 """Servos on a bus at every baud rate, and the choice of the serial port."""
 
-import os
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 from serial.tools import list_ports
 
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.errors import PortError
+from snakewalk.drivers.errors import BusError, ControlTableError, PortError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import model_numbers
-from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD
+from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, SECONDARY_ID_LIMIT
 
 _LIKELY = (1_000_000, FACTORY_BAUD)
 
@@ -23,6 +23,8 @@ class ScanResult:
     model: str
     firmware: int | None
     baud: int
+    secondary_id: int | None = None
+    """Another ID whose writes it obeys as well, silently; None: none."""
 
     def to_dict(self) -> dict[str, object]:
         """For JSON."""
@@ -45,11 +47,6 @@ def pick_port(port: str | None) -> str:
     raise PortError(f"--port: {shown}")
 
 
-def has_baud(device: str) -> bool:
-    """Whether the baud rate means anything: not on a pseudo-terminal."""
-    return not os.path.realpath(device).startswith("/dev/pts/")
-
-
 def scan(
     port: BytePort,
     bauds: Sequence[int] = (),
@@ -62,24 +59,43 @@ def scan(
 
     """
     before = port.getBaudRate()
-    if not has_baud(port.name):
-        bauds = (before,)
+    asked = tuple(bauds or sorted(BAUDS, key=lambda rate: (rate not in _LIKELY, rate)))
     results: list[ScanResult] = []
     try:
-        for baud in bauds or sorted(BAUDS, key=lambda rate: (rate not in _LIKELY, rate)):
+        for baud in asked:
             on_progress(f"{baud} baud")
             if port.setBaudRate(baud):
                 results += _at(port, baud)
     finally:
         port.setBaudRate(before)
+    if len(asked) > 1:
+        results = _told_once(results, before, len(asked))
     return sorted(results, key=lambda servo: (servo.servo_id, servo.baud))
+
+
+def _told_once(results: Sequence[ScanResult], baud: int, rates: int) -> list[ScanResult]:
+    """Results without the repetitions of a line that has no baud rate.
+
+    Behind some pseudo-terminals a servo answers at every rate; it is told at ``baud`` then.
+    """
+    answers = Counter(servo.servo_id for servo in results)
+    return [s for s in results if answers[s.servo_id] < rates or s.baud == baud]
 
 
 def _at(port: BytePort, baud: int) -> list[ScanResult]:
     names = model_numbers()
-    return [
-        ScanResult(
-            f.servo_id, names.get(f.model_number, f"number {f.model_number}"), f.firmware, baud
-        )
-        for f in DynamixelBus(port).scan().values()
-    ]
+    results = []
+    for servo in DynamixelBus(port).scan().values():
+        model = names.get(servo.model_number, f"number {servo.model_number}")
+        shadow = _secondary_id(port, servo.servo_id, model)
+        results.append(ScanResult(servo.servo_id, model, servo.firmware, baud, shadow))
+    return results
+
+
+def _secondary_id(port: BytePort, servo_id: int, model: str) -> int | None:
+    """Secondary(Shadow) ID(12) of a servo; None if it has none, or does not say."""
+    try:
+        shadow = DynamixelBus(port, model).read(servo_id, "Secondary(Shadow) ID")
+    except (BusError, ControlTableError):
+        return None
+    return shadow if shadow <= SECONDARY_ID_LIMIT else None

@@ -2,32 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 
-from snakewalk.controller.app.service.finding import Finding
+from snakewalk.controller.app.service.finding import Finding, shown_ids, shown_subject
 from snakewalk.drivers.bus.probe import Probe
 from snakewalk.drivers.chain.start_up import FAST_READ_FIRMWARE, ServoReport
 from snakewalk.drivers.protocol.registers import alarm_names
 
 _HOT_C = 60.0
 _CABLE_DROP_V = 0.5
+_DUPLICATE_REMEDY = (
+    "connect one of them alone and give it another: snakewalk bus set --id ID --new-id NEW"
+)
 
 
-def _ids(servos: Sequence[ServoReport] | Sequence[int]) -> str:
-    """``servo 3``, ``servos 1 to 4, 7``."""
-    numbers = sorted(servo if isinstance(servo, int) else servo.servo_id for servo in servos)
-    spans: list[list[int]] = []
-    for number in numbers:
-        if spans and number == spans[-1][1] + 1:
-            spans[-1][1] = number
-        else:
-            spans.append([number, number])
-    shown = [f"{a}" if a == b else f"{a}, {b}" if b == a + 1 else f"{a} to {b}" for a, b in spans]
-    return f"servo{'s' if len(numbers) > 1 else ''} {', '.join(shown)}"
-
-
-def _do(servos: Sequence[ServoReport] | Sequence[int], verb: str) -> str:
-    """``servo 3 answers``, ``servos 1 to 4 answer``; ``verb`` is the plural."""
-    one = {"have": "has", "are": "is"}.get(verb, f"{verb}s")
-    return f"{_ids(servos)} {verb if len(servos) > 1 else one}"
+def _subject(servos: Sequence[ServoReport], verb: str) -> str:
+    return shown_subject([servo.servo_id for servo in servos], verb)
 
 
 def presence(
@@ -55,7 +43,7 @@ def presence(
             Finding(
                 "baud rate",
                 "fail",
-                f"{_do(ids, 'answer')} at {rate} baud, not at {baud}",
+                f"{shown_subject(ids, 'answer')} at {rate} baud, not at {baud}",
                 f"snakewalk bus set --port {port} --baud {rate} --id {ids[0]} --new-baud {baud}",
             )
         )
@@ -66,9 +54,11 @@ def presence(
         remedy = (
             "is the servo power on? is the adapter's switch at TTL or RS-485 as the servos need?"
             if len(missing) == len(expected)
-            else f"look at the cable in front of {_ids(missing[:1])}; snakewalk scan --port {port}"
+            else f"look at the cable in front of servo {missing[0]}; snakewalk scan --port {port}"
         )
-        findings.append(Finding("servo IDs", "fail", f"no answer from {_ids(missing)}", remedy))
+        findings.append(
+            Finding("servo IDs", "fail", f"no answer from {shown_ids(missing)}", remedy)
+        )
     else:
         findings.append(Finding("servo IDs", "ok", f"{len(found)} of {len(expected)} answer"))
     return findings
@@ -82,30 +72,58 @@ def unexpected_ids(expected: Sequence[int], answering: Sequence[int]) -> Finding
     return Finding(
         "servo IDs",
         "warn",
-        f"{_do(extra, 'are')} on the bus and not in the robot",
+        f"{shown_subject(extra, 'are')} on the bus and not in the robot",
         "describe them in the robot's TOML, or take them off",
     )
 
 
-def duplicates(probes: Sequence[Probe]) -> Finding:
-    """Two servos with one ID answer twice, or over each other."""
-    doubled = [p.servo_id for p in probes if p.doubled]
-    damaged = [p.servo_id for p in probes if p.damaged and not p.doubled]
+def duplicates(pings: Sequence[Probe], reads: Sequence[Probe]) -> Finding:
+    """Two servos with one ID answer twice, or over each other.
+
+    Two that are alike reply to a ping with the same bytes at the same time, which is one good
+    reply; what they measure differs.
+    """
+    check = "duplicate IDs"
+    doubled = sorted({p.servo_id for p in (*pings, *reads) if p.doubled})
     if doubled:
         return Finding(
-            "duplicate IDs",
+            check,
             "fail",
-            f"{_do(doubled, 'answer')} twice: two servos have this ID",
-            "connect one of them alone and give it another: snakewalk bus set --new-id",
+            f"{shown_subject(doubled, 'answer')} twice: two servos have this ID",
+            _DUPLICATE_REMEDY,
         )
+    never = sorted(
+        {p.servo_id for p in (*pings, *reads) if p.damaged == p.requests and not p.answered}
+    )
+    if never:
+        return Finding(
+            check,
+            "fail",
+            f"{shown_subject(never, 'answer')} with damaged bytes only: two servos have this ID",
+            _DUPLICATE_REMEDY,
+        )
+    damaged = sorted({p.servo_id for p in (*pings, *reads) if p.damaged})
     if damaged:
         return Finding(
-            "duplicate IDs",
+            check,
             "warn",
-            f"answers of {_ids(damaged)} come damaged: two servos with this ID, or a bad line",
+            f"answers of {shown_ids(damaged)} come damaged: two servos with this ID, or a bad line",
             "connect it alone: if it is well then, another servo has its ID; if not, the cable",
         )
-    return Finding("duplicate IDs", "ok", f"none in {sum(p.pings for p in probes)} pings")
+    return Finding(check, "ok", f"none in {sum(p.requests for p in (*pings, *reads))} requests")
+
+
+def silent_to_reads(servo_ids: Sequence[int]) -> Finding | None:
+    """Servos that reply to pings, but not to reads: Status Return Level(68) is 0."""
+    if not servo_ids:
+        return None
+    return Finding(
+        "status return level",
+        "fail",
+        f"{shown_subject(servo_ids, 'reply')} to pings and not to reads: Status Return Level(68) "
+        "is 0, or the answer is lost",
+        "a run sets it to 2, unheard; else write 2 to address 68",
+    )
 
 
 def models(servos: Sequence[ServoReport], wrong: Sequence[str], model: str) -> Finding:
@@ -125,8 +143,8 @@ def firmware(servos: Sequence[ServoReport]) -> Finding:
         return Finding(
             "firmware",
             "warn",
-            f"{_do(old, 'have')} no fast sync read (before {FAST_READ_FIRMWARE}): plain reads are "
-            "used, which take longer",
+            f"{_subject(old, 'have')} no fast sync read (before {FAST_READ_FIRMWARE}): plain "
+            "reads are used, which take longer",
             "update it with DYNAMIXEL Wizard 2.0",
         )
     if len(versions) > 1:
@@ -143,7 +161,7 @@ def return_delay(servos: Sequence[ServoReport]) -> Finding:
     return Finding(
         "return delay",
         "warn",
-        f"{_do(slow, 'wait')} before answering, {total_ms:.1f} ms together",
+        f"{_subject(slow, 'wait')} before answering, {total_ms:.1f} ms together",
         "a run sets it to 0; to do it now: snakewalk bus set --id ID --return-delay 0",
     )
 
@@ -165,7 +183,7 @@ def torque(servos: Sequence[ServoReport]) -> Finding:
     return Finding(
         "torque",
         "warn",
-        f"on at {_ids(on)}",
+        f"on at {shown_ids([s.servo_id for s in on])}",
         "another program left it on, or still runs; a run switches it off and on again",
     )
 

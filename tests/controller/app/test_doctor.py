@@ -49,6 +49,7 @@ def test_a_healthy_bus_passes_every_check_and_is_not_written_to(line: Recorder) 
     assert {f.check for f in findings} == {
         *("latency timer", "baud rate", "servo IDs", "duplicate IDs", "model", "firmware"),
         *("return delay", "alarms", "torque", "supply", "temperature", "line", "wire budget"),
+        *("second master", "response time", "pose", "settings"),
     }
     asked = {p.instruction for p in line.heard}
     assert asked <= {Instruction.PING, Instruction.READ, *(0x82, 0x8A)}

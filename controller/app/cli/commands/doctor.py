@@ -17,9 +17,16 @@ def doctor(
     port: Port = None,
     robot: Robot = None,
     run: Annotated[str, typer.Option(help="run whose rate and limits count")] = DEFAULT_RUN,
+    wiggle: Annotated[
+        bool,
+        typer.Option("--wiggle", help="move all joints by 0.15 rad for 2 s: does the supply sag?"),
+    ] = False,
     as_json: Json = False,
 ) -> None:
-    """Examine adapter, bus and servos; every fault with its remedy. Changes nothing."""
+    """Examine adapter, bus and servos; every fault with its remedy.
+
+    Changes nothing, unless the joints are to wiggle: then the chain is set up as in a run.
+    """
     from snakewalk.config.loader import load_robot, load_run  # noqa: PLC0415  --help stays quick
     from snakewalk.controller.app.service.adapter import permission  # noqa: PLC0415
     from snakewalk.controller.app.service.doctor import examine  # noqa: PLC0415
@@ -43,6 +50,7 @@ def doctor(
                 job.cycle_hz,
                 latency_s=line.latency_s,
                 latency_timer_ms=line.latency_timer_ms,
+                wiggle=wiggle,
                 on_progress=lambda step: status.update(f"{device}: {step}"),
             )
     grade = worst(findings)

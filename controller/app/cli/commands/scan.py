@@ -40,6 +40,12 @@ def scan(
         for servo in results:
             table.add_row(str(servo.servo_id), servo.model, str(servo.firmware), str(servo.baud))
         console.print(table)
+        for servo in results:
+            if servo.secondary_id is not None:
+                console.print(
+                    f"servo {servo.servo_id} obeys ID {servo.secondary_id} as well: its "
+                    "Secondary ID(12); a run sets it to 255"
+                )
     else:
         console.print(f"{device}: nobody answers at any baud rate: power? cable? adapter's switch?")
     if not results:

@@ -1,0 +1,85 @@
+"""What comes over the line: who else talks, how late replies are, how many get lost."""
+
+import numpy as np
+
+from snakewalk.controller.app.service.finding import Finding
+from snakewalk.drivers.bus.control_cycle import ControlCycle
+from snakewalk.drivers.bus.probe import Overheard
+from snakewalk.drivers.port.byte_port import BytePort
+
+OVERHEAR_S = 0.6
+"""How long the doctor listens before it says a word (ours): any other master talks by then."""
+PATIENCE_S = 0.1
+"""How late a group read may be (ours): a computer that is busy is no bad line."""
+_TEST_READS = 200
+_LATE_S = 3e-3
+"""A reply that is later than the wire and the servo make it is held up by adapter or driver."""
+_STRAY_REPLIES = 3
+"""So many replies to somebody else show another master: one may be a late one to ourselves."""
+
+
+def second_master(overheard: Overheard) -> Finding:
+    """Another program or adapter that talks on the same line."""
+    check = "second master"
+    if overheard.instructions or overheard.replies >= _STRAY_REPLIES:
+        return Finding(
+            check,
+            "fail",
+            f"{overheard.instructions} instructions and {overheard.replies} replies of others in "
+            f"{OVERHEAR_S:g} s: another program or adapter talks to these servos",
+            "end it, or unplug the other adapter: two masters destroy each other's packets",
+        )
+    if overheard.noise_bytes:
+        return Finding(
+            check,
+            "warn",
+            f"none; but {overheard.noise_bytes} bytes came that nobody asked for",
+            "a floating data line: termination, pull-ups, ground; or another baud rate's traffic",
+        )
+    return Finding(check, "ok", f"nobody else talks within {OVERHEAR_S:g} s")
+
+
+def response(late_s: list[float], latency_s: float) -> Finding | None:
+    """How much later than the wire allows replies come; None without replies.
+
+    The lower quartile is judged: an adapter holds every reply up, a busy computer some.
+    """
+    if not late_s:
+        return None
+    usual_ms = float(np.quantile(late_s, 0.25)) * 1e3
+    found = f"replies come {usual_ms:.1f} ms later than the wire needs"
+    if usual_ms * 1e-3 <= max(_LATE_S, latency_s / 2.0):
+        return Finding("response time", "ok", found)
+    return Finding(
+        "response time",
+        "warn",
+        f"{found}: each cycle of a run takes that much longer",
+        "the adapter's latency timer, a USB hub, a serial server in between; or a busy computer",
+    )
+
+
+def line_quality(port: BytePort, cycle: ControlCycle, latency_s: float) -> Finding:
+    """Damaged or missing answers in many group reads, as a run does them.
+
+    Args:
+        port: the line.
+        cycle: waits ``PATIENCE_S``.
+        latency_s: beyond it a run takes a reply for lost.
+
+    """
+    lost, longest_s = 0, 0.0
+    for _ in range(_TEST_READS):
+        began_s = port.clock.now_s()
+        complete = bool(cycle.read().valid.all())
+        lost += not complete
+        if complete:
+            longest_s = max(longest_s, port.clock.now_s() - began_s)
+    found = f"{lost} of {_TEST_READS} group reads incomplete"
+    remedy = "cables, plugs, termination, a common ground; a lower baud rate"
+    if lost > 0.05 * _TEST_READS:
+        return Finding("line", "fail", found, remedy)
+    if lost:
+        return Finding("line", "warn", found, remedy)
+    if longest_s > 2.0 * latency_s:
+        found += f"; the longest took {longest_s * 1e3:.0f} ms"
+    return Finding("line", "ok", found)
