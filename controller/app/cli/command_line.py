@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 from snakewalk.controller.app.cli.commands.analyse import analyse
 from snakewalk.controller.app.cli.commands.body import body
 from snakewalk.controller.app.cli.commands.bus import bus_set, serve, sniff
+from snakewalk.controller.app.cli.commands.calibrate import calibrate
 from snakewalk.controller.app.cli.commands.capture import capture
 from snakewalk.controller.app.cli.commands.doctor import doctor
 from snakewalk.controller.app.cli.commands.fish import film, match, synthesise
@@ -164,6 +165,10 @@ app.command(
     epilog=_examples("doctor", "doctor --port /dev/ttyUSB0 --robot alternating16"),
     rich_help_panel=_BUS,
 )(doctor)
+
+app.command(
+    epilog=_examples("calibrate --robot alternating16 -o my-robot.toml"), rich_help_panel=_BUS
+)(calibrate)
 
 bus = typer.Typer(no_args_is_help=True, help="Servos and their settings.")
 
