@@ -35,7 +35,12 @@ class PathProgress(Protocol):
 
     @property
     def missed(self) -> int:
-        """How often a waypoint was passed outside its radius."""
+        """How often another path was laid: a waypoint was passed by, the body off it, or stuck."""
+        ...
+
+    @property
+    def replanned(self) -> str | None:
+        """Why another path was laid in the last step, if one was."""
         ...
 
     @property
@@ -69,6 +74,7 @@ class NoPath:
     along_m = float("nan")
     pulse_m_s = 0.0
     decision: Decision | None = None
+    replanned: str | None = None
 
     def __init__(self, source: MotionSource) -> None:
         self._source = source

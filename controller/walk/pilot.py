@@ -179,7 +179,9 @@ class Pilot:
         self._replan_after = 0.0
         self._missed_before = -1
         self.missed = 0
-        """How often a waypoint was passed outside its radius, and a new path was planned to it."""
+        """How often another path was laid to a waypoint."""
+        self.replanned: str | None = None
+        """Why another path was laid in the last step, if one was."""
         self.decision: Decision | None = None
         """Made in the last step, if one was."""
 
@@ -300,7 +302,8 @@ class Pilot:
         return np.interp(at, np.arange(points), body)
 
     def _count(self, centre_m: Floats, head_m: Floats, heading_rad: float) -> None:
-        """Count a waypoint when the centre is near it; when it was passed by, go back for it."""
+        """Count a waypoint when the centre is near it; lay another path where this one failed."""
+        self.replanned = None
         if self.complete:
             return
         x_m, y_m = self._goals_m[self.reached]
@@ -309,11 +312,15 @@ class Pilot:
             self._fall_back(False)
         elif self._feedback and self.head >= self._replan_after:
             self._note_gain()
-            stalled = self._is_stalled
-            if not stalled and not self._is_off_path(centre_m):
-                return
-            if stalled:
+            if self._is_stalled:
+                self.replanned = "no advance on the path"
                 self._stalls_m.append(head_m.copy())
+            elif self._has_passed(centre_m):
+                self.replanned = f"waypoint {self.reached + 1} passed by"
+            elif self._gap_m[0] > _OFF_PATH_BODIES * self._length_m:
+                self.replanned = f"{self._gap_m[0]:.2f} m off the path"
+            else:
+                return
             self.missed += 1
             self._fall_back(self.reached == self._missed_before)
             self._missed_before = self.reached
@@ -333,18 +340,15 @@ class Pilot:
         track = (self.head - self._gained_at) / self._chooser.track.points
         return track > _STALL_AFTER_BODIES
 
-    def _is_off_path(self, centre_m: Floats) -> bool:
-        """Whether the next waypoint was passed by, or the body is half its length off the path."""
+    def _has_passed(self, centre_m: Floats) -> bool:
+        """Whether the body is beyond the next waypoint on the path, and did not come near it."""
         path, end_m = self.path, self.path.length_m
-        along_m, gap_m = float(self._along_m[0]), float(self._gap_m[0])
+        along_m = float(self._along_m[0])
         if along_m >= end_m - 1e-6:  # distance beyond the end, along the path's last direction
             last = path.position([end_m - 0.05, end_m])
             ahead = (last[1] - last[0]) / 0.05
             along_m += float((centre_m - last[1]) @ ahead)
-        return bool(
-            along_m > self._passed_m[self.reached] + self._radius_m
-            or gap_m > _OFF_PATH_BODIES * self._length_m
-        )
+        return bool(along_m > self._passed_m[self.reached] + self._radius_m)
 
     def _plan_path(self, from_m: Floats, first: int, heading_rad: float | None = None) -> None:
         """Plan from a point, with the body's heading, through the waypoints from ``first`` on."""

@@ -83,6 +83,7 @@ class RouteMotion:
     along_m = float("nan")
     pulse_m_s = 0.0
     decision: Decision | None = None
+    replanned: str | None = None
 
     def __init__(self, prepared: RepertoireRun, on_event: OnEvent) -> None:
         run, route = prepared.run, prepared.route

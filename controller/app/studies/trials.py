@@ -67,7 +67,7 @@ class Trial:
     complete: bool = False
     reached: int = 0
     missed: int = 0
-    """How often a waypoint was passed by."""
+    """How often another path was laid: a waypoint was passed by, the body off it, or stuck."""
     duration_s: float = math.nan
     slope_median_deg: float = math.nan
     """Of the surface in the strip along the path that the body stands on."""
@@ -95,7 +95,7 @@ class Trial:
 
     @property
     def first_pass(self) -> bool:
-        """Whether every waypoint was reached and none was passed by."""
+        """Whether every waypoint was reached on the first path that was laid."""
         return self.complete and self.missed == 0
 
 
