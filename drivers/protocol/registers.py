@@ -58,6 +58,10 @@ SHUTDOWN_ALARMS = 0x34
 shock, overheating."""
 
 
+EEPROM_END = 64
+"""Addresses below are the EEPROM area, X series: locked while Torque Enable(64) is 1."""
+
+
 class Alarm(IntFlag):
     """Bits of Hardware Error Status(70)."""
 

@@ -16,6 +16,7 @@ from snakewalk.drivers.protocol.packet import ALERT, ResultError
 from snakewalk.drivers.protocol.registers import (
     BAUDS,
     CURRENT_MODES,
+    EEPROM_END,
     MODES,
     POSITION_MODE,
     VELOCITY_MODE,
@@ -23,7 +24,6 @@ from snakewalk.drivers.protocol.registers import (
 )
 from snakewalk.sim.servo.indirect import Indirect
 from snakewalk.sim.servo.register_rules import (
-    EEPROM_END,
     GOALS,
     MODE_RESETS,
     ModelRegisters,

@@ -28,8 +28,6 @@ class Rule:
         return self.low is not None
 
 
-EEPROM_END = 64
-"""Addresses below are the EEPROM area: locked while Torque Enable(64) is 1."""
 EXTENDED_RANGE_TICKS = 1_048_575
 """Goal Position(116) in the multi-turn modes: -256 to 256 revolutions."""
 GOALS = ("Goal PWM", "Goal Current", "Goal Velocity", "Goal Position")

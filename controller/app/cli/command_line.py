@@ -10,7 +10,15 @@ from typer.core import TyperGroup
 
 from snakewalk.controller.app.cli.commands.analyse import analyse
 from snakewalk.controller.app.cli.commands.body import body
-from snakewalk.controller.app.cli.commands.bus import bus_set, serve, sniff
+from snakewalk.controller.app.cli.commands.bus import (
+    backup,
+    blink,
+    bus_set,
+    reboot,
+    restore,
+    serve,
+    sniff,
+)
 from snakewalk.controller.app.cli.commands.calibrate import calibrate
 from snakewalk.controller.app.cli.commands.capture import capture
 from snakewalk.controller.app.cli.commands.doctor import doctor
@@ -187,6 +195,18 @@ bus.command(
         "bus serve --servos 1-16", "bus serve --robot yaw16 --faults faults.toml --pace 0.5"
     )
 )(serve)
+
+bus.command(epilog=_examples("bus backup -o servos.json", "bus backup --baud 57600 -o one.json"))(
+    backup
+)
+
+bus.command(
+    epilog=_examples("bus restore servos.json --dry-run", "bus restore servos.json --id 7 --yes")
+)(restore)
+
+bus.command(epilog=_examples("bus reboot --id 3 --id 4"))(reboot)
+
+bus.command(epilog=_examples("bus blink --id 7 --times 10"))(blink)
 
 bus.command(epilog=_examples("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))(sniff)
 

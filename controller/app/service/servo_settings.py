@@ -9,12 +9,20 @@ import numpy as np
 
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.errors import BusError
+from snakewalk.drivers.errors import BusError, NoAnswerError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import model_of
 from snakewalk.drivers.protocol.packet import MAX_ID
-from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V, ServoUnits, baud_code, bauds_of
+from snakewalk.drivers.protocol.registers import (
+    VOLTAGE_UNIT_V,
+    ServoUnits,
+    alarm_names,
+    baud_code,
+    bauds_of,
+)
 
+RESTART_S, _ASK_AGAIN_S = 3.0, 0.1
+"""How long a servo may take to answer after a reboot, and between the tries (ours)."""
 _LIMITS = {
     "min_position_rad": "Min Position Limit",
     "max_position_rad": "Max Position Limit",
@@ -132,6 +140,28 @@ def apply(bus: DynamixelBus, servo_id: int, changes: tuple[SettingChange, ...]) 
                 raise BusError(f"servo {servo_id}: {change.register}: does not read back")
         else:
             bus.write_verified(servo_id, change.register, change.after)
+
+
+def restart(bus: DynamixelBus, servo_id: int) -> tuple[str, str]:
+    """Reboot a servo and wait until it answers; its alarms before and after, in words.
+
+    Raises:
+        BusError: it does not answer, or not again.
+
+    """
+    before = bus.read(servo_id, "Hardware Error Status")
+    bus.reboot(servo_id)
+    clock = bus.port.clock
+    give_up_s = clock.now_s() + RESTART_S
+    while True:
+        clock.sleep_until_s(clock.now_s() + _ASK_AGAIN_S)
+        try:
+            after = bus.read(servo_id, "Hardware Error Status")
+        except NoAnswerError:
+            if clock.now_s() >= give_up_s:
+                raise
+        else:
+            return alarm_names(before), alarm_names(after)
 
 
 def _raw(

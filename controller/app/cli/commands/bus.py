@@ -1,4 +1,7 @@
-"""``snakewalk bus``: ``serve`` simulated servos, ``sniff`` bytes, ``set`` a servo's settings."""
+"""``snakewalk bus``: ``serve`` simulated servos, ``sniff`` bytes, and care for servos.
+
+``set`` a servo's settings, ``backup`` and ``restore`` those of all, ``reboot``, ``blink``.
+"""
 
 import json
 import signal
@@ -11,8 +14,8 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.options import Force, Json, Port, console
-from snakewalk.controller.app.result_files import refuse_to_overwrite
+from snakewalk.controller.app.cli.options import Force, Json, Port, console, show
+from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -305,6 +308,132 @@ def bus_set(
         console.print("written and read back" if written else "nothing written")
 
 
+_BLINK_S = 0.3
+"""How long a LED is on, and then off."""
+_Ids = Annotated[list[int], typer.Option("--id", help="a servo, 0 to 252; may be repeated")]
+_Baud = Annotated[int, typer.Option(help="at which the servos answer")]
+
+
+def backup(
+    out: Annotated[Path, typer.Option("--out", "-o", help="file (.json)")],
+    port: Port = None,
+    baud: _Baud = 1_000_000,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write the EEPROM of all servos on the bus into a file; changes nothing."""
+    from snakewalk.controller.app.service.eeprom_backup import back_up, backup_text  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
+    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+
+    refuse_to_overwrite([out], force)
+    with SerialPort(pick_port(port), baud) as line:
+        found = back_up(line, line.latency_s, lambda step: typer.echo(step, err=True))
+    with atomic_write(out) as part:
+        part.write_text(backup_text(found), encoding="utf-8")
+    show({"servos": [each.id for each in found.servos], "backup": str(out)}, as_json)
+
+
+def restore(
+    file: Annotated[Path, typer.Argument(help="of `snakewalk bus backup`", dir_okay=False)],
+    servo_id: Annotated[
+        list[int] | None, typer.Option("--id", help="only this servo; may be repeated")
+    ] = None,
+    port: Port = None,
+    baud: _Baud = 1_000_000,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="show the changes, no more")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="write without asking")] = False,
+    as_json: Json = False,
+) -> None:
+    """Write a backup's values where they differ; shows them and asks first."""
+    from snakewalk.controller.app.service.eeprom_backup import load_backup, plan_restore  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
+    from snakewalk.controller.app.service.servo_settings import apply, open_servo  # noqa: PLC0415
+    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+
+    servos = {each.id: each for each in load_backup(file).servos}
+    wanted = servo_id or list(servos)
+    missing = [str(each) for each in wanted if each not in servos]
+    if missing:
+        raise InputError(
+            f"{file}: has no ID {', '.join(missing)}; it has {', '.join(map(str, servos))}"
+        )
+    with SerialPort(pick_port(port), baud) as line:
+        buses = {each: open_servo(line, each, line.latency_s) for each in wanted}
+        plans = {each: plan_restore(buses[each], servos[each]) for each in wanted}
+        changed = {each: changes for each, changes in plans.items() if changes}
+        if not as_json:
+            table = Table("ID", "register", "now", "then", box=None)
+            for each, changes in changed.items():
+                for change in changes:
+                    table.add_row(str(each), change.register, str(change.before), str(change.after))
+            console.print(table if changed else "nothing to restore")
+        written = bool(changed) and not dry_run and (yes or _confirmed(as_json))
+        if written:
+            for each, changes in changed.items():
+                apply(buses[each], each, changes)
+    if as_json:
+        shown = {
+            str(each): {c.register: [c.before, c.after] for c in changes}
+            for each, changes in changed.items()
+        }
+        print(json.dumps({"changes": shown, "written": written}))
+    elif changed:
+        console.print("written and read back" if written else "nothing written")
+
+
+def reboot(
+    servo_id: _Ids,
+    port: Port = None,
+    baud: _Baud = 1_000_000,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="without asking")] = False,
+    as_json: Json = False,
+) -> None:
+    """Restart servos, which clears their alarms; torque goes off: what they hold falls."""
+    from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.app.service.servo_settings import open_servo, restart  # noqa: PLC0415
+    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+
+    facts: dict[str, object] = {}
+    with SerialPort(pick_port(port), baud) as line:
+        buses = {each: open_servo(line, each, line.latency_s) for each in servo_id}
+        if yes or _confirmed(
+            as_json, "torque goes off: what these servos hold falls; reboot them?"
+        ):
+            for each, bus in buses.items():
+                before, after = restart(bus, each)
+                facts[f"ID {each}"] = (
+                    f"rebooted; alarm before: {before or 'none'}; now: {after or 'none'}"
+                )
+    show(facts or {"rebooted": "none"}, as_json)
+
+
+def blink(
+    servo_id: _Ids,
+    port: Port = None,
+    baud: _Baud = 1_000_000,
+    times: Annotated[int, typer.Option(min=1, max=1000, help="how often")] = 5,
+    as_json: Json = False,
+) -> None:
+    """Let the LED of servos blink, to find them; nothing moves."""
+    from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.app.service.servo_settings import open_servo  # noqa: PLC0415
+    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+
+    with SerialPort(pick_port(port), baud) as line:
+        buses = {each: open_servo(line, each, line.latency_s) for each in servo_id}
+        try:
+            for _ in range(times):
+                for on in (1, 0):
+                    for each, bus in buses.items():
+                        bus.write(each, "LED", on)
+                    line.clock.sleep_until_s(line.clock.now_s() + _BLINK_S)
+        finally:
+            for each, bus in buses.items():
+                bus.write(each, "LED", 0)
+    show({"blinked": list(buses), "times": times}, as_json)
+
+
 def _show(servo_id: int, model: str, changes: "tuple[SettingChange, ...]") -> None:
     if not changes:
         console.print(f"servo {servo_id} ({model}): nothing to change")
@@ -315,9 +444,9 @@ def _show(servo_id: int, model: str, changes: "tuple[SettingChange, ...]") -> No
     console.print(table)
 
 
-def _confirmed(as_json: bool) -> bool:
+def _confirmed(as_json: bool, question: str = "write this?") -> bool:
     """Ask a person, if there is one."""
     if as_json or not sys.stdin.isatty():
         print("snakewalk: nothing written; say --yes to write without asking", file=sys.stderr)
         return False
-    return typer.confirm("write this?", default=False)
+    return typer.confirm(question, default=False)
