@@ -165,7 +165,7 @@ class GroupFastPath:
         address, length = int.from_bytes(raw[8:10], "little"), int.from_bytes(raw[10:12], "little")
         ids = np.frombuffer(raw, np.uint8, len(raw) - 14, 12)
         rows = self._handler.directory.rows[ids]
-        if (rows < 0).any() or not self._bank.readable(address, length):
+        if (rows < 0).any() or not self._bank.readable(rows, address, length):
             return None
         if (self._bank["Status Return Level"][rows] < 1).any():
             return None

@@ -20,6 +20,11 @@ from snakewalk.sim.line.id_directory import IdDirectory
 from snakewalk.sim.line.instructions import Instructions, word
 from snakewalk.sim.servo.firmware import Firmware
 
+_GROUP_INSTRUCTIONS = (
+    *(Instruction.SYNC_READ, Instruction.FAST_SYNC_READ, Instruction.SYNC_WRITE),
+    *(Instruction.BULK_READ, Instruction.FAST_BULK_READ, Instruction.BULK_WRITE),
+)
+"""Instructions with ID 254 (e-manual, Sync Read, Bulk Read and their like)."""
 MAX_LENGTH = 0xFFFF
 """Greatest value of a packet's length field."""
 
@@ -56,14 +61,8 @@ class InstructionHandler:
         code, params, servo_id = packet.instruction, packet.params, packet.servo_id
         if code == Instruction.PING:
             return self._ping(servo_id)
-        if code in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
-            return self._sync_read(params, fast=code == Instruction.FAST_SYNC_READ)
-        if code in (Instruction.BULK_READ, Instruction.FAST_BULK_READ):
-            return self._bulk_read(params, fast=code == Instruction.FAST_BULK_READ)
-        if code == Instruction.SYNC_WRITE:
-            return self._sync_write(params)
-        if code == Instruction.BULK_WRITE:
-            return self._bulk_write(params)
+        if code in _GROUP_INSTRUCTIONS and servo_id == BROADCAST_ID:
+            return self._group(code, params)
         if servo_id == BROADCAST_ID:
             whole = code == Instruction.FACTORY_RESET and params == b"\xff"
             for row in [] if whole else self.directory.present():  # refused since firmware 42
@@ -80,6 +79,16 @@ class InstructionHandler:
         for row in self.directory.secondary(servo_id):
             self._one(row, code, params, ram_only=True)
         return self._respond(replies)
+
+    def _group(self, code: int, params: bytes) -> list[Reply]:
+        """Execute an instruction to a group; it is none for a single servo."""
+        if code in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
+            return self._sync_read(params, fast=code == Instruction.FAST_SYNC_READ)
+        if code in (Instruction.BULK_READ, Instruction.FAST_BULK_READ):
+            return self._bulk_read(params, fast=code == Instruction.FAST_BULK_READ)
+        if code == Instruction.SYNC_WRITE:
+            return self._sync_write(params)
+        return self._bulk_write(params)
 
     def _respond(self, replies: list[Reply]) -> list[Reply]:
         if not replies:
@@ -103,7 +112,7 @@ class InstructionHandler:
         return sent
 
     def _block(self, row: int, address: int, length: int) -> tuple[int, bytes]:
-        if not self.bank.readable(address, length):
+        if not self.bank.readable(row, address, length):
             return ResultError.ACCESS, b""
         return 0, self.bank.table[row, address : address + length].tobytes()
 

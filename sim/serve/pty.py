@@ -38,7 +38,7 @@ class PtyServer:
     back under another name.
 
     Raises:
-        InputError: ``link`` is taken by something that is no link, or ``pace`` is not positive.
+        InputError: ``link`` is taken, by a file or by a server that runs; ``pace`` is not positive.
 
     """
 
@@ -123,13 +123,21 @@ class PtyServer:
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
         self._speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
-        if self._link is None:
+        link = self._link
+        if link is None:
             return
-        if self._link.is_symlink():
-            self._link.unlink()
-        elif self._link.exists():
-            raise InputError(f"{self._link}: is there already, and is no link")
-        self._link.symlink_to(self.path)
+        if link.is_symlink() and not link.exists():
+            link.unlink()  # left by a server that was killed
+        try:
+            link.symlink_to(self.path)
+        except FileExistsError:
+            what = f"leads to {os.readlink(link)}" if link.is_symlink() else "is no link"
+            self._link = None  # another's: not to be taken away at the end
+            self.close()
+            raise InputError(
+                f"{link}: is there already, and {what}: end the server whose it is, or choose "
+                "another name"
+            ) from None
 
     def _follow_baud_rate(self) -> None:
         """Follow the client's baud rate, once it has set one."""

@@ -82,6 +82,10 @@ class ServoBank:
         self._kinds = tuple(zip(kinds, rows, strict=True))
         self._registers = _in_one_place(kinds)
         self._columns = {name: self._column(each) for name, each in self._registers.items()}
+        self._defined = np.zeros((len(self.ids), TABLE_BYTES), bool)
+        for kind, own in self._kinds:
+            for each in kind.registers.values():
+                self._defined[own, each.address : each.address + each.size] = True
         self._starts = {
             kind.layout.model: {each.address: each for each in kind.registers.values()}
             for kind in kinds
@@ -130,9 +134,13 @@ class ServoBank:
         """Whether a hardware error of Shutdown(63) holds the torque off until a reboot."""
         return bool(self["Hardware Error Status"][row] & self["Shutdown"][row])
 
-    def readable(self, address: int, length: int) -> bool:
-        """Whether a block lies in the table; gaps between registers read as 0."""
-        return length > 0 and address >= 0 and address + length <= TABLE_BYTES
+    def readable(self, rows: Indices | int, address: int, length: int) -> bool:
+        """Whether a block lies in the tables of some servos and begins at a register of each.
+
+        Gaps between registers read as 0.
+        """
+        inside = length > 0 and address >= 0 and address + length <= TABLE_BYTES
+        return inside and bool(self._defined[rows, address].all())
 
     def check(self, row: int, address: int, data: bytes, *, ram_only: bool = False) -> ResultError:
         """Error of the reply to a write of ``data``; nothing is written.

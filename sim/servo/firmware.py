@@ -32,7 +32,7 @@ from snakewalk.sim.servo.motor import (
 from snakewalk.sim.servo.motor_output import MotorOutput
 from snakewalk.sim.servo.present_values import PRESENT, SUPPLY, PresentValues
 from snakewalk.sim.servo.protection import SLICE_S, Protection, SupplyAndAmbient
-from snakewalk.sim.servo.register_rules import EXTENDED_RANGE_TICKS
+from snakewalk.sim.servo.register_rules import EXTENDED_RANGE_TICKS, PROFILE
 from snakewalk.sim.servo.servo_loops import accept_goals
 from snakewalk.sim.servo.watchdog import Watchdog
 
@@ -315,7 +315,12 @@ class Firmware:
         self._turns[which] = np.floor(ticks / TICKS_PER_REV)[which]
 
     def _hold(self, late: NDArray[np.bool_]) -> None:
-        """Hold the servos whose watchdog has run out where they are."""
+        """Hold the servos whose watchdog has run out where they are, without a profile.
+
+        Their profile registers are 0 from then on (e-manual, Bus Watchdog(98), example, step 4).
+        """
+        for name in PROFILE:
+            self.bank[name][late] = 0
         self._held |= late
         self._goal[late] = self.plant.position_rad[late]
         self.apply_registers()

@@ -30,11 +30,12 @@ class Rule:
 
 EXTENDED_RANGE_TICKS = 1_048_575
 """Goal Position(116) in the multi-turn modes: -256 to 256 revolutions."""
+PROFILE = ("Profile Acceleration", "Profile Velocity")
 GOALS = ("Goal PWM", "Goal Current", "Goal Velocity", "Goal Position")
 MODE_RESETS = (
     *("Velocity I Gain", "Velocity P Gain", "Position D Gain", "Position I Gain"),
     *("Position P Gain", "Feedforward 2nd Gain", "Feedforward 1st Gain"),
-    *("Profile Acceleration", "Profile Velocity"),
+    *PROFILE,
 )
 _GAIN = (0, 16_383)
 
@@ -99,7 +100,7 @@ _X_SERIES: Mapping[str, Rule] = {
 }
 _BACKUP_READY = Register("Backup Ready", 147, 1, signed=False)
 """In the e-manual's tables from firmware 45 (330: 46) on, but not in the SDK's."""
-INDIRECT_FROM, INDIRECT_TO = 64, 661
+INDIRECT_FROM = 64
 """What Indirect Address registers may point at: the RAM area."""
 
 
@@ -147,12 +148,13 @@ def registers_of(model: str) -> ModelRegisters:
     listed[_BACKUP_READY.name] = _BACKUP_READY
     rules = {name: shared[name] for name in listed}
     blocks, first = indirect_blocks(layout), 1
+    last = max(block.data + block.count for block in blocks) - 1  # 661; 251 on the 330 models
     for block in blocks:
         for k in range(block.count):
             address, data = f"Indirect Address {first + k}", f"Indirect Data {first + k}"
             listed[address] = Register(address, block.addresses + 2 * k, 2, signed=False)
             listed[data] = Register(data, block.data + k, 1, signed=False)
-            rules[address] = Rule(block.data + k, INDIRECT_FROM, INDIRECT_TO)
+            rules[address] = Rule(block.data + k, INDIRECT_FROM, last)
             rules[data] = Rule(0, 0, 255)
         first += block.count
     return ModelRegisters(layout, listed, rules, blocks)

@@ -58,7 +58,8 @@ def test_status_return_level_of_every_instruction(name: str, level: int) -> None
         (bytes((132, 0)), ResultError.DATA_LENGTH),
         (bytes((132, 0, 0, 0)), ResultError.ACCESS),
         (bytes((0xFF, 3, 2, 0)), ResultError.ACCESS),  # across the table's end
-        (bytes((0xFF, 3, 1, 0)), 0),
+        (bytes((0xFF, 3, 1, 0)), ResultError.ACCESS),  # inside, but no register
+        (bytes((0x95, 2, 1, 0)), 0),  # the last one, 661
     ],
 )
 def test_reads_out_of_the_table_are_refused(params: bytes, error: int) -> None:
@@ -331,3 +332,47 @@ def test_stuffing_is_strict_both_ways() -> None:
     bare[-2:] = crc16(bytes(bare[:-2])).to_bytes(2, "little")
     assert exchange(line, bytes(bare)) == b""
     assert read(line, 1, 224, 1) == 0
+
+
+def span(address: int, length: int) -> bytes:
+    return address.to_bytes(2, "little") + length.to_bytes(2, "little")
+
+
+@pytest.mark.parametrize(
+    ("model", "address"),
+    [("XM430-W350", 14), ("XM430-W350", 150), ("XM430-W350", 700), ("XL330-M288", 578)],
+)
+def test_an_address_without_a_register_is_an_access_error(model: str, address: int) -> None:
+    line = a_line(2, model=model)
+    (status,) = ask(line, 1, Instruction.READ, span(address, 2))
+    assert (status.error, status.params) == (ResultError.ACCESS, b"")
+    group = ask(line, ALL, Instruction.SYNC_READ, group_params(address, 2, [1, 2]))
+    assert [(s.error, s.params) for s in group] == [(ResultError.ACCESS, b"")] * 2
+    write = address.to_bytes(2, "little") + b"\x01"
+    (status,) = ask(line, 1, Instruction.WRITE, write)
+    assert status.error == ResultError.ACCESS
+
+
+def test_a_block_that_begins_at_a_register_reads_gaps_as_zero() -> None:
+    line = a_line(1)
+    (status,) = ask(line, 1, Instruction.READ, span(0, 147))
+    assert (status.error, len(status.params)) == (0, 147)
+    assert status.params[13:20:6] == b"\x02\x00"  # Protocol Type(13); 19 is a gap
+
+
+@pytest.mark.parametrize(
+    ("code", "params"),
+    [
+        (Instruction.SYNC_READ, group_params(132, 4, [1, 2])),
+        (Instruction.FAST_SYNC_READ, group_params(132, 4, [1, 2])),
+        (Instruction.BULK_READ, bytes((1, 132, 0, 4, 0))),
+        (Instruction.FAST_BULK_READ, bytes((1, 132, 0, 4, 0))),
+        (Instruction.SYNC_WRITE, group_params(65, 1, [1]) + b"\x01"),
+        (Instruction.BULK_WRITE, bytes((1, 65, 0, 1, 0, 1))),
+    ],
+)
+def test_group_instructions_have_the_broadcast_id(code: int, params: bytes) -> None:
+    line = a_line(2)
+    (status,) = ask(line, 1, code, params)
+    assert (status.servo_id, status.error, status.params) == (1, ResultError.INSTRUCTION, b"")
+    assert read(line, 1, 65, 1) == 0

@@ -2,10 +2,12 @@
 
 import os
 import threading
+from pathlib import Path
 
 import dynamixel_sdk as sdk
 import pytest
 
+from snakewalk.config.errors import InputError
 from snakewalk.drivers.clock import WallClock
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.serve.pty import PtyServer
@@ -73,3 +75,19 @@ def test_the_sdk_opens_it_as_a_serial_port() -> None:
             stop.set()
             thread.join(5.0)
     assert not thread.is_alive()
+
+
+def test_a_second_server_never_takes_the_firsts_link(tmp_path: Path) -> None:
+    link = tmp_path / "tty"
+    with PtyServer(a_line(), SimClock(), link=link) as first:
+        with pytest.raises(InputError, match=f"is there already, and leads to {first.path}"):
+            PtyServer(a_line(), SimClock(), link=link)
+        assert os.readlink(link) == first.path
+    assert not link.is_symlink()
+    link.symlink_to("/dev/pts/none")  # of a server that was killed
+    with PtyServer(a_line(), SimClock(), link=link) as third:
+        assert os.readlink(link) == third.path
+    link.write_text("mine")
+    with pytest.raises(InputError, match="is there already, and is no link"):
+        PtyServer(a_line(), SimClock(), link=link)
+    assert link.read_text() == "mine"

@@ -174,6 +174,14 @@ def test_indirect_data_is_what_its_address_points_at(address: int, data: int) ->
     assert write(line, 1, address, 63, 2) == ResultError.DATA_RANGE
 
 
+@pytest.mark.parametrize(("model", "last"), [("XM430-W350", 661), ("XL330-M288", 251)])
+def test_an_indirect_address_points_into_the_models_own_ram(model: str, last: int) -> None:
+    """No further than its last register, which on the 330 models is Indirect Data 28."""
+    line = a_line(1, model=model)
+    assert write(line, 1, 168, last, 2) == 0
+    assert write(line, 1, 168, last + 1, 2) == ResultError.DATA_RANGE
+
+
 def test_a_group_read_of_indirect_data_is_fresh() -> None:
     plant = BenchPlant(3, start_rad=[0.1, 0.2, 0.3])
     line = SimLine(ServoBank([1, 2, 3]), plant)

@@ -192,6 +192,17 @@ def test_the_manuals_example_of_the_watchdog(ramp: int) -> None:
     assert read(line, 1, VELOCITY, 4) == pytest.approx(150, abs=3)
 
 
+@pytest.mark.parametrize("mode", [1, 3])
+def test_a_watchdogs_stop_leaves_no_profile(mode: int) -> None:
+    """E-manual, Bus Watchdog(98), example, step 4: both registers are 0 then."""
+    line = running((11, mode, 1), *RUN, (108, 5, 4), (112, 40, 4), (98, 3, 1))
+    other = (read(line, 1, 108, 4), read(line, 1, 112, 4))
+    assert other == (5, 40)
+    wait(line, 0.1)
+    assert read(line, 1, 98, 1) == -1
+    assert (read(line, 1, 108, 4), read(line, 1, 112, 4)) == (0, 0)
+
+
 # Startup Configuration(60)
 
 
