@@ -24,12 +24,16 @@ values out of range are reported all at once, one line each, with exit code 2.
 # my-run.toml                    # my-robot.toml
 name = "my-run"                  name = "mine"
 robot = "my-robot.toml"          joint_axes = "yyyyyyyyyyyy"
-world = "flat"                   link_length_m = 0.08
-waypoints_m = [[1, 0], [2, 1]]
-seed = 3                         [servo]
+world = "flat"                   link_length_m = 0.045
+waypoints_m = [[1, 0], [2, 1]]   body_radius_m = 0.02
+seed = 3                         link_mass_kg = 0.03
+                                 torque_limit_n_m = 0.25
+[behaviour]
+pulse_body_lengths_s = 0.2       [servo]
                                  model = "XL330-M288"
-[behaviour]                      supply_v = 5.0
-pulse_body_lengths_s = 0.2
+                                 supply_v = 5.0
+                                 armature_kg_m2 = 0.002
+                                 gear_drag_n_m_s = 0.006
 ```
 
 Units are in the names: `_m`, `_rad`, `_s`, `_a` (ampere), `_v`, `_c` (Celsius), `_kg`, `_n_m`.

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from typing import Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
@@ -10,6 +11,44 @@ from snakewalk.config.base import Name, Strict
 
 N = TypeVar("N", int, float)
 Baud = Literal[9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000]
+STALL_CURRENT_A: Mapping[str, float] = {
+    "XL330-M077": 1.47,
+    "XL330-M288": 1.47,
+    "XC330-M181": 1.8,
+    "XC330-M288": 1.8,
+    "XC330-T181": 0.8,
+    "XC330-T288": 0.8,
+    "XL430-W250": 1.3,
+    "2XL430-W250": 1.3,
+    "XH430-W210": 1.3,
+    "XH430-W350": 1.3,
+    "XD430-T210": 1.3,
+    "XD430-T350": 1.3,
+    "XW430-T333": 1.3,
+    "XC430-W150": 1.4,
+    "XC430-W240": 1.4,
+    "2XC430-W250": 1.4,
+    "XM430-W210": 2.3,
+    "XM430-W350": 2.3,
+    "XH430-V210": 0.7,
+    "XH430-V350": 0.7,
+    "XM540-W150": 4.4,
+    "XM540-W270": 4.4,
+    "XH540-W150": 4.9,
+    "XH540-W270": 4.9,
+    "XD540-T150": 4.9,
+    "XD540-T270": 4.9,
+    "XW540-T140": 4.9,
+    "XW540-T260": 4.9,
+    "XH540-V150": 2.4,
+    "XH540-V270": 2.4,
+    "XW540-H260": 2.4,
+}
+"""What a servo draws when it is held fast at its recommended voltage: the e-manual's page of each
+model of the X series, "Specifications"; XD models as their XH twins."""
+_LIMIT_SHARE = 2.0 / 2.3
+"""Of the stall current, up to which a run goes on (ours): 2 A of an XM430."""
+_PROTOCOL_1 = ("AX-", "RX-", "EX-", "DX-")
 
 
 class ServoConfig(Strict):
@@ -24,6 +63,9 @@ class ServoConfig(Strict):
     )
     supply_max_v: float | None = Field(
         None, gt=0.0, description="a run stops above; default: 14.8/12 of supply_v"
+    )
+    over_current_a: float | None = Field(
+        None, gt=0.0, description="a run stops above; default: 20/23 of the model's stall current"
     )
     position_p_gain: int = Field(800, ge=0, le=16383, description="register 84")
     position_i_gain: int = Field(0, ge=0, le=16383, description="register 82")
@@ -198,6 +240,46 @@ class RobotConfig(Strict):
         if twice:
             raise ValueError(f"joints: ID {', '.join(map(str, twice))} is of more than one joint")
         return self
+
+    @model_validator(mode="after")
+    def _models_can_run(self) -> Self:
+        for model in dict.fromkeys(self.servo_models):
+            if model.startswith(_PROTOCOL_1):
+                raise ValueError(
+                    f"servo: model {model} speaks Protocol 1.0, which has no group read and no "
+                    "watchdog that a run could rely on; a run needs a servo of Protocol 2.0, such "
+                    "as XL430-W250 (for programs of your own: snakewalk bus serve --servos "
+                    "1-4:AX-12A)"
+                )
+            if self.servo.over_current_a is None and model not in STALL_CURRENT_A:
+                raise ValueError(
+                    f"servo: over_current_a is missing: the stall current of {model} is not known"
+                )
+        if self.servo.over_current_a is not None:
+            self.check_over_current("servo: over_current_a", self.servo.over_current_a)
+        return self
+
+    def check_over_current(self, name: str, limit_a: float) -> None:
+        """Refuse a limit that a servo cannot reach: it would watch nothing.
+
+        Raises:
+            ValueError: it is the stall current of a servo or more.
+
+        """
+        for model in dict.fromkeys(self.servo_models):
+            stall_a = STALL_CURRENT_A.get(model, math.inf)
+            if limit_a >= stall_a:
+                raise ValueError(
+                    f"{name} = {limit_a:g}: {model} draws {stall_a:g} A at most and would never "
+                    f"trip; leave it out for {_LIMIT_SHARE * stall_a:.2f} A"
+                )
+
+    @property
+    def over_current_a(self) -> float:
+        """Current at which a run stops that says none: that of the weakest servo."""
+        if self.servo.over_current_a is not None:
+            return self.servo.over_current_a
+        return round(_LIMIT_SHARE * min(STALL_CURRENT_A[m] for m in self.servo_models), 3)
 
     @model_validator(mode="after")
     def _ranges_are_within_a_turn(self) -> Self:

@@ -93,7 +93,9 @@ class SafetyConfig(Strict):
         "where a low P gain needs it, and within 0.9 of goal_lead_rad",
     )
     following_time_s: float = Field(0.5, ge=0.0, description="how long it may be exceeded")
-    current_limit_a: float = Field(2.0, gt=0.0)
+    current_limit_a: float | None = Field(
+        None, gt=0.0, description="default: the robot's servo.over_current_a"
+    )
     current_time_s: float = Field(0.5, ge=0.0, description="how long it may be exceeded")
     temperature_limit_c: float = Field(70.0, gt=0.0)
     voltage_min_v: float | None = Field(
@@ -127,6 +129,10 @@ class SafetyConfig(Strict):
             full_rad = _FULL_OUTPUT_RAD / max(gain, 1) if axis == "y" else 0.0
             limits_rad.append(min(max(self.following_limit_rad, 2.0 * full_rad), most_rad))
         return tuple(limits_rad)
+
+    def current_limit_of_a(self, robot: RobotConfig) -> float:
+        """Greatest lasting current of a robot's servos: the run's, else the robot's."""
+        return robot.over_current_a if self.current_limit_a is None else self.current_limit_a
 
     def voltage_limits_v(self, servo: ServoConfig) -> tuple[float, float]:
         """Least and greatest supply of servos of this kind: the run's, else the robot's."""

@@ -60,7 +60,7 @@ def allowed(
     heat, amps, volts = state.temperature_c, current_a, state.voltage_v
     limit_c, limit_a, voltage_min_v = (
         safety.temperature_limit_c,
-        safety.current_limit_a,
+        safety.current_limit_of_a(robot),
         safety.voltage_limits_v(robot.servo)[0],
     )
     band_v, edge_v = VOLTAGE_BAND * robot.servo.supply_v, VOLTAGE_EDGE * robot.servo.supply_v
@@ -138,6 +138,7 @@ class Derating:
         """Lowest rate so far."""
         self._safety, self._robot = safety, robot
         servo = robot.servo
+        self._current_start_a = CURRENT_START * safety.current_limit_of_a(robot)
         self._voltage_low_v = safety.voltage_limits_v(servo)[0] + VOLTAGE_BAND * servo.supply_v
         self._on_event = on_event
         self._current_a = np.zeros(0)
@@ -154,7 +155,7 @@ class Derating:
             min(1.0, dt_s / CURRENT_S),
             state.temperature_c,
             state.voltage_v,
-            CURRENT_START * safety.current_limit_a,
+            self._current_start_a,
             safety.temperature_limit_c - HEAT_BAND_C,
             self._voltage_low_v,
         )

@@ -212,7 +212,8 @@ class DynamixelBus:
             ControlTableError: the model lacks one of the registers.
 
         """
-        return self.block(servo_ids, "Present Current", "Present Position", fast=fast)
+        first, *_, last = self.table.state_names
+        return self.block(servo_ids, first, last, fast=fast)
 
     def slow_cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> ControlCycle:
         """Group read of the slow state block: voltage and temperature.

@@ -20,7 +20,7 @@ from snakewalk.drivers.compiling import compiled
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.control_table import ControlTable
 from snakewalk.drivers.protocol.packet import ALERT
-from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V, ServoUnits
+from snakewalk.drivers.protocol.registers import LOAD_UNIT, PWM_FULL, VOLTAGE_UNIT_V, ServoUnits
 from snakewalk.drivers.types import JointState
 
 S = TypeVar("S", bound=np.generic)
@@ -40,6 +40,8 @@ class JointUnits:
     """(J,)"""
     a_per_current: Floats
     """(J,)"""
+    measures_current: Bools
+    """(J,) False where the current is the share of full output, times the stall current."""
     limits_raw: Int32s
     """(J, 2) least and greatest raw goal; in position mode the servo checks them."""
 
@@ -58,6 +60,7 @@ class JointUnits:
             sign * step_rad,
             sign * np.array([servo.rad_s_per_velocity for servo in servos]),
             sign * np.array([servo.a_per_current for servo in servos]),
+            np.array([servo.measures_current for servo in servos]),
             np.array([(z - h, z + h) for z, h in zip(zero, half, strict=True)], np.int32),
         )
 
@@ -68,6 +71,11 @@ class JointUnits:
     def current_raw(self, joint: int, current_a: float) -> int:
         """Nearest raw value of a limit of one joint's current."""
         return round(current_a / abs(float(self.a_per_current[joint])))
+
+    def pwm_raw(self, joint: int, current_a: float, most: int) -> int:
+        """Goal PWM(100), 1 to ``most``, at which a joint without a sensor draws that at rest."""
+        share = current_a * LOAD_UNIT / abs(float(self.a_per_current[joint]))
+        return min(most, max(1, round(PWM_FULL * share)))
 
 
 class GoalEncoder:
@@ -118,11 +126,11 @@ class StateDecoder:
 
         """
         for table in tables:
-            registers = [table[f"Present {name}"] for name in ("Current", "Velocity", "Position")]
+            registers = [table[name] for name in table.state_names]
             start = registers[0].address
             if [(r.address - start, r.size) for r in registers] != [(0, 2), (2, 4), (6, 4)]:
                 raise ControlTableError(
-                    [f"{table.model}: Present Current, Velocity and Position do not lie in a row"]
+                    [f"{table.model}: {', '.join(table.state_names)} do not lie in a row"]
                 )
         self._zero = units.zero_position.astype(np.float64)
         self._scale = np.stack(

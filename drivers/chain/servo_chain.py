@@ -139,6 +139,12 @@ class ServoChain:
             raise ChainError([str(fault) for fault in self.inspection.faults])
         if self._rate_hz is not None:
             self._budget(fast=self.inspection.fast_reads).check(self._rate_hz)
+        blind = np.flatnonzero(~self._units.measures_current)
+        if len(blind):
+            self.on_event(
+                f"{self.robot.servo_models[blind[0]]}: measures no current: safety watches the output's share "
+                "of the stall current instead; pitch joints are soft by Goal PWM"
+            )
         self._configured = configure(self._bus, self.robot, self._units, None, self.on_event)
         self._prepare_reads(fast=self.inspection.fast_reads)
         return self._begin()

@@ -86,6 +86,12 @@ class ControlTable:
     def __getitem__(self, name: str) -> Register:
         return self.register(name)
 
+    @property
+    def state_names(self) -> tuple[str, str, str]:
+        """Registers of the state block: Present Current, or Load without a sensor, and two more."""
+        first = "Present Current" if "Present Current" in self.registers else "Present Load"
+        return (first, "Present Velocity", "Present Position")
+
     def __contains__(self, name: object) -> bool:
         return name in self.registers
 

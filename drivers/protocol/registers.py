@@ -2,8 +2,9 @@
 
 The host scales positions and velocities by the SDK's control tables. For the current these tables
 give "raw", or a torque, so its unit is here, from the e-manual's page of each model, Current
-Limit(38) and Present Current(126). The host refuses a model that is not in the table: a current of
-unknown scale must not look like zero, or safe.
+Limit(38) and Present Current(126). A model without a current sensor has Present Load(126) in its
+place, the share of full output. The host refuses other models: a current of unknown scale must not
+look like zero, or safe.
 """
 
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from enum import IntFlag
 import numpy as np
 
 from snakewalk.config.arrays import Floats, SignedInts
+from snakewalk.config.robot import STALL_CURRENT_A
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.control_table import ControlTable
 
@@ -25,6 +27,8 @@ CURRENT_UNIT_A = {
     **dict.fromkeys(("PM42-010-S260", "PM54-040-S250", "PM54-060-S250"), 1e-3),
 }
 """Present Current(126), by model."""
+LOAD_UNIT = 1e-3
+"""Present Load(126) of models without a current sensor: of full output."""
 VOLTAGE_UNIT_V = 0.1
 """Present Input Voltage(144), all series of Protocol 2.0."""
 WATCHDOG_UNIT_S = 0.02
@@ -88,6 +92,9 @@ class ServoUnits:
     rad_per_position: float
     rad_s_per_velocity: float
     a_per_current: float
+    """Of Present Current(126); without a sensor the stall current's share in a unit of Present
+    Load(126): what the motor would draw at rest, more than it draws while it turns."""
+    measures_current: bool = True
 
     @staticmethod
     def of(table: ControlTable) -> "ServoUnits":
@@ -99,6 +106,9 @@ class ServoUnits:
         """
         faults = []
         velocity, current = table.rad_s_per_velocity, CURRENT_UNIT_A.get(table.model)
+        measures = "Present Current" in table
+        if not measures and table.model in STALL_CURRENT_A:
+            current = STALL_CURRENT_A[table.model] * LOAD_UNIT
         if velocity is None:
             faults.append(f"{table.model}: the SDK's table gives no unit of velocity")
         if current is None:
@@ -108,7 +118,7 @@ class ServoUnits:
             )
         if velocity is None or current is None:
             raise ControlTableError(faults)
-        return ServoUnits(table.zero_position, table.rad_per_position, velocity, current)
+        return ServoUnits(table.zero_position, table.rad_per_position, velocity, current, measures)
 
     def position_rad(self, raw: SignedInts) -> Floats:
         """Angles, rad; 0 is straight."""

@@ -60,7 +60,7 @@ class SafetyLimits:
             limit_slack_rad=LIMIT_SLACK_RAD,
             goal_rate_rad_s=safety.goal_rate_rad_s,
             goal_lead_rad=safety.goal_lead_rad,
-            current_limit_a=safety.current_limit_a,
+            current_limit_a=safety.current_limit_of_a(robot),
             current_time_s=safety.current_time_s,
             temperature_limit_c=safety.temperature_limit_c,
             voltage_min_v=voltage_min_v,

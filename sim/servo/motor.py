@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import AnyInts, Floats
+from snakewalk.config.robot import STALL_CURRENT_A
 from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A, PWM_FULL
 from snakewalk.sim.plant import ServoDrive
 from snakewalk.sim.servo.models import MODELS, ModelFacts
@@ -67,11 +68,12 @@ class MotorModel:
 
 def _motor(model: str, facts: ModelFacts) -> MotorModel:
     small = facts.pwm_slope is not None
-    light = small or facts.stall_current_a < _HEAVY_A
+    stall_current_a = STALL_CURRENT_A[model]
+    light = small or stall_current_a < _HEAVY_A
     return MotorModel(
         facts.nominal_v,
         facts.stall_torque_n_m,
-        facts.stall_current_a,
+        stall_current_a,
         facts.no_load_rpm * _RPM,
         CURRENT_UNIT_A.get(model, _CURRENT_UNIT_A),
         _DIVISOR_330 if small else _DIVISOR,

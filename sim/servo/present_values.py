@@ -55,18 +55,22 @@ class PresentValues:
         first = "Present Current" if "Present Current" in bank else "Present Load"  # one place
         names = (first, "Present Velocity", "Present Position")
         self._addresses = np.array([bank.register(name).address for name in names])
-        measured = bank.measures_current
+        self._measured = measured = bank.measures_current
+        self._stall_a, self._any_load = motor.stall_current_a, not bool(np.all(measured))
         ampere = np.where(measured, motor.current_unit_a, motor.stall_current_a / 1e3)
         self._current_units = np.stack([ampere, np.where(measured, math.inf, 1e3)])
         self._units = np.array([VELOCITY_UNIT_RAD_S, TICKS_PER_RAD])
 
     def motion(self, frame: Floats) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
-        plant = self._plant
+        plant, current_a = self._plant, self._motor_output.current_a()
+        if self._any_load:  # what full output would draw at stall, in the unit of such a row
+            output_a = self._motor_output.pwm(plant.velocity_rad_s) * self._stall_a
+            current_a = np.where(self._measured, current_a, output_a)
         write_motion(
             self._bank.table,
             self._addresses,
-            self._motor_output.current_a(),
+            current_a,
             plant.velocity_rad_s,
             plant.position_rad,
             frame,

@@ -33,8 +33,9 @@ from snakewalk.drivers.bus.budget import chain_budget
 
 C = TypeVar("C", RunConfig, RobotConfig, WorldConfig)
 
-GAIT_PITCH_CURRENT_A = 1.5
-"""Goal current of the pitch joints in a motion that lifts: soft ones would not carry the links."""
+GAIT_PITCH_SHARE = 0.75
+"""Goal current of the pitch joints in a motion that lifts, of the current at which safety stops
+(1.5 A of an XM430; ours): soft ones would not carry the links."""
 
 
 def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
@@ -101,7 +102,7 @@ def prepare_walk(
     if run.motion == "source":
         raise InputError(f"run {run.name}: a source of your own is run by prepare_source")
     robot = _with_keys_of("robot", load_robot(run.robot, beside), keys)
-    _check_wire(run, robot)
+    _check_servos(run, robot)
     return WalkRun(run, robot, _with_keys_of("world", load_world(run.world, beside), keys))
 
 
@@ -169,7 +170,7 @@ def prepare_gait(
         },
         "command line",
     )
-    _check_wire(run, body)
+    _check_servos(run, body)
     soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
     body = _with_gains(body, pitch=pitch, soft=soft)
     return GaitRun(run, body, load_world(run.world), make_operator)
@@ -207,7 +208,7 @@ def prepare_playback(
         "playback": {"speed": speed},
     }
     run = checked(RunConfig, fields, "command line")
-    _check_wire(run, body)
+    _check_servos(run, body)
     prepared = PlaybackRun(run, body, load_world(run.world))
     Recorded(body, *prepared.joint_track).needs.check(body, "this recording")
     limit = {"time_limit_s": prepared.duration_s + 30.0}
@@ -245,17 +246,22 @@ def prepare_source(
         "time_limit_s": seconds,
     }
     run = checked(RunConfig, fields, "prepare_source")
-    _check_wire(run, body)
+    _check_servos(run, body)
     return SourceRun(run, _with_gains(body, pitch=needs.pitch), load_world(run.world), make)
 
 
-def _check_wire(run: RunConfig, robot: RobotConfig) -> None:
-    """Refuse a cycle that takes longer on the wire than its period.
+def _check_servos(run: RunConfig, robot: RobotConfig) -> None:
+    """Refuse a cycle longer than its period on the wire, and a current that no servo reaches.
 
     Raises:
-        InputError: with the highest rate that fits.
+        InputError: with the highest rate that fits; with the current at which the model stalls.
 
     """
+    if run.safety.current_limit_a is not None:
+        try:
+            robot.check_over_current("safety.current_limit_a", run.safety.current_limit_a)
+        except ValueError as fault:
+            raise InputError(f"run {run.name}: {fault}") from None
     chain_budget(robot.joint_count, robot.servo.baud, fast=True).check(run.cycle_hz)
 
 
@@ -280,7 +286,8 @@ def _with_gains(robot: RobotConfig, *, pitch: bool, soft: Sequence[int] = ()) ->
     changes: dict[str, float] = {}
     if pitch:
         changes["pitch_p_gain"] = max(servo.pitch_p_gain, servo.position_p_gain)
-        changes["pitch_current_limit_a"] = max(servo.pitch_current_limit_a, GAIT_PITCH_CURRENT_A)
+        carry_a = GAIT_PITCH_SHARE * robot.over_current_a
+        changes["pitch_current_limit_a"] = max(servo.pitch_current_limit_a, carry_a)
     if soft:
         changes["position_p_gain"] = changes["pitch_p_gain"] = min(soft)
     joints = []

@@ -40,7 +40,7 @@ def _current(axes: Axes, record: RunRecord) -> None:
     ):
         trace(axes, cycle.time_s, values, colour, label)
     peak = float(np.nanmax(np.append(size, 0.0)))
-    limit = record.header.run.safety.current_limit_a
+    limit = record.header.run.safety.current_limit_of_a(record.header.robot)
     axes.set_ylim(0.0, max(1.15 * peak, 0.05))
     if peak > 0.5 * limit:
         axes.axhline(limit, color=RED, linewidth=1.0, linestyle=(0, (4, 3)), label="limit")
