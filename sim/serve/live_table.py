@@ -1,4 +1,7 @@
-"""Live table of a simulated bus: registers of all servos, and the latest packets."""
+"""Live table of a simulated bus: registers of all servos, and the latest packets.
+
+Nothing here takes long: the servos reply in between.
+"""
 
 from collections import deque
 from collections.abc import Callable
@@ -6,10 +9,8 @@ from collections.abc import Callable
 import numpy as np
 
 from snakewalk.sim.ax12.ax12 import Ax12Servos
-from snakewalk.sim.ax12.decode import Decoder1
 from snakewalk.sim.ax12.table import CELLS
 from snakewalk.sim.line.sim_line import SimLine
-from snakewalk.sim.sniff.decode import DecodedPacket, Decoder
 
 COLUMNS = {
     "id": "ID",
@@ -24,25 +25,32 @@ COLUMNS = {
 }
 """Registers shown of each servo, by key."""
 Rows = list[dict[str, object]]
-SHOWN = 8
-"""Packets kept."""
+Packet = tuple[float, bytes]
+"""Time and bytes of one packet."""
+KEPT = 32
+"""Packets kept from one drawing to the next."""
 
 
 class LiveTable:
     """A ``PacketTap`` that counts packets and keeps the latest; ``registers`` reads the rows."""
 
-    def __init__(self, registers: Callable[[], Rows], decoder: Decoder | Decoder1) -> None:
+    def __init__(self, registers: Callable[[], Rows]) -> None:
         self.registers = registers
-        self._decoder = decoder
         self.questions = self.answers = self.bytes = 0
-        self.recent: deque[DecodedPacket] = deque(maxlen=SHOWN)
+        self._recent: deque[Packet] = deque(maxlen=KEPT)
 
     def __call__(self, time_s: float, from_host: bool, data: bytes) -> None:
         """Count one packet and keep it."""
         self.questions += from_host
         self.answers += not from_host
         self.bytes += len(data)
-        self.recent.extend(self._decoder.feed(time_s, data))
+        self._recent.append((time_s, data))
+
+    def take_recent(self) -> tuple[Packet, ...]:
+        """The latest packets since the last call, oldest first."""
+        recent = tuple(self._recent)
+        self._recent.clear()
+        return recent
 
 
 def servo_rows(line: SimLine) -> Rows:

@@ -6,7 +6,7 @@
 import json
 import signal
 import sys
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,9 +20,9 @@ from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwr
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rich.console import Group
-
+    from snakewalk.controller.app.cli.live_table import MakeDecoder
     from snakewalk.controller.app.service.servo_settings import SettingChange
+    from snakewalk.drivers.clock import Clock
     from snakewalk.sim.line.sim_line import SimLine
     from snakewalk.sim.line.wire import Wire
     from snakewalk.sim.serve.chain_spec import ChainSpec
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 REFRESH_S = 0.25
 """Time between two drawings of the live table."""
 STEP_S = 0.02
-WIDTH = 120
-"""Characters of a packet that the live view shows."""
 
 
 def serve(
@@ -65,7 +63,7 @@ def serve(
         raise InputError(f"--latency {latency:g}: must not be negative")
     refuse_to_overwrite([record], force)
     refuse_to_overwrite([link], force=True)
-    what, line, traffic = _simulated(servos, robot, baud, faults)
+    what, line, traffic, make_decoder = _simulated(servos, robot, baud, faults)
     line.usb_latency_s = latency * 1e-3
     line.taps.append(traffic)
     clock = WallClock()
@@ -76,7 +74,8 @@ def serve(
             line.taps.append(TraceWriter(out))
         _announce(server, what, line, as_json)
         try:
-            _run(server, traffic, lambda: for_s is not None and clock.now_s() >= for_s, as_json)
+            ended = lambda: for_s is not None and clock.now_s() >= for_s  # noqa: E731
+            _run(server, traffic, make_decoder, clock, ended, as_json)
         except KeyboardInterrupt:
             print(file=sys.stderr)
         finally:
@@ -137,8 +136,8 @@ def sniff(
 
 def _simulated(
     servos: str | None, robot: str | None, baud: int | None, faults: Path | None
-) -> tuple["ChainSpec", "Wire", "LiveTable"]:
-    """What is served, its line, and who looks at it."""
+) -> tuple["ChainSpec", "Wire", "LiveTable", "MakeDecoder"]:
+    """What is served, its line, who looks at it, and what puts its packets into words."""
     from snakewalk.config.faults import FaultPlan  # noqa: PLC0415
     from snakewalk.config.loader import load  # noqa: PLC0415
     from snakewalk.sim.ax12.decode import Decoder1  # noqa: PLC0415
@@ -158,9 +157,9 @@ def _simulated(
     if faults is not None:
         FaultPlayer(line, load(faults, FaultPlan), str(faults))
     if isinstance(line, Ax12Line):
-        return spec, line, LiveTable(lambda: ax12_rows(line.servos), Decoder1())
+        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), Decoder1
     models = dict(zip(spec.ids, spec.models, strict=True))
-    return spec, line, LiveTable(lambda: servo_rows(line), Decoder(spec.kinds[0], models))
+    return spec, line, LiveTable(lambda: servo_rows(line)), partial(Decoder, spec.kinds[0], models)
 
 
 def _robot_line(name: str, baud: int | None) -> "SimLine":
@@ -197,58 +196,33 @@ def _announce(server: "PtyServer", what: "ChainSpec", line: "Wire", as_json: boo
 
 
 def _run(
-    server: "PtyServer", traffic: "LiveTable", stopped: "Callable[[], bool]", as_json: bool
+    server: "PtyServer",
+    traffic: "LiveTable",
+    make_decoder: "MakeDecoder",
+    clock: "Clock",
+    stopped: "Callable[[], bool]",
+    as_json: bool,
 ) -> None:
     """Serve; draw the table on a terminal, nothing elsewhere."""
-    from rich.console import Console  # noqa: PLC0415
-    from rich.live import Live  # noqa: PLC0415
-
-    screen = Console(stderr=True)
-    if as_json or not screen.is_terminal:
+    if as_json or not sys.stderr.isatty():
         server.serve(stopped)
         return
-    seen = _Shown(server.path, [], "")
+    from snakewalk.controller.app.cli.live_table import LiveScreen, Snapshot  # noqa: PLC0415
 
-    def view() -> "Group":
-        return _view(seen)
-
-    # Drawing takes longer than a servo may take to answer: it has a thread of its own, which sees
-    # only what the serving one has copied for it.
-    with Live(console=screen, get_renderable=view, refresh_per_second=1.0 / REFRESH_S):
-        since_s = 0.0
+    with LiveScreen(make_decoder) as screen:
+        due_s = 0.0
         while not stopped():
             server.step(STEP_S)
-            since_s += STEP_S
-            if since_s >= REFRESH_S:
-                since_s = 0.0
+            now_s = clock.now_s()
+            if now_s >= due_s and screen.ready:
+                due_s = now_s + REFRESH_S
                 counts = (
                     f"{server.path or 'port gone'}   {traffic.questions} questions, "
                     f"{traffic.answers} answers, {traffic.bytes} bytes"
                 )
                 if server.missed_s >= REFRESH_S:
                     counts += f"; {server.missed_s:.1f} s left out, this machine is too slow"
-                recent = "\n".join(line.text()[:WIDTH] for line in traffic.recent)
-                seen = _Shown(counts, traffic.registers(), recent)
-
-
-@dataclass(frozen=True, slots=True)
-class _Shown:
-    """What the live view shows."""
-
-    counts: str
-    rows: list[dict[str, object]]
-    recent: str
-
-
-def _view(shown: _Shown) -> "Group":
-    from rich.console import Group  # noqa: PLC0415
-    from rich.text import Text  # noqa: PLC0415
-
-    table = Table(*(shown.rows[0] if shown.rows else ()), box=None, header_style="bold")
-    for row in shown.rows:
-        style = "red" if row["error"] or not row["power"] else "" if row["torque"] else "dim"
-        table.add_row(*(str(value) for value in row.values()), style=style)
-    return Group(Text(shown.counts, style="bold"), table, Text(shown.recent, style="dim"))
+                screen.show(Snapshot(counts, traffic.registers(), traffic.take_recent()))
 
 
 def bus_set(
