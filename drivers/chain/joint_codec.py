@@ -40,10 +40,10 @@ class JointUnits:
     """(J,)"""
     a_per_current: Floats
     """(J,)"""
-    measures_current: Bools
-    """(J,) False where the current is the share of full output, times the stall current."""
     limits_raw: Int32s
     """(J, 2) least and greatest raw goal; in position mode the servo checks them."""
+    measures_current: Bools
+    """(J,) False where the current is the share of full output, times the stall current."""
 
     @staticmethod
     def of(robot: RobotConfig, servos: Sequence[ServoUnits]) -> "JointUnits":
@@ -60,8 +60,8 @@ class JointUnits:
             sign * step_rad,
             sign * np.array([servo.rad_s_per_velocity for servo in servos]),
             sign * np.array([servo.a_per_current for servo in servos]),
-            np.array([servo.measures_current for servo in servos]),
             np.array([(z - h, z + h) for z, h in zip(zero, half, strict=True)], np.int32),
+            np.array([servo.measures_current for servo in servos]),
         )
 
     def position_rad(self, joint: int, raw: int) -> float:

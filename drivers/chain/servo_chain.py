@@ -142,8 +142,8 @@ class ServoChain:
         blind = np.flatnonzero(~self._units.measures_current)
         if len(blind):
             self.on_event(
-                f"{self.robot.servo_models[blind[0]]}: measures no current: safety watches the output's share "
-                "of the stall current instead; pitch joints are soft by Goal PWM"
+                f"{self.robot.servo_models[blind[0]]}: measures no current: safety "
+                "watches its output instead, as a share of the stall current"
             )
         self._configured = configure(self._bus, self.robot, self._units, None, self.on_event)
         self._prepare_reads(fast=self.inspection.fast_reads)

@@ -19,6 +19,7 @@ JOINTS = JointUnits(
     ONES * UNITS.rad_s_per_velocity,
     ONES * UNITS.a_per_current,
     LIMITS,
+    ONES > 0.0,
 )
 both_ways = pytest.mark.parametrize(
     "loop", [encode_goals, encode_goals.py_func], ids=["compiled", "interpreted"]
