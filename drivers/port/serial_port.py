@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import select
 import termios
@@ -82,7 +83,7 @@ class SerialPort:
     @property
     def latency_s(self) -> float:
         """How long bytes may be held back on this side, the ``latency_s`` of ``DynamixelBus``."""
-        if os.path.realpath(self._device).startswith("/dev/pts/"):
+        if self._is_pseudo_terminal():
             return _PROGRAM_S
         timer_ms = self.latency_timer_ms
         return 0.003 + (timer_ms if timer_ms is not None else 1) * 1e-3
@@ -144,6 +145,8 @@ class SerialPort:
         if self._serial is not None:
             device, self._serial, self.descriptor = self._serial, None, None
             with suppress(*_DEVICE_ERRORS):  # a device that is gone is closed as far as it can be
+                fcntl.ioctl(device.fileno(), termios.TIOCNXCL)
+            with suppress(*_DEVICE_ERRORS):
                 device.close()
         self.is_using = False
 
@@ -208,12 +211,20 @@ class SerialPort:
         except (ValueError, *_DEVICE_ERRORS) as error:
             raise self._open_error(error) from error
         self.descriptor = int(self._serial.fileno())
+        # Programs that ask for no lock can open a locked device all the same. Not on a
+        # pseudo-terminal: its other end keeps it open, and with it the flag, after we are killed.
+        if not self._is_pseudo_terminal():
+            with suppress(*_DEVICE_ERRORS):
+                fcntl.ioctl(self.descriptor, termios.TIOCEXCL)
         self._readable, self._writable = select.poll(), select.poll()
         self._readable.register(self._serial.fileno(), select.POLLIN)
         self._writable.register(self._serial.fileno(), select.POLLOUT)
         # asks an FTDI driver for a latency timer of 1 ms instead of 16; others have none to set
         with suppress(ValueError, NotImplementedError, *_DEVICE_ERRORS):
             self._serial.set_low_latency_mode(True)
+
+    def _is_pseudo_terminal(self) -> bool:
+        return os.path.realpath(self._device).startswith("/dev/pts/")
 
     def _lost(self, error: Exception) -> PortError:
         self.is_using = False
@@ -230,7 +241,21 @@ class SerialPort:
         if number in (errno.EACCES, errno.EPERM):
             return f"{self._device}: no permission; join the group that owns it (often 'dialout')"
         if number in (errno.EBUSY, errno.EAGAIN):
-            return f"{self._device}: another program has it open"
+            holders = ", ".join(_holders(self._device))
+            return f"{self._device}: another program has it open{holders and ': '}{holders}"
         if isinstance(error, ValueError):
             return f"{self._device}: {self._baud} bit/s is not possible here: {error}"
         return f"{self._device}: cannot be opened: {error}"
+
+
+def _holders(device: str) -> list[str]:
+    """Programs that have a device open, ``name (process 123)``; those of other users are hidden."""
+    path = os.path.realpath(device)
+    found = []
+    for process in sorted(filter(str.isdigit, os.listdir("/proc")), key=int):
+        with suppress(OSError):  # another user's, or ended just now
+            descriptors = os.listdir(f"/proc/{process}/fd")
+            if any(os.readlink(f"/proc/{process}/fd/{each}") == path for each in descriptors):
+                with open(f"/proc/{process}/comm", encoding="utf-8", errors="replace") as file:
+                    found.append(f"{file.read().strip()} (process {process})")
+    return found

@@ -1,6 +1,8 @@
 """The serial port on a pseudo terminal; the other end is the test."""
 
+import fcntl
 import os
+import struct
 import termios
 import threading
 from collections.abc import Iterator
@@ -199,3 +201,40 @@ def test_a_device_that_is_gone_is_a_port_error_whatever_the_terminal_raises(
     with pytest.raises(PortError, match="the port is gone"):
         port.drain_until_quiet(0.01)
     port.closePort()
+
+
+_TIOCGEXCL = 0x80045440
+"""ioctl_tty(2): whether a terminal is in exclusive mode."""
+
+
+def exclusive(descriptor: int) -> bool:
+    flag = fcntl.ioctl(descriptor, _TIOCGEXCL, struct.pack("i", 0))
+    return bool(struct.unpack("i", flag)[0])
+
+
+def test_a_device_is_taken_exclusively_and_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(SerialPort, "_is_pseudo_terminal", lambda port: False)
+    master, slave = os.openpty()
+    with SerialPort(os.ttyname(slave), 57_600):
+        assert exclusive(slave)
+    assert not exclusive(slave)
+    os.close(master)
+    os.close(slave)
+
+
+def test_a_pseudo_terminal_keeps_no_flag_that_a_killed_program_would_leave() -> None:
+    master, slave = os.openpty()
+    with SerialPort(os.ttyname(slave), 57_600):
+        assert not exclusive(slave)
+    os.close(master)
+    os.close(slave)
+
+
+def test_who_has_the_port_open_is_named(pair: tuple[int, SerialPort]) -> None:
+    name = pair[1].name
+    with open("/proc/self/comm", encoding="utf-8") as file:
+        own = file.read().strip()
+    with pytest.raises(PortError) as caught:
+        SerialPort(name, 57_600)
+    assert str(caught.value).startswith(f"{name}: another program has it open: ")
+    assert f"{own} (process {os.getpid()})" in str(caught.value)
