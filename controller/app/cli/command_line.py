@@ -26,7 +26,7 @@ from snakewalk.controller.app.cli.commands.fish import film, match, synthesise
 from snakewalk.controller.app.cli.commands.gait import list_gaits, show_gait
 from snakewalk.controller.app.cli.commands.gait_fit import fit_gait
 from snakewalk.controller.app.cli.commands.gait_run import run_gait
-from snakewalk.controller.app.cli.commands.listing import list_
+from snakewalk.controller.app.cli.commands.listing import export_robot, list_, show_robot
 from snakewalk.controller.app.cli.commands.plan import plan
 from snakewalk.controller.app.cli.commands.play import play
 from snakewalk.controller.app.cli.commands.repertoire import record, run_plan, show_file
@@ -238,6 +238,18 @@ gait_app.command(
     "fit",
     epilog=_examples("gait fit CURVE.csv --picture fit.png", "gait fit CURVE.csv -o joints.npz"),
 )(fit_gait)
+
+robot_app = typer.Typer(no_args_is_help=True, help="A robot: show it, export it.")
+
+app.add_typer(robot_app, name="robot", rich_help_panel=_JOB)
+
+robot_app.command("show", epilog=_examples("robot show alternating16", "robot show my.toml"))(
+    show_robot
+)
+
+robot_app.command(
+    "export", epilog=_examples("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml")
+)(export_robot)
 
 fish_app = typer.Typer(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
 

@@ -1,10 +1,17 @@
-"""``snakewalk list``: what is shipped."""
+"""``snakewalk list`` and ``robot``: what is shipped; a robot in figures, and as files."""
 
 import json
+from pathlib import Path
+from typing import Annotated
 
+import typer
 from rich.table import Table
 
-from snakewalk.controller.app.cli.options import Json, console
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.options import Force, Json, console, show
+from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
+
+RobotName = Annotated[str, typer.Argument(help="shipped robot, or a TOML file")]
 
 
 def list_(as_json: Json = False) -> None:
@@ -28,3 +35,69 @@ def list_(as_json: Json = False) -> None:
         for line in lines:
             table.add_row(f"  {line[0]}", line[1])
         console.print(table)
+
+
+def show_robot(name: RobotName, as_json: Json = False) -> None:
+    """Show a robot: its links, and servo, sign, zero and limit of each joint."""
+    from snakewalk.config.loader import load_robot  # noqa: PLC0415  --help stays quick
+
+    robot = load_robot(name)
+    columns = (robot.servo_ids, robot.servo_models, robot.signs, robot.zeros_rad, robot.limit_rad)
+    joints: list[dict[str, object]] = [
+        {
+            "joint": k,
+            "axis": axis,
+            "id": i,
+            "model": m,
+            "sign": s,
+            "zero_rad": z,
+            "limit_rad": limit,
+        }
+        for k, (axis, i, m, s, z, limit) in enumerate(
+            zip(robot.joint_axes, *columns, strict=True), start=1
+        )
+    ]
+    links = robot.joint_count + 1
+    facts: dict[str, object] = {
+        "robot": robot.name,
+        "links": links,
+        "link_length_m": robot.link_length_m,
+        "body_radius_m": robot.body_radius_m,
+        "length_m": round(robot.length_m, 4),
+        "mass_kg": round(links * robot.link_mass_kg, 4),
+        "baud": robot.servo.baud,
+        "supply_v": robot.servo.supply_v,
+    }
+    show(facts | ({"joints": joints} if as_json else {}), as_json)
+    if not as_json:
+        table = Table(*(key.replace("_", " ") for key in joints[0]), box=None)
+        for joint in joints:
+            table.add_row(*map(str, joint.values()))
+        console.print(table)
+
+
+def export_robot(
+    name: RobotName,
+    urdf: Annotated[Path | None, typer.Option(help="write a URDF here")] = None,
+    mjcf: Annotated[
+        Path | None, typer.Option(help="write a MuJoCo model here, on a level floor")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write a robot for other programs: the same masses and kinematics."""
+    from snakewalk.config.extras import require_extra  # noqa: PLC0415  --help stays quick
+    from snakewalk.config.loader import load_robot  # noqa: PLC0415
+    from snakewalk.controller.app.service.robot_export import mjcf_text, urdf_text  # noqa: PLC0415
+
+    if urdf is None and mjcf is None:
+        raise InputError("say what to write: --urdf FILE, --mjcf FILE, or both")
+    refuse_to_overwrite([urdf, mjcf], force)
+    robot = load_robot(name)
+    if mjcf is not None:
+        require_extra("MuJoCo models need", "mujoco")
+    for path, text in ((urdf, urdf_text), (mjcf, mjcf_text)):
+        if path is not None:
+            with atomic_write(path) as part:
+                part.write_text(text(robot), encoding="utf-8")
+    show({"robot": robot.name, "urdf": urdf and str(urdf), "mjcf": mjcf and str(mjcf)}, as_json)

@@ -1,0 +1,93 @@
+"""Robots in other programs' formats: MuJoCo reads them, and finds the links where ours are."""
+
+import json
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot, shipped
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.app.cli.command_line import app
+from snakewalk.controller.app.service.robot_export import mjcf_text, urdf_text
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.drivers.types import BodyPose
+
+ROBOTS = [load_robot(name) for name in shipped("robots")]
+
+
+def poses(robot: RobotConfig) -> np.ndarray:
+    rng = np.random.default_rng(4)
+    return rng.uniform(-1.0, 1.0, (20, robot.joint_count)) * np.array(robot.limit_rad)
+
+
+def limits(model: mujoco.MjModel) -> np.ndarray:
+    return model.jnt_range[model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE]
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+def test_links_of_the_urdf_are_where_ours_are(robot: RobotConfig) -> None:
+    model = mujoco.MjModel.from_xml_string(urdf_text(robot))
+    data = mujoco.MjData(model)
+    assert model.nq == robot.joint_count
+    head = BodyPose(0.0, np.zeros(3), np.eye(3))  # MuJoCo welds a URDF's first link to the world
+    for joint_rad in poses(robot):
+        data.qpos[:] = joint_rad
+        mujoco.mj_kinematics(model, data)
+        ours = body_in_world(robot, head, joint_rad)
+        assert np.abs(data.xipos[1:] - ours.link_m[1:]).max() < 1e-9
+        assert np.abs(data.xmat[1:].reshape(-1, 3, 3) - ours.rotation[1:]).max() < 1e-9
+    assert np.abs(model.body_mass[1:] - robot.link_mass_kg).max() < 1e-9
+    assert limits(model) == pytest.approx(np.outer(robot.limit_rad, [-1.0, 1.0]))
+    names = [model.joint(j).name for j in range(model.njnt)]
+    assert names == [f"joint{j}" for j in range(robot.joint_count)]
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+def test_links_of_the_mjcf_are_where_ours_are(robot: RobotConfig) -> None:
+    model = mujoco.MjModel.from_xml_string(mjcf_text(robot))
+    data = mujoco.MjData(model)
+    assert abs(model.body_mass.sum() - robot.link_mass_kg * (robot.joint_count + 1)) < 1e-9
+    turned = np.array([0.3, -0.5, 0.6, 0.2])
+    for joint_rad in poses(robot):
+        data.qpos[:3], data.qpos[3:7] = (0.4, -1.0, 0.2), turned / np.linalg.norm(turned)
+        data.qpos[7:] = joint_rad
+        mujoco.mj_kinematics(model, data)
+        axes = data.xmat[1:].reshape(-1, 3, 3)
+        ours = body_in_world(robot, BodyPose(0.0, data.qpos[:3].copy(), axes[0].copy()), joint_rad)
+        assert np.abs(data.xipos[1:] - ours.link_m).max() < 1e-9
+        assert np.abs(axes - ours.rotation).max() < 1e-9
+
+
+def test_the_head_of_the_urdf_weighs_what_it_does() -> None:
+    robot = load_robot("xl330-16")
+    text = urdf_text(robot)
+    assert text.count(f'<mass value="{robot.link_mass_kg!r}"') == robot.joint_count + 1
+
+
+def test_export_writes_what_is_asked_for(tmp_path: Path) -> None:
+    files = tmp_path / "a.urdf", tmp_path / "a.xml"
+    words = ["robot", "export", "yaw16", "--urdf", str(files[0]), "--mjcf", str(files[1])]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    for file in files:
+        assert mujoco.MjModel.from_xml_path(str(file)).nbody > 16
+    assert isinstance(CliRunner().invoke(app, words).exception, InputError)  # they exist
+    nothing = CliRunner().invoke(app, ["robot", "export", "yaw16"]).exception
+    assert isinstance(nothing, InputError)
+    assert "--urdf FILE" in str(nothing)
+
+
+def test_show_says_what_each_joint_is(tmp_path: Path) -> None:
+    file = tmp_path / "two.toml"
+    file.write_text(
+        'name = "two"\n[[joints]]\naxis = "y"\nid = 9\nsign = -1\n[[joints]]\naxis = "p"\n'
+    )
+    shown = json.loads(CliRunner().invoke(app, ["robot", "show", str(file), "--json"]).stdout)
+    assert shown["mass_kg"] == 0.33
+    assert [each["id"] for each in shown["joints"]] == [9, 2]
+    assert [each["sign"] for each in shown["joints"]] == [-1, 1]
+    plain = CliRunner().invoke(app, ["robot", "show", str(file)]).stdout
+    assert "XM430-W350" in plain
