@@ -3,7 +3,8 @@
 import math
 from collections import Counter
 from collections.abc import Mapping
-from typing import Literal, Self, TypeVar
+from itertools import pairwise
+from typing import Literal, NamedTuple, Self, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -168,8 +169,60 @@ class JointConfig(Strict):
     )
 
 
+_SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
+
+
+class LimbsConfig(Strict):
+    """A pair of legs at one link of the spine, mirror images: left, then right.
+
+    At zero angles a leg stands straight out to the side. On both sides a positive yaw joint swings
+    the leg forward, and a positive roll joint lifts the foot.
+    """
+
+    link: int = Field(ge=0, description="of the spine, 0 is the head, at whose middle the legs are")
+    joint_axes: str = Field(
+        "yr",
+        pattern=r"^[yr]{1,4}$",
+        description="one letter a servo from the hip: y = yaw (swings), r = roll (lifts)",
+    )
+    hip_m: float = Field(0.03, ge=0.0, le=1.0, description="first joint beside the spine's axis")
+    segments_m: tuple[float, ...] = Field(
+        (0.035, 0.09), description="from joint to joint, the last to the middle of the foot"
+    )
+    segment_mass_kg: float = Field(0.09, gt=0.001, le=20.0)
+    foot_radius_m: float = Field(0.012, gt=0.002, le=0.2)
+    foot_friction: float = Field(0.8, gt=0.0, le=3.0, description="of rubber, in all directions")
+    yaw_limit_rad: float = Field(1.2, gt=0.05, le=3.1)
+    roll_limit_rad: float = Field(1.5, gt=0.05, le=3.1)
+
+    @model_validator(mode="after")
+    def _a_segment_a_joint(self) -> Self:
+        if len(self.segments_m) != len(self.joint_axes):
+            raise ValueError(
+                f"segments_m: {len(self.joint_axes)} lengths, one a joint, not "
+                f"{len(self.segments_m)}"
+            )
+        if any(not 0.002 < length <= 1.0 for length in self.segments_m):
+            raise ValueError("segments_m: lengths over 0.002 and at most 1")
+        return self
+
+
+class LimbJoint(NamedTuple):
+    """One joint of a leg; the link behind it has the joint's index plus one."""
+
+    pair: int
+    """Index in ``limbs``."""
+    side: Literal["left", "right"]
+    place: int
+    """0 at the hip."""
+
+
 class RobotConfig(Strict):
-    """A chain of links joined by servos; lengths in metres, index 0 is the head."""
+    """A chain of links joined by servos, with or without legs; metres, index 0 is the head.
+
+    The joints of the spine come first, head to tail, then those of the legs, pair by pair from the
+    tail to the head, left before right and hip before foot: so stand the servos on the bus.
+    """
 
     name: Name
     joint_axes: str = Field(
@@ -197,6 +250,9 @@ class RobotConfig(Strict):
     joint_speed_limit_rad_s: float = Field(2.0, gt=0.0, description="what a plan may ask")
     joint_acceleration_limit_rad_s2: float = Field(25.0, gt=0.0, description="what a plan may ask")
     torque_limit_n_m: float = Field(2.0, gt=0.0, description="what a plan may ask of a joint")
+    limbs: tuple[LimbsConfig, ...] = Field(
+        (), description="pairs of legs, from the tail to the head: tables [[limbs]]"
+    )
     servo: ServoConfig = ServoConfig()
 
     @model_validator(mode="after")
@@ -219,16 +275,31 @@ class RobotConfig(Strict):
         if len(self.joints) != self.joint_count:
             raise ValueError(
                 f"joints: {len(self.joints)} of them, but joint_axes has {self.joint_count}"
+                if not self.limbs
+                else f"joints: {len(self.joints)} of them, but spine and legs have "
+                f"{self.joint_count}"
             )
-        for number, (joint, axis) in enumerate(zip(self.joints, self.joint_axes, strict=True), 1):
+        for number, (joint, axis) in enumerate(zip(self.joints, self.all_axes, strict=True), 1):
             if joint.axis not in (None, axis):
                 raise ValueError(
                     f"joints: axis of joint {number} is {joint.axis}, joint_axes says {axis}"
                 )
-            if joint.current_limit_a is not None and axis == "y":
+            if joint.current_limit_a is not None and axis != "p":
                 raise ValueError(
                     f"joints: current_limit_a of joint {number}: only pitch joints have one"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _limbs_stand_on_the_spine(self) -> Self:
+        at = [pair.link for pair in self.limbs]
+        if any(link >= self.link_count for link in at):
+            raise ValueError(f"limbs: link {max(at)} of {self.link_count}: 0 is the head")
+        if any(after >= before for before, after in pairwise(at)):
+            raise ValueError(
+                "limbs: each at a link of its own, from the tail to the head: "
+                f"{sorted(set(at), reverse=True)}"
+            )
         return self
 
     @model_validator(mode="after")
@@ -310,13 +381,48 @@ class RobotConfig(Strict):
 
     @property
     def joint_count(self) -> int:
-        """Number of servos J; the chain has J + 1 links."""
-        return len(self.joint_axes)
+        """Number of servos J, legs included; there are J + 1 links."""
+        return len(self.joint_axes) + len(self.limb_joints)
+
+    @property
+    def link_count(self) -> int:
+        """Links of the spine: the first of all links."""
+        return len(self.joint_axes) + 1
+
+    @property
+    def limb_joints(self) -> tuple[LimbJoint, ...]:
+        """Joints of the legs in the order of the bus, behind those of the spine."""
+        return tuple(
+            LimbJoint(index, side, place)
+            for index, pair in enumerate(self.limbs)
+            for side in _SIDES
+            for place in range(len(pair.joint_axes))
+        )
+
+    @property
+    def all_axes(self) -> str:
+        """One letter a servo: spine, then legs."""
+        return self.joint_axes + "".join(2 * pair.joint_axes for pair in self.limbs)
+
+    @property
+    def link_parents(self) -> tuple[int, ...]:
+        """(J + 1,) link that each link hangs on: link i + 1 by joint i; -1 for the head."""
+        parents = list(range(-1, self.link_count - 1))
+        for joint in self.limb_joints:
+            hip = joint.place == 0
+            parents.append(self.limbs[joint.pair].link if hip else len(parents) - 1)
+        return tuple(parents)
+
+    @property
+    def mass_kg(self) -> float:
+        """Of all links."""
+        legs = sum(2 * len(pair.joint_axes) * pair.segment_mass_kg for pair in self.limbs)
+        return self.link_mass_kg * self.link_count + legs
 
     @property
     def length_m(self) -> float:
-        """Body length: J + 1 links."""
-        return self.link_length_m * (self.joint_count + 1)
+        """Body length: the links of the spine."""
+        return self.link_length_m * self.link_count
 
     def radii_m(self, stations: int) -> tuple[float, ...]:
         """Body radius at ``stations`` (1 or more) equal places from head tip to tail tip."""
@@ -362,8 +468,9 @@ class RobotConfig(Strict):
     @property
     def position_p_gains(self) -> tuple[int, ...]:
         """Register 84 of each joint, head first."""
-        usual = {"y": self.servo.position_p_gain, "p": self.servo.pitch_p_gain}
-        return self._own("position_p_gain", tuple(usual[axis] for axis in self.joint_axes))
+        stiff, soft = self.servo.position_p_gain, self.servo.pitch_p_gain
+        usual = tuple(soft if axis == "p" else stiff for axis in self.all_axes)
+        return self._own("position_p_gain", usual)
 
     @property
     def position_i_gains(self) -> tuple[int, ...]:
@@ -377,9 +484,9 @@ class RobotConfig(Strict):
 
     @property
     def current_limits_a(self) -> tuple[float, ...]:
-        """Goal current of each joint, head first; infinite at the yaw joints, which have none."""
+        """Goal current of each joint, head first; infinite where it does not lift the spine."""
         pitch_a = self.servo.pitch_current_limit_a
-        usual = tuple(pitch_a if axis == "p" else math.inf for axis in self.joint_axes)
+        usual = tuple(pitch_a if axis == "p" else math.inf for axis in self.all_axes)
         return self._own("current_limit_a", usual)
 
     @property
@@ -400,21 +507,35 @@ class RobotConfig(Strict):
         return tuple(u if o is None else o for o, u in zip(own, usual, strict=True))
 
     def joint_name(self, joint: int) -> str:
-        """Name of a joint in all messages: its place, counted from 1 at the head, and servo ID."""
-        return f"joint {joint + 1} (ID {self.servo_ids[joint]})"
+        """Name of a joint in all messages: its place, counted from 1 at the head, and servo ID.
+
+        Of a leg, the side and the link of the spine are told as well.
+        """
+        name = f"joint {joint + 1} (ID {self.servo_ids[joint]})"
+        if joint < len(self.joint_axes):
+            return name
+        limb = self.limb_joints[joint - len(self.joint_axes)]
+        return f"{name} of the {limb.side} leg at link {self.limbs[limb.pair].link}"
 
     @property
     def yaw_joints(self) -> tuple[int, ...]:
-        """Indices of the joints that turn about the vertical."""
+        """Indices of the spine's joints that turn about the vertical."""
         return tuple(i for i, axis in enumerate(self.joint_axes) if axis == "y")
 
     @property
     def pitch_joints(self) -> tuple[int, ...]:
-        """Indices of the joints that lift."""
+        """Indices of the spine's joints that lift."""
         return tuple(i for i, axis in enumerate(self.joint_axes) if axis == "p")
 
     @property
     def limit_rad(self) -> tuple[float, ...]:
-        """Half range of each joint, rad, head first."""
-        usual = {"y": self.yaw_limit_rad, "p": self.pitch_limit_rad}
-        return self._own("limit_rad", tuple(usual[axis] for axis in self.joint_axes))
+        """Half range of each joint, rad, in the order of the bus."""
+        spine = tuple(
+            self.yaw_limit_rad if axis == "y" else self.pitch_limit_rad for axis in self.joint_axes
+        )
+        legs = (
+            (pair.yaw_limit_rad if axis == "y" else pair.roll_limit_rad)
+            for pair in self.limbs
+            for axis in 2 * pair.joint_axes
+        )
+        return self._own("limit_rad", spine + tuple(legs))

@@ -121,12 +121,13 @@ class SafetyConfig(Strict):
         """How far each joint may be from its goal, rad, head first.
 
         A yaw joint may lag by the error at which its P gain gives full output, which is all that
-        an honest lag can need; twice of it is the limit, but at least ``following_limit_rad``. A
-        pitch joint has ``following_limit_rad``: its current tells whether the ground holds it off.
+        an honest lag can need; twice of it is the limit, but at least ``following_limit_rad``; so
+        may a leg's joint. A pitch joint has ``following_limit_rad``: its current tells whether the
+        ground holds it off.
         """
         most_rad, limits_rad = 0.9 * self.goal_lead_rad, []
-        for axis, gain in zip(robot.joint_axes, robot.position_p_gains, strict=True):
-            full_rad = _FULL_OUTPUT_RAD / max(gain, 1) if axis == "y" else 0.0
+        for axis, gain in zip(robot.all_axes, robot.position_p_gains, strict=True):
+            full_rad = _FULL_OUTPUT_RAD / max(gain, 1) if axis != "p" else 0.0
             limits_rad.append(min(max(self.following_limit_rad, 2.0 * full_rad), most_rad))
         return tuple(limits_rad)
 

@@ -110,7 +110,7 @@ class SpineGait(Gait):
     def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
         p = self.params
         own = robot.pitch_joints if self.vertical else robot.yaw_joints
-        edges = np.concatenate([[0.0], (np.array(own) + 1.0) / (robot.joint_count + 1), [1.0]])
+        edges = np.concatenate([[0.0], (np.array(own) + 1.0) / robot.link_count, [1.0]])
         joints = np.zeros((len(phase_rad), robot.joint_count))
         joints[:, own] = spine_bends_rad(phase_rad, len(own), p, edges)
         if robot.yaw_joints:

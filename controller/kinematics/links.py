@@ -12,14 +12,14 @@ from snakewalk.drivers.types import BodyPose
 
 
 class BodyView(NamedTuple):
-    """Where every link is, in the world."""
+    """Where every link of the spine is, in the world."""
 
     link_m: Floats
     """(L, 3) centres of the links, head first."""
     rotation: Floats
     """(L, 3, 3) axes of the links; columns: forward (in the direction of travel), left and up."""
     centre_m: Floats
-    """(3,) centre of mass of equal links; [PT] 2.6.2 calls it S_k."""
+    """(3,) centre of mass of equal links, without legs; [PT] 2.6.2 calls it S_k."""
 
     @property
     def forward(self) -> Floats:
@@ -43,16 +43,18 @@ class BodyView(NamedTuple):
 
 
 def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> BodyView:
-    """Forward kinematics from the head pose and joint angles (J,).
+    """Forward kinematics of the spine from the head pose and joint angles (J,), legs left out.
 
     Yaw turns the link behind by ``-q`` about the up axis, pitch by ``+q`` about the left axis, so a
     positive joint bends the head side to the left, or lifts it.
     """
-    links = len(joint_rad) + 1
+    links = robot.link_count
     rotation, centres = np.empty((links, 3, 3)), np.empty((links + 1, 3))
     yaws = _yaws(robot.joint_axes)
     link_m = robot.link_length_m
-    _forward(yaws, pose.rotation, pose.head_in_world_m, joint_rad, link_m, rotation, centres)
+    _forward(
+        yaws, pose.rotation, pose.head_in_world_m, joint_rad[: links - 1], link_m, rotation, centres
+    )
     return BodyView(centres[:-1], rotation, centres[-1])
 
 

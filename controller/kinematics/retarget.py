@@ -21,7 +21,7 @@ class Retarget:
                 f"robot {robot.name}: has no yaw joint: it cannot take the shapes of a walk or a "
                 "recording; gaits that need pitch joints only run on it (snakewalk gait list)"
             )
-        links = robot.joint_count + 1
+        links = robot.link_count
         edges = np.concatenate([[0], yaw + 1, [links]])
         self.edges = edges * points / links
         """(G + 1,) ends of the rigid groups, in points from the head."""

@@ -77,7 +77,7 @@ def sampled_energy(record: RunRecord) -> EnergyTrack:
 
 def weight_n(robot: RobotConfig) -> float:
     """Weight of a robot."""
-    return robot.link_mass_kg * (robot.joint_count + 1) * GRAVITY_M_S2
+    return robot.mass_kg * GRAVITY_M_S2
 
 
 _LEAST_CARRIED_J = 1e-4

@@ -44,7 +44,7 @@ def record_of(rows: Mapping[str, Sequence[Row]], *, complete: bool, note: str) -
         header=header,
         cycle=_cycle(rows.get("/cycle", ()), joints),
         slow=_slow(rows.get("/slow", ()), joints),
-        pose=_pose(rows.get("/pose", ()), joints + 1),
+        pose=_pose(rows.get("/pose", ()), header.robot.link_count),
         walk=_walk(rows.get("/walk", ())),
         qpos=_qpos(rows.get("/qpos", ())),
         paths=((0.0, header.plan.path_m), *replanned),

@@ -142,7 +142,7 @@ def chain_settings(
 
     """
     low, high = units.limits_raw[joint]
-    pitch = robot.joint_axes[joint] == "p"
+    pitch = robot.all_axes[joint] == "p"
     limits_current = pitch and bool(units.measures_current[joint])
     if pitch and not limits_current:  # such a model is as soft as its output is small
         goal_pwm = units.pwm_raw(joint, robot.current_limits_a[joint], goal_pwm)
@@ -219,7 +219,7 @@ def _configure_joint(
     for setting in chain_settings(robot, units, joint, pwm_limit):
         if setting.register in bus.table_of(servo_id):
             values[setting.register] = _apply(bus, robot, joint, setting, on_event)
-    if robot.joint_axes[joint] == "p" and units.measures_current[joint]:
+    if robot.all_axes[joint] == "p" and units.measures_current[joint]:
         values["Goal Current"] = _limit_current(bus, robot, joint, units)
     if pwm_limit < PWM_FULL:
         on_event(f"{name}: PWM Limit is {pwm_limit} of {PWM_FULL}: weak and slow")

@@ -1,6 +1,8 @@
 """The robot and its ground as a MuJoCo model.
 
-The head link floats, the others hang behind it, so MuJoCo's order of bodies and joints is ours.
+The head link floats, the others hang behind it, so MuJoCo's order of bodies and joints is ours. So
+it is with legs: they are written behind the rest of the spine, and MuJoCo counts depth first. A leg
+meets the ground with its foot, a ball under MuJoCo's own friction, and passes through all else.
 A link meets the ground with its belly: a capsule along it, or a ball, or two capsules as rails.
 On a height field each capsule is two balls, and every ball has tangent planes of its own
 (``sim.physics.tangent_planes``).
@@ -17,7 +19,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.heightfield import HeightField
-from snakewalk.config.robot import RobotConfig
+from snakewalk.config.robot import LimbsConfig, RobotConfig
 from snakewalk.config.world import FlatGround, WaterGround, WorldConfig
 from snakewalk.sim.physics.obstacles import obstacle_mjcf
 from snakewalk.sim.physics.tangent_planes import AWAY_M, PLANES
@@ -133,7 +135,9 @@ def mjcf(
     soft = f'solref="{max(CONTACT_TIME_S, 2.0 * step_s)} 1" solimp="0.9 0.95 0.001"'
     asset, floor = _ground(world, ground)
     options, obstacle = obstacle_mjcf(world)
-    links, apart = robot.joint_count + 1, links_apart(robot)
+    if robot.limbs:
+        options = ' cone="elliptic" impratio="10"'  # as an obstacle's: for friction that holds
+    links, apart = robot.link_count, links_apart(robot)
     overlapping = "".join(
         f'<exclude body1="link{i}" body2="link{j}"/>'
         for i in range(links)
@@ -152,7 +156,7 @@ def mjcf(
     {floor}{obstacle}
     <body name="link0"><freejoint name="head"/>
       {_link(robot, 0, balls=ground is not None)}
-      {_links_behind(robot, balls=ground is not None)}
+      {_links_behind(robot, balls=ground is not None)}{_limbs(robot, 0)}
     </body>
   </worldbody>
   <contact>{overlapping}</contact>
@@ -209,7 +213,7 @@ def _belly(robot: RobotConfig, index: int, balls: bool) -> str:
 
 def _links_behind(robot: RobotConfig, *, balls: bool) -> str:
     text = ""
-    for j in reversed(range(robot.joint_count)):
+    for j in reversed(range(robot.link_count - 1)):
         axis = "0 0 -1" if robot.joint_axes[j] == "y" else "0 1 0"
         stop = robot.limit_rad[j] + STOP_MARGIN_RAD
         back = robot.link_length_m / (2.0 if j == 0 else 1.0)
@@ -217,6 +221,47 @@ def _links_behind(robot: RobotConfig, *, balls: bool) -> str:
             f'<body name="link{j + 1}" pos="{-back!r} 0 0">'
             f'<joint name="joint{j}" axis="{axis}" range="{-stop!r} {stop!r}" '
             f'armature="{robot.armatures_kg_m2[j]!r}"/>'
-            f"{_link(robot, j + 1, balls=balls)}{text}</body>"
+            f"{_link(robot, j + 1, balls=balls)}{text}{_limbs(robot, j + 1)}</body>"
+        )
+    return text
+
+
+def _limbs(robot: RobotConfig, link: int) -> str:
+    """Legs at a link of the spine, behind the rest of the spine in MuJoCo's order, depth first."""
+    text, start = "", robot.link_count
+    for pair in robot.limbs:
+        count = len(pair.joint_axes)
+        if pair.link == link:
+            for side in (1.0, -1.0):
+                text += _limb(robot, pair, start, side)
+                start += count
+        else:
+            start += 2 * count
+    return text
+
+
+def _limb(robot: RobotConfig, pair: LimbsConfig, first: int, side: float) -> str:
+    """One leg, ``side`` 1 to the left; its segments are thin rods, its foot a ball at the end."""
+    text, limits = "", robot.limit_rad
+    for k in reversed(range(len(pair.joint_axes))):
+        axis = f"0 0 {-side!r}" if pair.joint_axes[k] == "y" else f"{side!r} 0 0"
+        stop = limits[first + k - 1] + STOP_MARGIN_RAD
+        along = -0.5 * robot.link_length_m if pair.link > 0 else 0.0
+        at = (along, side * pair.hip_m) if k == 0 else (0.0, side * pair.segments_m[k - 1])
+        length, mass, r = pair.segments_m[k], pair.segment_mass_kg, pair.foot_radius_m
+        across = mass * (3.0 * r**2 + length**2) / 12.0
+        foot = (
+            f'<geom name="foot{first + k}" type="sphere" size="{r!r}" pos="0 {side * length!r} 0" '
+            f'contype="4" conaffinity="1" condim="3" priority="2" '
+            f'friction="{pair.foot_friction!r} 0 0"/>'
+            if k == len(pair.joint_axes) - 1
+            else ""
+        )
+        text = (
+            f'<body name="link{first + k}" pos="{at[0]!r} {at[1]!r} 0">'
+            f'<joint name="joint{first + k - 1}" axis="{axis}" range="{-stop!r} {stop!r}" '
+            f'armature="{robot.armatures_kg_m2[first + k - 1]!r}"/>'
+            f'<inertial pos="0 {0.5 * side * length!r} 0" mass="{mass!r}" '
+            f'diaginertia="{across!r} {mass * r**2 / 2.0!r} {across!r}"/>{foot}{text}</body>'
         )
     return text

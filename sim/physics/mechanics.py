@@ -17,26 +17,35 @@ LEAST_DEPTH_M = 1e-9
 """Contacts of one link share its load by depth; this is the depth of one that just touches."""
 
 
+GROUND, FOOT = 1, 2
+"""Roles in contacts: the floor or a plane on it; a foot, whose friction is MuJoCo's own cone, since
+it knows no direction. Everything else is 0: bellies, obstacles."""
+
+
 class PhysicsError(RuntimeError):
     """The physics cannot go on: its state diverged, or this MuJoCo is not the one it knows."""
 
 
 @dataclass(slots=True)
 class Mechanics:
-    """One robot's model and data; link i is body ``1 + i``, joint j has position ``7 + j``."""
+    """One robot's model and data; link i is body ``1 + i``, joint j has position ``7 + j``.
+
+    The links of the spine come first, then those of the legs.
+    """
 
     model: mujoco.MjModel
     data: mujoco.MjData
     mu: tuple[float, float, float]
     """Coefficients of friction: sliding forward, across and back."""
+    spine_links: int
     link_mass_kg: float
     radius_m: float
     gear_drag_n_m_s: Floats
     """(J,) viscous loss of each gearbox, powered or not."""
     planes: TangentPlanes
     """What bears the body on a height field."""
-    is_ground: NDArray[np.int32]
-    """(geoms,) 1 for the floor and the planes, 0 for bellies and obstacles."""
+    contact_role: NDArray[np.int32]
+    """(geoms,) ``GROUND``, ``FOOT``, or 0."""
     load_n: Floats
     """(L,) what the ground bore of each link in the last step, N."""
     before_m: Floats
@@ -63,11 +72,12 @@ class Mechanics:
         water = water_constants(world, robot)
         grip = mu.along, mu.across, mu.backward
         planes = TangentPlanes.of(model, ground, radius)
-        is_ground = np.zeros(model.ngeom, dtype=np.int32)
-        is_ground[model.geom("ground").id] = 1
-        is_ground[planes.planes] = 1
-        about = mass, radius, np.array(robot.gear_drags_n_m_s)
-        return cls(model, data, grip, *about, planes, is_ground, load, before, water)
+        role = np.zeros(model.ngeom, dtype=np.int32)
+        role[model.geom("ground").id] = GROUND
+        role[planes.planes] = GROUND
+        role[foot_geoms(model, robot)] = FOOT
+        about = robot.link_count, mass, radius, np.array(robot.gear_drags_n_m_s)
+        return cls(model, data, grip, *about, planes, role, load, before, water)
 
     @property
     def joint_count(self) -> int:
@@ -81,22 +91,35 @@ class Mechanics:
 
     def start_at_rest(self) -> None:
         """Set up the memory for a state that was set, not stepped to, after ``mj_forward``."""
-        self.before_m[:] = self.data.xipos[1:] - self.step_s * velocities(self.data)[0]
+        self.before_m[:] = self.data.xipos[1:] - self.step_s * velocities(self.model, self.data)[0]
         self.measure_loads()
 
     def measure_loads(self) -> None:
         """Set ``load_n`` from the contact forces in the data."""
         d = self.data
         row = np.asarray(d.contact.efc_address)
-        bears = (row >= 0) & (self.is_ground[d.contact.geom[:, 0]] > 0)
+        bears = (row >= 0) & (self.contact_role[d.contact.geom[:, 0]] == GROUND)
         link = self.model.geom_bodyid[d.contact.geom[bears, 1]] - 1
         self.load_n[:] = np.bincount(link, d.efc_force[row[bears]], len(self.load_n))
 
 
-def velocities(data: mujoco.MjData) -> tuple[Floats, Floats]:
+def foot_geoms(model: mujoco.MjModel, robot: RobotConfig) -> list[int]:
+    """Geoms of the feet, in the order of the legs' joints; none of a snake."""
+    return [
+        model.geom(f"foot{robot.link_count + k}").id
+        for k, joint in enumerate(robot.limb_joints)
+        if joint.place == len(robot.limbs[joint.pair].joint_axes) - 1
+    ]
+
+
+def velocities(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Floats, Floats]:
     """Velocity of the links' centres and their spins, world frame, (L, 3) each."""
-    centre, anchor = data.xipos[1:], data.xanchor[1:]
-    head_spin = data.xmat[1].reshape(3, 3) @ data.qvel[3:6]
-    spin = np.vstack([head_spin, data.xaxis[1:] * data.qvel[6:, None]]).cumsum(axis=0)
-    rise = np.cross(spin[:-1], anchor - centre[:-1]) + np.cross(spin[1:], centre[1:] - anchor)
-    return np.vstack([data.qvel[:3], rise]).cumsum(axis=0), spin
+    centre, anchor = data.xipos[1:], data.xanchor
+    velocity, spin = np.empty_like(centre), np.empty_like(centre)
+    velocity[0], spin[0] = data.qvel[:3], data.xmat[1].reshape(3, 3) @ data.qvel[3:6]
+    for i in range(1, len(centre)):
+        on = int(model.body_parentid[i + 1]) - 1
+        spin[i] = spin[on] + data.xaxis[i] * data.qvel[5 + i]
+        rise = np.cross(spin[on], anchor[i] - centre[on]) + np.cross(spin[i], centre[i] - anchor[i])
+        velocity[i] = velocity[on] + rise
+    return velocity, spin

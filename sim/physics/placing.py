@@ -10,7 +10,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WaterGround, WorldConfig
 from snakewalk.drivers.least_squares import least_squares
 from snakewalk.sim.physics.body import belly_points_m
-from snakewalk.sim.physics.mechanics import Mechanics
+from snakewalk.sim.physics.mechanics import Mechanics, foot_geoms
 from snakewalk.sim.physics.water import floating_height_m
 
 DRAPE_ROUNDS = 8
@@ -138,15 +138,26 @@ def _settle(m: Mechanics) -> None:
 
 
 def _clearance_m(m: Mechanics, robot: RobotConfig, ground: HeightField | None) -> Floats:
-    """(L,) height by which each link's belly clears the ground, negative below it."""
+    """(L,) height by which each link's belly or foot clears the ground, negative below it.
+
+    Infinite for the segments of a leg that end in no foot.
+    """
     mujoco.mj_kinematics(m.model, m.data)
-    axes = np.asarray(m.data.xmat[1:]).reshape(-1, 3, 3)
+    spine = robot.link_count
+    axes = np.asarray(m.data.xmat[1 : 1 + spine]).reshape(-1, 3, 3)
     along, aside, _ = belly_points_m(robot).reshape(-1, 3).T[..., None]
     # products by hand: BLAS adds in another order on another processor
-    places = m.data.xipos[1:, None] + along * axes[:, None, :, 0] + aside * axes[:, None, :, 1]
+    centres = m.data.xipos[1 : 1 + spine, None]
+    places = centres + along * axes[:, None, :, 0] + aside * axes[:, None, :, 1]
     points = places.reshape(-1, 3)
     above = points[:, 2] - _rest_height_m(ground, points, robot.body_radius_m)
-    return np.asarray(above.reshape(len(axes), -1).min(axis=1))
+    clear = np.full(m.joint_count + 1, np.inf)
+    clear[:spine] = above.reshape(len(axes), -1).min(axis=1)
+    for foot in foot_geoms(m.model, robot):
+        radius_m = float(m.model.geom_size[foot, 0])
+        low = m.data.geom_xpos[foot : foot + 1]
+        clear[m.model.geom_bodyid[foot] - 1] = low[0, 2] - _rest_height_m(ground, low, radius_m)[0]
+    return clear
 
 
 def _rest_height_m(ground: HeightField | None, centre: Floats, radius_m: float) -> Floats:

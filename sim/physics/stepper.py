@@ -21,7 +21,13 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 from snakewalk.sim.physics.friction import ellipse_force, stop_drag
 from snakewalk.sim.physics.layout import step_layout
-from snakewalk.sim.physics.mechanics import LEAST_DEPTH_M, Mechanics, PhysicsError
+from snakewalk.sim.physics.mechanics import (
+    FOOT,
+    GROUND,
+    LEAST_DEPTH_M,
+    Mechanics,
+    PhysicsError,
+)
 from snakewalk.sim.physics.tangent_planes import PLANES, lay_planes
 from snakewalk.sim.physics.water import add_water, immersed
 from snakewalk.sim.plant import ServoDrive, shaft_torque
@@ -68,9 +74,10 @@ def _move(
     before: Floats,
     qvel: Floats,
     chain: tuple[Floats, ...],
+    parents: NDArray[np.int32],
     step_s: float,
 ) -> None:
-    """Rate at which each link's centre moved in the last step, and its spin, head to tail."""
+    """Rate at which each link's centre moved in the last step, and its spin, from the head on."""
     centre, rotation, _, axis = chain
     for k in range(3):
         w[0, k] = 0.0
@@ -81,11 +88,13 @@ def _move(
             v[i, k] = (centre[i + 1, k] - before[i, k]) / step_s
             before[i, k] = centre[i + 1, k]
             if i > 0:
-                w[i, k] = w[i - 1, k] + axis[i, k] * qvel[5 + i]
+                w[i, k] = w[parents[i + 1] - 1, k] + axis[i, k] * qvel[5 + i]
 
 
-def _collect(wrench: Floats, qfrc: Floats, chain: tuple[Floats, ...]) -> None:
-    """Add the links' wrenches (force, torque about the world's origin) to ``qfrc``, tail first."""
+def _collect(
+    wrench: Floats, qfrc: Floats, chain: tuple[Floats, ...], parents: NDArray[np.int32]
+) -> None:
+    """Add the links' wrenches (force, torque about the world's origin) to ``qfrc``, ends first."""
     centre, rotation, anchor, axis = chain
     for i in range(len(wrench) - 1, 0, -1):
         f, t, a, e = wrench[i, :3], wrench[i, 3:], anchor[i], axis[i]
@@ -95,7 +104,7 @@ def _collect(wrench: Floats, qfrc: Floats, chain: tuple[Floats, ...]) -> None:
             + e[2] * (t[2] - a[0] * f[1] + a[1] * f[0])
         )
         for k in range(6):
-            wrench[i - 1, k] += wrench[i, k]
+            wrench[parents[i + 1] - 1, k] += wrench[i, k]
     f, t, a = wrench[0, :3], wrench[0, 3:], centre[1]
     m0 = t[0] - a[1] * f[2] + a[2] * f[1]
     m1 = t[1] - a[2] * f[0] + a[0] * f[2]
@@ -116,25 +125,28 @@ def _add_friction(
     load: Floats,
     totals: Floats,
     water: Floats,
+    spine: int,
 ) -> None:
     """Ellipse at every contact of now under the load of the last step, collected into ``qfrc``."""
     reals, integers, count, at = contacts
     size, at_dist, at_place, at_up, at_geom, _ = at
-    geom_body, is_ground = geoms
+    geom_body, role, parents = geoms
     v, w, wrench, depth, before = work
     mu, mass_kg, radius_m, step_s = (law[0], law[1], law[2]), law[3], law[4], law[5]
     centre, rotation = chain[0], chain[1]
-    still = stop_drag(centre[1:], mass_kg, radius_m, step_s)
+    still = stop_drag(centre[1 : spine + 1], mass_kg, radius_m, step_s)
     depth[:] = 0.0
     for c in range(count):
-        if not is_ground[integers[2 * size * c + at_geom]]:
-            continue  # an obstacle's, which has MuJoCo's own friction, or two links'
+        pair = integers[2 * size * c + at_geom : 2 * size * c + at_geom + 2]
+        if role[pair[0]] != GROUND or role[pair[1]] == FOOT:
+            continue  # an obstacle's or a foot's, with MuJoCo's own friction, or two links'
         i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
         depth[i] += max(-reals[size * c + at_dist], LEAST_DEPTH_M)
-    _move(v, w, before, qvel, chain, step_s)
+    _move(v, w, before, qvel, chain, parents, step_s)
     wrench[:] = 0.0
     for c in range(count):
-        if not is_ground[integers[2 * size * c + at_geom]]:
+        pair = integers[2 * size * c + at_geom : 2 * size * c + at_geom + 2]
+        if role[pair[0]] != GROUND or role[pair[1]] == FOOT:
             continue
         i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
         share = max(-reals[size * c + at_dist], LEAST_DEPTH_M) / depth[i]
@@ -166,7 +178,7 @@ def _add_friction(
         wrench[i, 5] += p[0] * f1 - p[1] * f0
     if water[3] > 0.0:
         totals[0] += add_water(wrench, centre[1:], rotation[1:], v, w, water, step_s)
-    _collect(wrench, qfrc, chain)
+    _collect(wrench, qfrc, chain, parents)
 
 
 def _weigh(
@@ -177,10 +189,10 @@ def _weigh(
 ) -> None:
     """Sum the ground's contact forces on each link."""
     _, integers, count, at = contacts
-    geom_body, is_ground = geoms
+    geom_body, role, _ = geoms
     for c in range(count):
         row = integers[2 * at[0] * c + at[5]]
-        if row >= 0 and is_ground[integers[2 * at[0] * c + at[4]]]:
+        if row >= 0 and role[integers[2 * at[0] * c + at[4]]] == GROUND:
             load[geom_body[integers[2 * at[0] * c + at[4] + 1]] - 1] += force_n[row]
 
 
@@ -198,6 +210,7 @@ def _steps(
     load: Floats,
     totals: Floats,
     water: Floats,
+    spine: int,
 ) -> None:
     """Advance: ``mj_step1``, drive, friction, ``mj_step2``, so often."""
     qpos, qvel, qfrc = state
@@ -249,7 +262,7 @@ def _steps(
             count,
             at,
         )
-        _add_friction(contacts, qfrc, qvel, chain, work, geoms, law, load, totals, water)
+        _add_friction(contacts, qfrc, qvel, chain, work, geoms, law, load, totals, water, spine)
         call(step2, model, data)
         for j in range(joints):
             # a force does its work at the mean of the speeds before and after Euler's step
@@ -297,6 +310,7 @@ def _run(
     geoms = (
         carray(pointer(arrays[14]), (geom_count,), np.int32),
         carray(pointer(arrays[15]), (geom_count,), np.int32),
+        carray(pointer(arrays[39]), (bodies,), np.int32),
     )
     ground = (
         carray(pointer(arrays[16]), (geom_count, 3), np.float64),
@@ -331,6 +345,7 @@ def _run(
     _steps(
         *(steps, where, state, chain, work, geoms, ground, law, gear_drag, drive, load, totals),
         constants[6:12],
+        sizes[6],
     )
 
 
@@ -389,7 +404,7 @@ class CompiledSteps:
             *(d.qpos, d.qvel, d.qfrc_applied),
             *(d.xipos, d.xmat, d.xanchor, d.xaxis),
             *(np.zeros((links, 3)), np.zeros((links, 3)), np.zeros((links, 6)), np.zeros(links)),
-            *(m.before_m, m.load_n, m.totals, m.model.geom_bodyid, m.is_ground),
+            *(m.before_m, m.load_n, m.totals, m.model.geom_bodyid, m.contact_role),
             *(d.geom_xpos, m.planes.balls, m.planes.z_m, m.planes.planes),
             *(m.model.geom_pos, m.model.geom_quat),
         )
@@ -399,6 +414,7 @@ class CompiledSteps:
             m.model.ngeom,
             len(m.planes.balls),
             *m.planes.z_m.shape,
+            m.spine_links,
         )
         self._sizes = np.array(sizes, dtype=np.int64)
         self._constants = np.array(
@@ -414,6 +430,7 @@ class CompiledSteps:
         """Advance ``steps`` steps."""
         if drive is not self._drive:
             self._drive = drive
-            arrays = (*self._arrays, *drive.columns(), self._m.gear_drag_n_m_s)
+            motors = (*drive.columns(), self._m.gear_drag_n_m_s)
+            arrays = (*self._arrays, *motors, self._m.model.body_parentid)
             self._addresses = np.array([each.ctypes.data for each in arrays], dtype=np.int64)
         run_steps(steps, self._where, self._addresses, self._sizes, self._constants)

@@ -91,7 +91,8 @@ def render_film(
         robot, world, ground, waypoints_m, waypoint_radius_m, look=look, fine=fine
     )
     data = mujoco.MjData(model)
-    camera = _camera(model, data, shots, fps, robot.length_m)
+    spine = slice(1, 1 + (bodies if bodies > 1 else robot.link_count))
+    camera = _camera(model, data, shots, fps, robot.length_m, spine)
     trail = make_trail(paths, times, poses, ground)
     scene = mujoco.MjvScene(model, maxgeom=model.ngeom + model.nbody + 11 + trail.most)
     scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
@@ -113,7 +114,9 @@ def render_film(
             mujoco.mjv_updateScene(
                 model, data, option, None, view, mujoco.mjtCatBit.mjCAT_ALL, scene
             )
-            add_shade(scene, np.array(data.xipos[1:]), np.array(data.xmat[1:, ::3]), robot, ground)
+            add_shade(
+                scene, np.array(data.xipos[spine]), np.array(data.xmat[spine, ::3]), robot, ground
+            )
             trail.add(scene, now)
             film.add(screen.draw(scene, f"{title}  {now:6.1f} s   {speed_up:g}x".strip()))
             if on_frame is not None:
@@ -138,14 +141,19 @@ def poses_at(time_s: Floats, qpos: Floats, at_s: Floats, bodies: int = 1) -> Flo
 
 
 def _camera(
-    model: mujoco.MjModel, data: mujoco.MjData, shots: Floats, fps: int, length_m: float
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    shots: Floats,
+    fps: int,
+    length_m: float,
+    spine: slice,
 ) -> Floats:
     """Look-at point, azimuth in degrees, and distance of each frame (F, 5), smoothed both ways."""
     centre, body = np.empty((len(shots), 3)), np.empty((len(shots), 2))
     for k, shot in enumerate(shots):
         data.qpos[:] = shot
         mujoco.mj_kinematics(model, data)
-        links = data.xipos[1:]
+        links = data.xipos[spine]
         centre[k] = (links.min(axis=0) + links.max(axis=0)) / 2
         body[k] = links[0, :2] - links[-1, :2]
     smooth = gaussian_filter1d(centre, SMOOTHING_S * fps, axis=0, mode="nearest")

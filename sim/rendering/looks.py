@@ -76,7 +76,7 @@ def dressed_model(
     if look is not None and look.free:
         _replace_robot(spec, len(look.rest_m))
     for geom in spec.geoms:
-        geom.group = 4 if geom.name.startswith("belly") else 0  # bellies are not drawn
+        geom.group = 4 if geom.name.startswith(("belly", "foot")) else 0  # drawn by other geoms
     _light(spec, robot, fine)
     _floor(spec, ground)
     if look is None:
@@ -229,7 +229,7 @@ def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
 def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
     """A capsule a link; a broad head with eyes and a forked tongue."""
     r, length = robot.body_radius_m, robot.link_length_m
-    links = robot.joint_count + 1
+    links = robot.link_count
     thickness = _thickness_m(robot)
     for i in range(1, links):
         body = spec.body(f"link{i}")
@@ -237,6 +237,7 @@ def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
         low = thick - r  # the belly stays on the ground
         ends = (0.0, 0.0, low, -length, 0.0, low)
         _add(body, _CAPSULE, (thick, 0, 0), (), BACK[i % 2], ends)
+    _legs(spec, robot)
     head = spec.body("link0")
     half = length / 2
     _add(head, _ELLIPSOID, (half * 1.25, r * 1.02, r * 0.78), (half * 0.2, 0, -0.2 * r), HEAD)
@@ -257,6 +258,18 @@ def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
         TONGUE,
         (half * 1.3, 0, -0.35 * r, half * 1.9, 0, -0.35 * r),
     )
+
+
+def _legs(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
+    """A capsule a segment, and the feet, which are not drawn as bellies are not."""
+    for k, joint in enumerate(robot.limb_joints):
+        pair = robot.limbs[joint.pair]
+        body = spec.body(f"link{robot.link_count + k}")
+        end = pair.segments_m[joint.place] * (1.0 if joint.side == "left" else -1.0)
+        thick = pair.foot_radius_m
+        _add(body, _CAPSULE, (thick, 0, 0), (), BACK[k % 2], (0, 0, 0, 0, end, 0))
+        if joint.place == len(pair.joint_axes) - 1:
+            _add(body, _SPHERE, (1.02 * thick, 0, 0), (0, end, 0), HEAD)
 
 
 def _animal(spec: mujoco.MjSpec, look: SkinLook) -> None:
@@ -286,7 +299,7 @@ def _animal(spec: mujoco.MjSpec, look: SkinLook) -> None:
 
 def _thickness_m(robot: RobotConfig) -> Floats:
     """Skin radius (L,) of each link: the robot's profile, or one thinner at neck and tail."""
-    links = robot.joint_count + 1
+    links = robot.link_count
     if robot.body_profile is not None:
         return np.array(robot.radii_m(2 * links + 1))[1::2]  # at the links' middles
     along = np.arange(links) / (links - 1)

@@ -60,8 +60,13 @@ class TopView:
         data = self._data
         data.qpos[:] = qpos
         self._update(mujoco.MjvOption())
+        spine = slice(1, 1 + self._robot.link_count)
         add_shade(
-            self._scene, np.array(data.xipos[1:]), np.array(data.xmat[1:, ::3]), self._robot, None
+            self._scene,
+            np.array(data.xipos[spine]),
+            np.array(data.xmat[spine, ::3]),
+            self._robot,
+            None,
         )
         return self._drawn()
 

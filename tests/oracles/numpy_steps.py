@@ -7,7 +7,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.sim.physics.friction import stop_drag
-from snakewalk.sim.physics.mechanics import LEAST_DEPTH_M, Mechanics, velocities
+from snakewalk.sim.physics.mechanics import FOOT, GROUND, LEAST_DEPTH_M, Mechanics, velocities
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.physics.water import add_water
 from snakewalk.sim.plant import ServoDrive
@@ -59,7 +59,8 @@ def friction_forces(m: Mechanics) -> Floats:
     out = np.zeros(m.model.nv)
     contacts = d.contact
     # the others are an obstacle's, which have MuJoCo's own friction, or those of two links
-    ours = m.is_ground[contacts.geom[:, 0]] > 0
+    one, other = m.contact_role[contacts.geom].T
+    ours = (one == GROUND) & (other != FOOT)
     link = m.model.geom_bodyid[contacts.geom[ours, 1]] - 1
     depth = np.maximum(-contacts.dist[ours], LEAST_DEPTH_M)
     load = m.load_n[link]
@@ -67,7 +68,7 @@ def friction_forces(m: Mechanics) -> Floats:
     normal_n = load * share
     place, up = contacts.pos[ours], contacts.frame[ours, :3]
     centre = d.xipos[1:]
-    velocity, (_, spin) = (centre - m.before_m) / m.step_s, velocities(d)
+    velocity, (_, spin) = (centre - m.before_m) / m.step_s, velocities(m.model, d)
     m.before_m[:] = centre
     arm = place - centre[link]
     sliding = velocity[link] + np.cross(spin[link], arm)
@@ -76,7 +77,7 @@ def friction_forces(m: Mechanics) -> Floats:
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
     across = np.cross(up, along)
     v_along, v_across = (sliding * along).sum(axis=1), (sliding * across).sum(axis=1)
-    still = stop_drag(centre, m.link_mass_kg, m.radius_m, m.step_s)
+    still = stop_drag(centre[: m.spine_links], m.link_mass_kg, m.radius_m, m.step_s)
     f_along, f_across = ellipse_forces(normal_n, v_along, v_across, m.mu, still, load)
     m.totals[0] -= float(f_along @ v_along + f_across @ v_across) * m.step_s
     m.totals[1] += float((np.abs(v_across) * share).sum()) * m.step_s / len(centre)

@@ -77,7 +77,7 @@ def _robot_skin(skin: Skin, record: RunRecord, fps: float, source: str) -> tuple
 
 def robot_skin(skin: Skin, robot: RobotConfig, in_water: bool = False) -> Skin:
     """Size a skin to a robot; on land its lowest place is where the robot's belly is."""
-    sized = skin.sized((robot.joint_count + 1) * robot.link_length_m)
+    sized = skin.sized(robot.length_m)
     if in_water:
         return sized
     low = float(sized.mesh.vertices[:, 2].min())
@@ -86,7 +86,7 @@ def robot_skin(skin: Skin, robot: RobotConfig, in_water: bool = False) -> Skin:
 
 def from_poses(robot: RobotConfig, time_s: Floats, qpos: Floats) -> BoneMotion:
     """Bones that are the robot's links; ``qpos`` (T, 7 + J) as ``MujocoPlant.qpos``."""
-    links = robot.joint_count + 1
+    links = robot.link_count
     half = 0.5 * robot.link_length_m
     turns = Rotation.from_quat(qpos[:, 3:7], scalar_first=True).as_matrix()
     front, rotation = np.empty((len(qpos), links, 3)), np.empty((len(qpos), links, 3, 3))

@@ -102,6 +102,7 @@ def prepare_walk(
     if run.motion == "source":
         raise InputError(f"run {run.name}: a source of your own is run by prepare_source")
     robot = _with_keys_of("robot", load_robot(run.robot, beside), keys)
+    _refuse_legs(robot)
     _check_servos(run, robot)
     return WalkRun(run, robot, _with_keys_of("world", load_world(run.world, beside), keys))
 
@@ -109,6 +110,14 @@ def prepare_walk(
 def _with_keys_of(file: str, config: C, keys: Mapping[str, object]) -> C:
     own = {k.removeprefix(f"{file}."): v for k, v in keys.items() if k.startswith(f"{file}.")}
     return with_keys(config, own, f"{file} {config.name}") if own else config
+
+
+def _refuse_legs(robot: RobotConfig) -> None:
+    if robot.limbs:
+        raise InputError(
+            f"robot {robot.name}: walks and recordings move a body without legs; a robot with legs "
+            "runs gaits (snakewalk gait run) and sources of your own"
+        )
 
 
 def prepare_gait(
@@ -208,6 +217,7 @@ def prepare_playback(
         "playback": {"speed": speed},
     }
     run = checked(RunConfig, fields, "command line")
+    _refuse_legs(body)
     _check_servos(run, body)
     prepared = PlaybackRun(run, body, load_world(run.world))
     Recorded(body, *prepared.joint_track).needs.check(body, "this recording")
@@ -291,7 +301,7 @@ def _with_gains(robot: RobotConfig, *, pitch: bool, soft: Sequence[int] = ()) ->
     if soft:
         changes["position_p_gain"] = changes["pitch_p_gain"] = min(soft)
     joints = []
-    for joint, axis in zip(robot.joints, robot.joint_axes, strict=False):  # there may be none
+    for joint, axis in zip(robot.joints, robot.all_axes, strict=False):  # there may be none
         own: dict[str, float | None] = {}
         for key, least in (
             ("position_p_gain", changes.get("pitch_p_gain")),

@@ -226,7 +226,7 @@ class _Checks:
             "current limit",
             "fail",
             lambda servo: (
-                robot.joint_axes[servo.joint] == "p"
+                robot.all_axes[servo.joint] == "p"
                 and servo.values.get("Current Limit", math.inf)
                 < units.current_raw(servo.joint, robot.current_limits_a[servo.joint])
             ),

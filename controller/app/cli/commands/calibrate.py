@@ -47,6 +47,8 @@ def calibrate(
         raise InputError(f"--current {current:g}: over 0 and at most 2 A")
     refuse_to_overwrite([out], force)
     like = load_robot(robot)
+    if like.limbs:
+        raise InputError(f"robot {like.name}: has legs; calibrate knows chains without")
     with SerialPort(pick_port(port), baud or like.servo.baud) as line:
         found = chain_calibration.calibrate(
             line,

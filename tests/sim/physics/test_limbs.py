@@ -1,0 +1,166 @@
+"""Legs in the model: order, geometry, weight, grip of the feet, and equal answers of both steps."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from snakewalk.config.constants import GRAVITY_M_S2
+from snakewalk.config.errors import InputError
+from snakewalk.config.ground import build_ground
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.sim.physics.mechanics import foot_geoms
+from snakewalk.sim.physics.plant import MujocoPlant
+from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
+from tests.oracles.numpy_steps import numpy_plant
+
+ROBOT = load_robot("salamander")
+WORLD = load_world("isotropic")
+HIND, FRONT = ROBOT.limbs
+SPINE = len(ROBOT.joint_axes)
+STAND = np.zeros(ROBOT.joint_count)
+STAND[SPINE + 1 :: 2] = -0.6
+
+
+def drive():
+    servo = make_drive([MOTORS["XM430-W350"]] * ROBOT.joint_count, 12.0)
+    servo.torque_on[:] = 1.0
+    servo.p_gain_per_rad[:] = p_gain_per_rad(800, MOTORS["XM430-W350"])
+    servo.goal_rad[:] = STAND
+    return servo
+
+
+def feet_m(joint_rad: np.ndarray) -> np.ndarray:
+    """(4, 3) feet about the head's middle: hind left, hind right, front left, front right."""
+    body = MujocoPlant(ROBOT, WORLD)
+    body.mechanics.data.qpos[:3] = 0.0
+    body.mechanics.data.qpos[3:7] = 1.0, 0.0, 0.0, 0.0
+    body.mechanics.data.qpos[7:] = joint_rad
+    mujoco.mj_kinematics(body.mechanics.model, body.mechanics.data)
+    return np.array(body.mechanics.data.geom_xpos[foot_geoms(body.mechanics.model, ROBOT)])
+
+
+def expected_m(pair: int, side: float, swing: float, lift: float) -> np.ndarray:
+    """Closed form: the hip at its link's middle, two segments, swung and lifted."""
+    limb = ROBOT.limbs[pair]
+    first, second = limb.segments_m
+    out = first + second * np.cos(lift)
+    return np.array(
+        [
+            -limb.link * ROBOT.link_length_m + out * np.sin(swing),
+            side * (limb.hip_m + out * np.cos(swing)),
+            second * np.sin(lift),
+        ]
+    )
+
+
+def test_bodies_and_joints_stand_in_the_order_of_the_bus() -> None:
+    model = MujocoPlant(ROBOT, WORLD).mechanics.model
+    links = range(ROBOT.joint_count + 1)
+    assert [model.body(1 + k).name for k in links] == [f"link{k}" for k in links]
+    assert [model.joint(1 + k).name for k in links[:-1]] == [f"joint{k}" for k in links[:-1]]
+    assert tuple(model.body_parentid[1:] - 1) == ROBOT.link_parents
+    assert model.body_mass.sum() == pytest.approx(ROBOT.mass_kg)
+    assert model.body_mass[-1] == HIND.segment_mass_kg
+
+
+@pytest.mark.parametrize(("swing", "lift"), [(0.0, 0.0), (0.5, 0.0), (0.0, -0.6), (-0.4, 0.3)])
+def test_yaw_swings_forward_and_roll_lifts_on_both_sides(swing: float, lift: float) -> None:
+    joints = np.zeros(ROBOT.joint_count)
+    joints[SPINE::2], joints[SPINE + 1 :: 2] = swing, lift
+    wanted = [expected_m(pair, side, swing, lift) for pair in (0, 1) for side in (1.0, -1.0)]
+    np.testing.assert_allclose(feet_m(joints), wanted, atol=1e-9)
+
+
+def test_it_stands_still_on_four_feet_that_bear_all_of_it() -> None:
+    body = MujocoPlant(ROBOT, WORLD)
+    body.reset((0.2, -0.1), 0.7, STAND)
+    body.advance(1.0, drive())
+    start = body.link_positions_m
+    body.advance(3.0, drive())
+    moved = np.abs(body.link_positions_m - start).max()
+    assert moved < 1e-3  # a third of a millimetre a second: MuJoCo's cone creeps
+    load = body.mechanics.load_n
+    feet = body.mechanics.model.geom_bodyid[foot_geoms(body.mechanics.model, ROBOT)] - 1
+    assert load[feet].min() > 0.5
+    assert load[feet].sum() == pytest.approx(ROBOT.mass_kg * GRAVITY_M_S2, rel=1e-3)
+    # the moment about the front feet: what the hind feet bear lifts the rest
+    x = body.link_positions_m @ [np.cos(0.7), np.sin(0.7), 0.0]
+    mass = body.mechanics.model.body_mass[1:]
+    ground_x = body.mechanics.data.geom_xpos[foot_geoms(body.mechanics.model, ROBOT)] @ [
+        np.cos(0.7), np.sin(0.7), 0.0,
+    ]  # fmt: skip
+    lever = (mass @ x) * GRAVITY_M_S2
+    assert load[feet] @ ground_x == pytest.approx(lever, rel=2e-3)
+
+
+@pytest.mark.parametrize("direction_rad", [0.0, 0.8, 1.57])
+def test_feet_hold_up_to_their_friction_in_every_direction(direction_rad: float) -> None:
+    """A push of a share of mu m g: under 1 it creeps less than a millimetre a second."""
+    mu, weight_n = HIND.foot_friction, ROBOT.mass_kg * GRAVITY_M_S2
+    way = {}
+    for share in (0.6, 1.5):
+        body = MujocoPlant(ROBOT, WORLD)
+        body.reset((0.0, 0.0), 0.0, STAND)
+        servo = drive()
+        body.advance(0.5, servo)
+        push = share * mu * weight_n * ROBOT_SHARES  # on each link by its mass
+        body.mechanics.data.xfrc_applied[1:, 0] = push * np.cos(direction_rad)
+        body.mechanics.data.xfrc_applied[1:, 1] = push * np.sin(direction_rad)
+        body.advance(0.8, servo)  # the servos give way first
+        was = centre_m(body)
+        body.advance(1.1, servo)
+        way[share] = float(np.hypot(*(centre_m(body) - was)[:2]))
+    assert way[0.6] < 1e-3
+    assert way[1.5] > 0.05
+
+
+def centre_m(body: MujocoPlant) -> np.ndarray:
+    mass = body.mechanics.model.body_mass[1:]
+    return np.asarray(mass @ body.link_positions_m / mass.sum())
+
+
+ROBOT_SHARES = np.array(
+    [ROBOT.link_mass_kg] * ROBOT.link_count + [HIND.segment_mass_kg] * len(ROBOT.limb_joints)
+)
+ROBOT_SHARES = ROBOT_SHARES / ROBOT_SHARES.sum()
+
+
+def test_compiled_and_numpy_steps_agree_with_legs() -> None:
+    ends = []
+    for make in (MujocoPlant, numpy_plant):
+        body, servo = make(ROBOT, WORLD, None, 0.002), drive()
+        body.reset((0.0, 0.0), 0.3, STAND)
+        for k in range(60):
+            phase = 0.02 * k * 4.0
+            servo.goal_rad[:SPINE] = 0.3 * np.sin(phase - 0.7 * np.arange(SPINE))
+            servo.goal_rad[SPINE::2] = 0.4 * np.sin(phase + np.array([0.0, np.pi, np.pi, 0.0]))
+            servo.goal_rad[SPINE + 1 :: 2] = 0.4 * np.cos(phase)  # it falls on its belly
+            body.advance(0.02 * (k + 1), servo)
+        ends.append((body.qpos, body.friction_loss_j, body.mechanics.load_n.copy()))
+    np.testing.assert_allclose(ends[0][0], ends[1][0], atol=1e-9)
+    assert ends[0][1] == pytest.approx(ends[1][1], rel=1e-6)
+    assert ends[0][1] > 0.0  # bellies slid
+    np.testing.assert_allclose(ends[0][2], ends[1][2], atol=1e-6)
+
+
+def test_thrown_through_the_air_momentum_and_spin_stay() -> None:
+    """Links by their parents, not by their numbers: no force arises within the tree."""
+    body, servo = MujocoPlant(ROBOT, WORLD, None, 0.0005), drive()
+    body.mechanics.model.opt.gravity[:] = 0.0
+    body.mechanics.data.qpos[2] = 5.0
+    mujoco.mj_forward(body.mechanics.model, body.mechanics.data)
+    body.mechanics.start_at_rest()
+    for k in range(50):
+        servo.goal_rad[SPINE:] = 0.5 * np.sin(0.1 * k + np.arange(8))
+        body.advance(0.01 * (k + 1), servo)
+    assert np.abs(body.position_rad[SPINE:]).max() > 0.2
+    linear, spin = body.momentum
+    assert np.abs(linear).max() / ROBOT.mass_kg < 2e-3
+    assert np.abs(spin).max() < 2e-4
+
+
+def test_hills_and_water_are_refused_in_words() -> None:
+    for name in ("pool", "jacksboro-gentle"):
+        world = load_world(name)
+        with pytest.raises(InputError, match="salamander has legs"):
+            MujocoPlant(ROBOT, world, build_ground(world))
