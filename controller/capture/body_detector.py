@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Image
@@ -11,13 +12,22 @@ from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.background import (
     background_candidates,
     contrast_polarity,
+    median_background,
     smooth_background,
+    surrounding_ground,
 )
 from snakewalk.controller.capture.image.medial_axis import Skeleton, no_skeleton, skeleton_of_level
+from snakewalk.controller.capture.image.residual import check_residual
 from snakewalk.controller.capture.image.silhouette import Polarity, Silhouette, silhouette_of
 
 _LENGTH_TOLERANCE = 0.15  # of the length: frames that agree on the body's length
 _BETTER = 0.04  # of the frames: by how much more must agree to leave the median
+_FEWEST = 5  # frames from which a ground is learnt
+_CALM = 8  # frames whose median has little of their noise
+_CLEAR = 0.9  # share from which no other size of the surroundings is tried
+_SURE = 0.5  # share from which a ground's length of the body is believed
+_PARTS = (0.015, 0.04, 0.1)  # of the smaller side: half the side of the surroundings
+_WIDTHS = 1.5  # of the body: the same
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +46,13 @@ class BodyDetector:
     """Background and contrast of a scene; ``detect`` takes any frame, in any order."""
 
     background: Image | None
-    """(H, W[, 3]) the scene without the animal; None: a smooth surface is fitted to each frame."""
+    """(H, W[, 3]) the scene without the animal; None: the ground is found in each frame alone."""
     polarity: Polarity
     background_source: str
     """Where the background is from, in words."""
+    surroundings_px: int = 0
+    """Where there is no background: side of the square whose ground a place is compared with; 0: a
+    smooth surface is fitted to the frame."""
 
     def detect(self, image: Image) -> Detection:
         """Find the animal in one frame; a frame that cannot be used is not ``GOOD``.
@@ -50,7 +63,7 @@ class BodyDetector:
         """
         background = self.background
         if background is None:
-            background = smooth_background(image)
+            background = self._ground_of(image)
         elif background.shape != image.shape:
             raise InputError(
                 f"a frame is {_size(image)}, the background {_size(background)}: they must be alike"
@@ -59,15 +72,35 @@ class BodyDetector:
         if body.status is not FrameStatus.GOOD:
             return Detection(body, no_skeleton(body.status), background)
         skeleton = skeleton_of_level(body.level, body.threshold, body.origin_px, body.noise_level)
+        if skeleton.status is FrameStatus.GOOD:
+            ghosts = self.background is not None
+            status = check_residual(image, background, self.polarity, body, skeleton, ghosts=ghosts)
+            if status is not FrameStatus.GOOD:
+                skeleton = no_skeleton(status)
         return Detection(body, skeleton, background)
 
+    def _ground_of(self, image: Image) -> Image:
+        if self.surroundings_px:
+            return surrounding_ground(image, self.polarity, self.surroundings_px)
+        return smooth_background(image)
 
-def make_detector(frames: Sequence[Image], background: Image | None = None) -> BodyDetector:
+
+def make_detector(
+    frames: Sequence[Image], background: Image | None = None, *, cropped: bool = False
+) -> BodyDetector:
     """Learn a scene from a few frames spread over the recording.
 
-    Without a background the median of the frames is taken. Where the animal hardly moves, the
-    median shows the animal itself; then a brighter or darker quantile of each pixel's values, or a
-    smooth surface through each frame alone, is taken if more frames agree on the body's length.
+    Without a background the median of the frames is taken. Where the animal hardly moves, or the
+    camera goes with it, the median shows the animal itself; then another ground is taken if more
+    frames agree on the body's length and are explained by it: the median of frames in which the
+    animal is painted out, a brighter or darker quantile of each pixel's values, or what is found in
+    each frame alone, a smooth surface or the surroundings of each place.
+
+    Args:
+        frames: (H, W) or (H, W, 3), 8 bit.
+        background: the scene without the animal.
+        cropped: the camera moves, or the frames were cropped to the animal: the ground is found in
+            each frame alone.
 
     Raises:
         InputError: no frames, or the background is of another size.
@@ -82,9 +115,13 @@ def make_detector(frames: Sequence[Image], background: Image | None = None) -> B
     surface = BodyDetector(
         None, _usual_polarity(frames, None), "a smooth surface through each frame"
     )
-    if len({frame.shape for frame in frames}) > 1 or len(frames) < 5:
-        return surface
-    detectors = [
+    alone = [_Candidate.of(surface, frames)]
+    around = _with_surroundings(surface, alone[0], frames)
+    if around is not None:
+        alone.append(_Candidate.of(around, frames))
+    if cropped or len({frame.shape for frame in frames}) > 1 or len(frames) < _FEWEST:
+        return _best(alone)
+    median, *quantiles = [
         BodyDetector(
             candidate,
             _usual_polarity(frames, candidate) if polarity is None else polarity,
@@ -92,32 +129,110 @@ def make_detector(frames: Sequence[Image], background: Image | None = None) -> B
         )
         for candidate, polarity, source in background_candidates(frames)
     ]
-    detectors.append(surface)
-    scores = [_agreement(detector, frames) for detector in detectors]
+    fixed = [median, *quantiles]
+    painted = _painted_out(_best(alone), frames)
+    if painted is not None:
+        fixed.insert(1, painted)
+    return _best([*(_Candidate.of(detector, frames) for detector in fixed), *alone])
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """A detector, and how it does on some frames."""
+
+    detector: BodyDetector
+    share: float
+    """Of the frames: they show a whole body of the usual length, which explains the picture."""
+    length_px: float
+    """Usual length; 0 where there is none."""
+    width_px: float
+
+    @classmethod
+    def of(cls, detector: BodyDetector, frames: Sequence[Image]) -> "_Candidate":
+        bodies = [detector.detect(frame).skeleton for frame in frames]
+        length = np.array([one.length_px for one in bodies])
+        if not np.isfinite(length).any():
+            return cls(detector, 0.0, 0.0, 0.0)
+        usual = float(np.nanmedian(length))
+        share = float(np.mean(np.abs(length - usual) < _LENGTH_TOLERANCE * usual))
+        width = 2.0 * float(np.nanmedian([np.median(one.radius_px) for one in bodies]))
+        return cls(detector, share, usual, width)
+
+
+def _best(candidates: Sequence[_Candidate]) -> BodyDetector:
+    """The first with about the highest share; half of a body in all frames counts as half."""
+    sure = [one.length_px for one in candidates if one.share >= _SURE]
+    longest = max(sure, default=0.0)
+    scores = [
+        one.share * (min(1.0, one.length_px / longest) if longest else 1.0) for one in candidates
+    ]
     best = max(scores)
     return next(
-        detector
-        for detector, score in zip(detectors, scores, strict=True)
+        one.detector
+        for one, score in zip(candidates, scores, strict=True)
         if score >= best - _BETTER
     )
 
 
-def _agreement(detector: BodyDetector, frames: Sequence[Image]) -> float:
-    """Share of the frames that show a whole body of the usual length."""
-    length = np.array([detector.detect(frame).skeleton.length_px for frame in frames])
-    if not np.isfinite(length).any():
-        return 0.0
-    usual = np.nanmedian(length)
-    return float(np.mean(np.abs(length - usual) < _LENGTH_TOLERANCE * usual))
+def _with_surroundings(
+    surface: BodyDetector, seen: _Candidate, frames: Sequence[Image]
+) -> BodyDetector | None:
+    """The detector that compares each place with its surroundings; None without a polarity."""
+    if surface.polarity is Polarity.BOTH:
+        return None
+    side = min(frames[0].shape[:2])
+    tried = [2 * max(2, round(part * side)) + 1 for part in _PARTS]
+    if seen.width_px > 0.0:
+        tried.insert(0, 2 * max(2, round(_WIDTHS * seen.width_px)) + 1)
+    source = "the surroundings of each place in each frame"
+    found: list[_Candidate] = []
+    for size in tried:
+        detector = BodyDetector(None, surface.polarity, source, size)
+        found.append(_Candidate.of(detector, frames[:: max(1, len(frames) // 9)]))
+        if found[-1].share >= _CLEAR:
+            break
+    return _best(found)
+
+
+def _painted_out(detector: BodyDetector, frames: Sequence[Image]) -> BodyDetector | None:
+    """Median of the frames with the animal painted over; None where it is seldom found alone."""
+    out = []
+    for frame in frames:
+        detection = detector.detect(frame)
+        if detection.skeleton.status is not FrameStatus.GOOD:
+            continue
+        body = detection.silhouette
+        reach = 2 * round(0.5 * float(np.median(detection.skeleton.radius_px)) + 2.0) + 1
+        left, top = (int(v) for v in body.origin_px)
+        rows, columns = body.level.shape
+        cover = np.zeros(frame.shape[:2], dtype=np.uint8)
+        cover[top : top + rows, left : left + columns] = body.mask
+        cover = np.asarray(cv2.dilate(cover, np.ones((reach, reach), np.uint8)), dtype=np.uint8)
+        painted = frame.copy()
+        painted[cover > 0] = detection.background[cover > 0]
+        out.append(painted)
+    if len(out) < max(_CALM, len(frames) // 2):
+        return None
+    ground = median_background(out)
+    return BodyDetector(
+        ground, detector.polarity, "the median of frames, the animal painted out of each"
+    )
 
 
 def _usual_polarity(frames: Sequence[Image], background: Image | None) -> Polarity:
-    """The polarity of most frames."""
+    """The polarity of most frames.
+
+    Against a background that shows the animal a frame stands out both ways; then what each frame
+    shows alone decides.
+    """
     found = [
         contrast_polarity(frame, smooth_background(frame) if background is None else background)
         for frame in frames[:: max(1, len(frames) // 9)]
     ]
-    return max(Polarity, key=found.count)
+    usual = max(Polarity, key=found.count)
+    if background is not None and usual is Polarity.BOTH:
+        return _usual_polarity(frames, None)
+    return usual
 
 
 def _size(image: Image) -> str:

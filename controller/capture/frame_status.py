@@ -15,6 +15,8 @@ class FrameStatus(StrEnum):
     BRANCH = "touches itself: the medial axis branches"
     SHORT = "touches itself: much shorter or thicker than in the other frames"
     LARGER = "touches something: longer or larger than in the other frames"
+    PART = "a part is missing: something goes on beyond its end"
+    GHOST = "the background shows the animal"
     BLOB = "not a long body"
 
     @property

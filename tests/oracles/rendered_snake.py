@@ -5,15 +5,17 @@ blurred and made noisy as a camera would.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.controller.capture.resample import body_points, equal_arc_length
 
+_STAIN = 0.05  # of the picture's width: how soft a blot is
 _FINE = 8  # parts of a pixel's side in which bodies up to 100 px are drawn
 
 
@@ -46,6 +48,22 @@ class SnakeScene:
     texture: float = 0.0
     """Standard deviation of the pattern of the ground."""
     seed: int = 0
+    vignette: float = 0.0
+    """How much light the lens takes away in the corners."""
+    stains: float = 0.0
+    """Contrast of blots on the ground, grey values; wide and soft ones."""
+    jpeg: int = 0
+    """Quality of a JPEG that each frame went through; 0: none."""
+    follow: float = 0.0
+    """How far the camera goes with the animal: 1 keeps its middle in the middle of the picture."""
+    gain: float = 1.0
+    """Exposure: above 1 the ground saturates."""
+
+
+def camera_places(scene: SnakeScene, midlines: Floats) -> Floats:
+    """(T, 2) whole x, y of the picture's first pixel on the ground: the camera's motion."""
+    middle = midlines.mean(axis=1) - [(scene.columns - 1) / 2.0, (scene.rows - 1) / 2.0]
+    return np.asarray(np.rint(scene.follow * middle))
 
 
 def true_midlines(scene: SnakeScene) -> Floats:
@@ -64,6 +82,7 @@ def true_midlines(scene: SnakeScene) -> Floats:
     at = 0.5 * np.pi - turn * (time_s - 0.5 / pulse)
     centre = radius * np.stack([np.cos(at), np.sin(at)], axis=1)
     body = body + centre[:, None] + [(scene.columns - 1) / 2.0, (scene.rows - 1) / 2.0]
+    body = body - camera_places(scene, body)[:, None]
     return np.stack([equal_arc_length(one, 100) for one in body])
 
 
@@ -71,8 +90,11 @@ def film(scene: SnakeScene) -> Iterator[Image]:
     """The frames (H, W)."""
     rng = np.random.default_rng(scene.seed)
     ground = _ground(scene, rng)
-    for midline in true_midlines(scene):
-        yield _shot(scene, ground, _coverage(scene, midline), rng)
+    still = true_midlines(replace(scene, follow=0.0))
+    for midline, (x, y) in zip(
+        true_midlines(scene), camera_places(scene, still).astype(int), strict=True
+    ):
+        yield _shot(scene, np.roll(ground, (-y, -x), axis=(0, 1)), _coverage(scene, midline), rng)
 
 
 def empty(scene: SnakeScene) -> Image:
@@ -132,6 +154,10 @@ def _ground(scene: SnakeScene, rng: np.random.Generator) -> NDArray[np.float32]:
             cv2.GaussianBlur(rng.normal(size=ground.shape).astype(np.float32), (0, 0), 2.0)
         )
         ground += scene.texture * pattern / float(pattern.std())
+    if scene.stains > 0.0:
+        pattern = rng.normal(size=ground.shape).astype(np.float32)
+        soft = gaussian_filter(pattern, _STAIN * scene.columns, mode="wrap")
+        ground -= scene.stains * np.clip(soft / float(soft.std()) - 0.5, 0.0, 1.5)
     return ground
 
 
@@ -151,7 +177,16 @@ def _shot(
     if scene.light > 0.0:
         y, x = np.mgrid[0 : scene.rows, 0 : scene.columns]
         image = image * (1.0 + scene.light * (x / scene.columns + y / scene.rows - 1.0))
+    if scene.vignette > 0.0:
+        y, x = np.mgrid[0 : scene.rows, 0 : scene.columns]
+        away = np.hypot(2.0 * x / scene.columns - 1.0, 2.0 * y / scene.rows - 1.0) / np.sqrt(2.0)
+        image = image * (1.0 - scene.vignette * away**4)
+    image = scene.gain * image
     if scene.blur_px > 0.0:
         image = cv2.GaussianBlur(image.astype(np.float32), (0, 0), scene.blur_px)
     noisy = image + scene.noise * rng.standard_normal(image.shape, dtype=np.float32)
-    return np.asarray(np.clip(np.rint(noisy), 0, 255), dtype=np.uint8)
+    whole = np.asarray(np.clip(np.rint(noisy), 0, 255), dtype=np.uint8)
+    if not scene.jpeg:
+        return whole
+    packed = cv2.imencode(".jpg", whole, [cv2.IMWRITE_JPEG_QUALITY, scene.jpeg])[1]
+    return np.asarray(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)

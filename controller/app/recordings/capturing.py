@@ -82,7 +82,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         background = (
             None if options.background is None else _like(read_image(options.background), some[0])
         )
-        detector = make_detector(some, background)
+        detector = make_detector(some, background, cropped=options.cropped)
         m_per_px = None
         if options.marker is not None:
             ground = some[0] if detector.background is None else detector.background
@@ -121,6 +121,8 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
 
 
 def _check(options: CaptureOptions) -> None:
+    if options.cropped and options.background is not None:
+        raise InputError("--cropped and --background: a camera that moves has no one background")
     if options.length_m is not None and options.marker is not None:
         raise InputError("--length-m and --marker both give the scale: say one of them")
     if options.length_m is not None and not 0.0 < options.length_m < float("inf"):

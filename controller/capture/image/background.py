@@ -1,4 +1,4 @@
-"""The ground without the animal: the median of frames, or a smooth surface fitted to one frame."""
+"""The ground without the animal: from many frames, or from the surroundings in one frame."""
 
 from collections.abc import Iterator, Sequence
 
@@ -62,6 +62,19 @@ def smooth_background(image: Image) -> Image:
     surface = np.clip((terms @ fit).reshape(small.shape), 0.0, 255.0).astype(np.float32)
     whole = cv2.resize(surface, (columns, rows), interpolation=cv2.INTER_LINEAR)
     return np.asarray(np.rint(whole), dtype=np.uint8)
+
+
+def surrounding_ground(image: Image, polarity: Polarity, side_px: int) -> Image:
+    """(H, W[, 3]) the image without what is narrower than ``side_px``: a morphological closing.
+
+    Of dark things on lighter ground; an opening of light things on darker ground. Wide shades of
+    the ground, as those of a lens, of stains and of lamps, are kept.
+    """
+    kind = cv2.MORPH_OPEN if polarity is Polarity.LIGHT else cv2.MORPH_CLOSE
+    calm = cv2.medianBlur(image, 3)
+    box = np.ones((side_px, side_px), dtype=np.uint8)
+    closed = cv2.morphologyEx(calm, kind, box, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(cv2.blur(closed, (side_px, side_px)), dtype=np.uint8)
 
 
 def contrast_polarity(image: Image, background: Image) -> Polarity:

@@ -14,6 +14,8 @@ _MARGIN = 4
 _CLEAR = 6.0  # standard deviations of the noise by which an animal's pixel must stand out
 _LEAST_PX = 12
 _RIVAL = 0.4  # of the largest body's size: a second animal, not dirt
+_CANDIDATES = 4  # parts that may be the animal
+_SHARE = 0.4  # of the squares of a part's contrast: the contrast of the part
 _SHRUNK_PX = 400  # longest side of the picture on which the noise is measured
 
 
@@ -90,13 +92,44 @@ def silhouette_of(
     found = _parts((apart > clear).astype(np.uint8))
     if found is None:
         return _no_silhouette()
-    label, stats = found
-    best = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    left, top, wide, high, _ = (int(v) for v in stats[best])
-    inside = apart[top : top + high, left : left + wide]
-    own = inside[label[top : top + high, left : left + wide] == best]
-    threshold = max(middle + 0.5 * (float(np.percentile(own, 70)) - middle), middle + 3.0 * spread)
-    return _cut_out(apart, threshold, clear)
+    threshold = _threshold_of_body(apart, *found, middle, middle + 3.0 * spread)
+    return _cut_out(apart, threshold, clear, middle)
+
+
+def _threshold_of_body(
+    apart: Image,
+    label: NDArray[np.int32],
+    stats: NDArray[np.int32],
+    middle: float,
+    least: float,
+) -> float:
+    """Half of the contrast of the part with the most contrast in sum.
+
+    Stains of a JPEG and a soft shade of the ground may be larger than the animal, and joined to
+    it. So where a part is mostly fainter than half of its strong pixels, its contrast is a
+    percentile in which each pixel counts by the square of its own, and a part's sum is taken above
+    half of that.
+    """
+    strength = np.maximum(apart.astype(np.float32) - middle, 0.0)
+    inside = label > 0
+    squares = np.bincount(label[inside], weights=strength[inside] ** 2, minlength=len(stats))
+    best, most = least, -1.0
+    for part in np.argsort(squares)[: -_CANDIDATES - 1 : -1]:
+        if squares[part] <= 0.0:
+            break
+        left, top, wide, high, _ = (int(v) for v in stats[part])
+        window = (slice(top, top + high), slice(left, left + wide))
+        own = np.sort(strength[window][label[window] == part])
+        weight = np.cumsum(own**2)
+        level = float(own[np.searchsorted(weight, _SHARE * weight[-1])])
+        usual = float(np.percentile(own, 70))
+        if usual > 0.5 * level:
+            level = usual
+        threshold = max(middle + 0.5 * level, least)
+        mass = float(own[own > threshold - middle].sum())
+        if mass > most:
+            best, most = threshold, mass
+    return best
 
 
 def _no_silhouette() -> Silhouette:
@@ -121,18 +154,19 @@ def _parts(mask: Image) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
     return label, np.asarray(stats, dtype=np.int32)
 
 
-def _cut_out(apart: Image, threshold: float, noise_level: float) -> Silhouette:
-    """The largest body above the threshold, with a margin, and whether it is alone and whole."""
+def _cut_out(apart: Image, threshold: float, noise_level: float, middle: float) -> Silhouette:
+    """The body of most contrast above the threshold, with a margin; whether alone and whole."""
     found = _parts((apart > threshold).astype(np.uint8))
     if found is None:
         return _no_silhouette()
     label, stats = found
     areas = stats[1:, cv2.CC_STAT_AREA]
-    best = 1 + int(np.argmax(areas))
+    sums = np.bincount(label.ravel(), weights=(apart - np.float32(middle)).ravel())
+    best = 1 + int(np.argmax(sums[1:]))
     left, top, wide, high, area = (int(v) for v in stats[best])
     rows, columns = apart.shape
     status = FrameStatus.GOOD
-    distractors = float(np.sort(areas)[-2:-1].sum()) / area
+    distractors = float(np.delete(areas, best - 1).max(initial=0)) / area
     if distractors > _RIVAL:
         status = FrameStatus.SEVERAL
     elif left == 0 or top == 0 or left + wide == columns or top + high == rows:

@@ -28,6 +28,12 @@ class Crop:
     origin_px: tuple[int, int]
     """x, y of its first pixel."""
 
+    def shows(self, points_px: Floats) -> bool:
+        """Whether any of (P, 2) points lies in it."""
+        size = self.image.shape[1::-1]
+        inside = (points_px >= self.origin_px) & (points_px < np.add(self.origin_px, size))
+        return bool(inside.all(axis=1).any())
+
 
 def crop_body(image: Image, ground: Image, points_px: Floats) -> Crop:
     """Cut the body of (P, 2) points out."""

@@ -39,6 +39,7 @@ _SAMPLE_PX = 30000.0  # working pixels in all frames of the sample
 _FEWEST, _MOST = 8, 40
 _PASSES = 2
 _FORM = 0.004  # of the length: what the model of the tips may be wrong by
+_UNLIKE = 10.0  # times misfit and blur: error of what all frames share; measured on rendered films
 _SHARP = 62.0  # times the blur: a longer body's medial axis is as good
 _LONG, _WIDE = 50.0, 2.4  # times the blur: so is that of a wide body, by length and half width
 _BY_BLUR = 0.6  # of the blur of all of the body, what its edges show: ``edge_blur_px``
@@ -116,11 +117,12 @@ def fit_film(
     out = list(skeletons)
     expected = expected_px.copy()
     usual = float(np.median([fit.noise for fit in fits.values()]))
+    unlike_px = _UNLIKE * misfit(list(fits.values()), body) * float(np.exp(body.values[1]))
     for k, fit in fits.items():
         if fit.noise > _LOST * usual:
             out[k] = replace(out[k], status=FrameStatus.ROUGH) if k in good else out[k]
             continue
-        expected[k] = expected_error(fit, body) / space.scale
+        expected[k] = float(np.hypot(expected_error(fit, body), unlike_px)) / space.scale
         line = space.to_px(curve_of(fit.frame, float(body.values[0])) + views[k].first)
         out[k] = _skeleton(line, body, space, expected[k])
     rest = [
@@ -157,6 +159,24 @@ def expected_error(fit: Fit, body: FilmBody) -> float:
     square = np.einsum("kij,jl,kil->k", own, fit.inverse[:size, :size], own)
     square += np.einsum("kij,jl,kil->k", shared, body.covariance, shared)
     return float(np.sqrt(np.maximum(square, 0.0) + (_FORM * length) ** 2).mean())
+
+
+def misfit(fits: Sequence[Fit], body: FilmBody) -> float:
+    """How far the body's picture is from its model, of its contrast: median over the frames.
+
+    Noise is the same beside the body. What is stronger on the body and at its edge (a saturated
+    ground, the blocks of a JPEG, stains) shifts it alike in all frames, which no covariance shows.
+    """
+    ribbon = Ribbon(body.grid)
+    found = []
+    for fit in fits:
+        cover = ribbon.cover(fit.frame, body.values, fit.residual.shape)
+        near, beside = cover > _FREE, (cover < _FREE / 3.0) & (fit.residual != 0.0)
+        if near.any() and beside.any():
+            squares = fit.residual**2
+            more = float(squares[near].mean() - squares[beside].mean())
+            found.append(np.sqrt(max(more, 0.0)) / body.contrast)
+    return float(np.median(found)) if found else 0.0
 
 
 def _reverse_wrong_stretches(
@@ -199,6 +219,8 @@ def _recover_lost(
                 continue
             near = fits[k + step].frame
             line = curve_of(near, float(body.values[0]), SEGMENTS) + views[k + step].first
+            if not crops[k].shows(space.to_px(line)):
+                continue
             view = View.of(crops[k], space.to_px(line), radius, space)
             first = near.copy()
             first[:2] += np.subtract(views[k + step].first, view.first)
