@@ -255,7 +255,13 @@ def _holders(device: str) -> list[str]:
     for process in sorted(filter(str.isdigit, os.listdir("/proc")), key=int):
         with suppress(OSError):  # another user's, or ended just now
             descriptors = os.listdir(f"/proc/{process}/fd")
-            if any(os.readlink(f"/proc/{process}/fd/{each}") == path for each in descriptors):
+            if any(_leads_to(f"/proc/{process}/fd/{each}", path) for each in descriptors):
                 with open(f"/proc/{process}/comm", encoding="utf-8", errors="replace") as file:
                     found.append(f"{file.read().strip()} (process {process})")
     return found
+
+
+def _leads_to(link: str, path: str) -> bool:
+    with suppress(OSError):  # closed just now, as the one of the listing itself is
+        return os.readlink(link) == path
+    return False
