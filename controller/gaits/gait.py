@@ -25,6 +25,8 @@ class Needs:
 
     yaw: bool = False
     pitch: bool = False
+    legs: bool = False
+    """Whether two pairs of legs take part."""
     wheels: bool = False
     """Whether it advances only on a belly that slides along easily and across badly."""
 
@@ -44,6 +46,11 @@ class Needs:
                     f"{what} needs {axis} joints; robot {robot.name} has none "
                     f"(joint_axes {robot.joint_axes})"
                 )
+        if self.legs and len(robot.limbs) != 2:
+            raise InputError(
+                f"{what} needs two pairs of legs; robot {robot.name} has {len(robot.limbs)} "
+                "(tables [[limbs]])"
+            )
 
 
 Frequency = Annotated[float, Field(ge=0.0, le=2.0, description="cycles a second")]

@@ -18,6 +18,7 @@ from snakewalk.controller.gaits.spine import (
     Subcarangiform,
     Thunniform,
 )
+from snakewalk.controller.gaits.trot import LateralWalk, Trot
 from snakewalk.controller.gaits.turn_in_place import TurnInPlace
 
 GAITS: dict[str, type[Gait]] = {
@@ -37,6 +38,8 @@ GAITS: dict[str, type[Gait]] = {
         Carangiform,
         Thunniform,
         Dolphin,
+        Trot,
+        LateralWalk,
     )
 }
 

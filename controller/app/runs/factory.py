@@ -151,7 +151,9 @@ def prepare_gait(
     changes = [(at_s, _gait_by_name(other, values)[0]) for at_s, other, values in then]
     gaits = [gait, *(other for _, other in changes)]
     pitch = any(each.needs.pitch for each in gaits)
-    body = load_robot(robot or ("alternating16" if pitch else "yaw16"))
+    legs = any(each.needs.legs for each in gaits)
+    own = "salamander" if legs else "alternating16" if pitch else "yaw16"
+    body = load_robot(robot or own)
     for each in gaits:
         each.check(body)
     run = checked(

@@ -17,7 +17,7 @@ from snakewalk.controller.motion.gait_cycle import GaitCycle
 
 Floats = NDArray[np.float64]
 ROBOT = load_robot("alternating16")
-NAMES = tuple(GAITS)
+NAMES = tuple(name for name, gait in GAITS.items() if not gait.needs.legs)
 DT_S = 0.02
 PHASES = np.linspace(0.0, 2.0 * np.pi, 721)
 CHANGES = tuple(itertools.pairwise((*NAMES, NAMES[0], NAMES[5], NAMES[7], NAMES[3], NAMES[0])))

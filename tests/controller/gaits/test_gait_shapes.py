@@ -11,13 +11,17 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 
-ROBOTS = {name: load_robot(name) for name in ("yaw16", "alternating16", "alternating32")}
+ROBOTS = {
+    name: load_robot(name) for name in ("yaw16", "alternating16", "alternating32", "salamander")
+}
 PHASES = np.linspace(0.0, 2.0 * np.pi, 50)
 
 
 def suits(gait: type[Gait], robot: RobotConfig) -> bool:
     return not (
-        (gait.needs.pitch and not robot.pitch_joints) or (gait.needs.yaw and not robot.yaw_joints)
+        (gait.needs.pitch and not robot.pitch_joints)
+        or (gait.needs.yaw and not robot.yaw_joints)
+        or gait.needs.legs != bool(robot.limbs)
     )
 
 

@@ -18,7 +18,7 @@ from snakewalk.controller.gaits.registry import GAITS
 @pytest.mark.parametrize("name", list(GAITS))
 def test_points_are_in_range_and_within_the_joints(name: str) -> None:
     gait = GAITS[name]
-    robot = load_robot("alternating16")
+    robot = load_robot("salamander" if gait.needs.legs else "alternating16")
     points, _ = points_of(gait, robot, 30, seed=3, seconds=10.0)
     assert len(points) == 30
     assert points[0].parameters == {}

@@ -1,0 +1,114 @@
+"""Trot and walk of a sprawling body: legs by phase, and a spine that bends at the girdles.
+
+The lizard of [KP] 4.2.2 has a body that may bend where the pairs of legs are, and legs whose angles
+to the body over one cycle say everything. Here the angles are computed: on the ground a foot goes
+back at an even rate, in the air it goes forward again; the girdles turn with the legs, the front
+one against the hind one (a standing wave between them), which makes the strides longer, while head
+and tail keep their heading. Correction of the cyclic legs of [GC] 2.2.2, Eq. 9-10: there both feet
+take their height from one ``T_y``; here each foot has a phase of its own in height and way.
+"""
+
+from abc import ABC
+from typing import ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Frequency, Gait, GaitParameters, Needs
+from snakewalk.controller.gaits.wave import TURN
+from snakewalk.controller.kinematics import smoothstep
+
+
+class LegParameters(GaitParameters):
+    """Strides, stance and bends."""
+
+    frequency_hz: Frequency = 0.25
+    stride_rad: float = Field(0.5, ge=0.0, le=1.1, description="of a leg to either side: swing")
+    stance_rad: float = Field(0.6, ge=0.0, le=1.2, description="roll of a leg down to the ground")
+    lift_rad: float = Field(0.35, ge=0.0, le=1.2, description="how far a leg rises in the air")
+    bend_rad: float = Field(0.5, ge=0.0, le=1.5, description="front girdle against hind girdle")
+    turn_rad: float = Field(
+        0.0, ge=-1.0, le=1.0, description="bend of the trunk; positive turns left"
+    )
+
+
+class LegGait(Gait, ABC):
+    """Legs of two pairs by phase; a subclass says in what order they step."""
+
+    duty: ClassVar[float]
+    """Share of a cycle that a foot is on the ground."""
+    offsets: ClassVar[tuple[float, float, float, float]]
+    """In cycles, when a foot comes down: hind left, hind right, front left, front right."""
+    needs = Needs(yaw=True, legs=True)
+    model = LegParameters
+
+    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+        joints = np.zeros((len(phase_rad), robot.joint_count))
+        self._bend(robot, phase_rad, joints)
+        p = self.params
+        first = robot.link_count - 1
+        for k, joint in enumerate(robot.limb_joints):
+            left = (joint.side == "left") != p.mirror
+            at = (phase_rad / TURN - self.offsets[2 * joint.pair + (0 if left else 1)]) % 1.0
+            axis = robot.limbs[joint.pair].joint_axes[joint.place]
+            if axis == "y":
+                shorter = max(p.turn_rad if left else -p.turn_rad, 0.0)
+                joints[:, first + k] = (1.0 - shorter) * p.stride_rad * self._swing(at)
+            elif joint.place == _first_roll(robot.limbs[joint.pair].joint_axes):
+                joints[:, first + k] = -p.stance_rad + p.lift_rad * self._lift(at)
+        return joints
+
+    def _swing(self, at: Floats) -> Floats:
+        """1 where a foot comes down, evenly to -1 where it leaves, and smoothly back."""
+        back = 1.0 - 2.0 * at / self.duty
+        air = np.clip((at - self.duty) / (1.0 - self.duty), 0.0, 1.0)
+        return np.where(at < self.duty, back, 2.0 * smoothstep.cubic(air) - 1.0)
+
+    def _lift(self, at: Floats) -> Floats:
+        """0 on the ground, to 1 in the middle of the air."""
+        air = np.clip((at - self.duty) / (1.0 - self.duty), 0.0, 1.0)
+        return np.sin(0.5 * TURN * air) ** 2
+
+    def _bend(self, robot: RobotConfig, phase_rad: Floats, joints: Floats) -> None:
+        """Turn the girdles: each is turned furthest when its legs are.
+
+        The left front leg is foremost at phase 0 of its offset: the front girdle is then turned to
+        the right by half of the bend, the hind one to the left.
+        """
+        p, hind, front = self.params, robot.limbs[0].link, robot.limbs[-1].link
+        turned = 0.5 * p.bend_rad * np.cos(phase_rad - TURN * self.offsets[2])
+        trunk = np.arange(front, hind)
+        joints[:, trunk] = (p.turn_rad - 2.0 * turned[:, None]) / max(len(trunk), 1)
+        if front > 0:
+            joints[:, front - 1] += turned
+        if hind < robot.link_count - 1:
+            joints[:, hind] += turned
+
+
+def _first_roll(joint_axes: str) -> int:
+    return joint_axes.find("r")
+
+
+class Trot(LegGait):
+    """Legs that stand across from each other step together."""
+
+    name = "trot"
+    title = "two legs across from each other step together, the spine bends between the girdles"
+    source = (
+        "N. Komodakis et al., 2005, 4.2.2: the lizard; A. J. Ijspeert et al., Science 315, 2007: "
+        "the salamander's trot with a standing wave"
+    )
+    duty = 0.5
+    offsets = (0.5, 0.0, 0.0, 0.5)
+
+
+class LateralWalk(LegGait):
+    """One leg after the other, hind before front on each side: three feet are on the ground."""
+
+    name = "lateral-walk"
+    title = "one leg after the other, three on the ground"
+    source = "M. Hildebrand, The quadrupedal gaits of vertebrates, BioScience 39, 1989"
+    duty = 0.75
+    offsets = (0.75, 0.25, 0.0, 0.5)
