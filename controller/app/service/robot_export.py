@@ -2,6 +2,7 @@
 
 from xml.etree import ElementTree as ET
 
+from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 
@@ -11,7 +12,13 @@ def urdf_text(robot: RobotConfig) -> str:
 
     Joint j turns what is behind it, so the axis of a yaw joint points down: a positive angle bends
     the head side to the left. Inertia is a solid cylinder's.
+
+    Raises:
+        InputError: the robot has legs.
+
     """
+    if robot.limbs:
+        raise InputError(f"{robot.name}: has legs; a URDF is written of a chain only: give --mjcf")
     length, radius, mass = robot.link_length_m, robot.body_radius_m, robot.link_mass_kg
     across = mass * (3.0 * radius**2 + length**2) / 12.0
     root = ET.Element("robot", name=robot.name)

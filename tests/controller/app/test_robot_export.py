@@ -17,6 +17,7 @@ from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.drivers.types import BodyPose
 
 ROBOTS = [load_robot(name) for name in shipped("robots")]
+CHAINS = [robot for robot in ROBOTS if not robot.limbs]
 
 
 def poses(robot: RobotConfig) -> np.ndarray:
@@ -28,7 +29,7 @@ def limits(model: mujoco.MjModel) -> np.ndarray:
     return model.jnt_range[model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE]
 
 
-@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+@pytest.mark.parametrize("robot", CHAINS, ids=lambda robot: robot.name)
 def test_links_of_the_urdf_are_where_ours_are(robot: RobotConfig) -> None:
     model = mujoco.MjModel.from_xml_string(urdf_text(robot))
     data = mujoco.MjData(model)
@@ -50,16 +51,23 @@ def test_links_of_the_urdf_are_where_ours_are(robot: RobotConfig) -> None:
 def test_links_of_the_mjcf_are_where_ours_are(robot: RobotConfig) -> None:
     model = mujoco.MjModel.from_xml_string(mjcf_text(robot))
     data = mujoco.MjData(model)
-    assert abs(model.body_mass.sum() - robot.link_mass_kg * (robot.joint_count + 1)) < 1e-9
+    legs = sum(2 * len(pair.joint_axes) * pair.segment_mass_kg for pair in robot.limbs)
+    assert abs(model.body_mass.sum() - robot.link_mass_kg * robot.link_count - legs) < 1e-9
     turned = np.array([0.3, -0.5, 0.6, 0.2])
     for joint_rad in poses(robot):
         data.qpos[:3], data.qpos[3:7] = (0.4, -1.0, 0.2), turned / np.linalg.norm(turned)
         data.qpos[7:] = joint_rad
         mujoco.mj_kinematics(model, data)
-        axes = data.xmat[1:].reshape(-1, 3, 3)
+        spine = slice(1, 1 + robot.link_count)  # legs are bodies behind it
+        axes = data.xmat[spine].reshape(-1, 3, 3)
         ours = body_in_world(robot, BodyPose(0.0, data.qpos[:3].copy(), axes[0].copy()), joint_rad)
-        assert np.abs(data.xipos[1:] - ours.link_m).max() < 1e-9
+        assert np.abs(data.xipos[spine] - ours.link_m).max() < 1e-9
         assert np.abs(axes - ours.rotation).max() < 1e-9
+
+
+def test_a_urdf_of_a_body_with_legs_is_refused_not_written_without_them() -> None:
+    with pytest.raises(InputError, match=r"salamander: has legs.*--mjcf"):
+        urdf_text(load_robot("salamander"))
 
 
 def test_the_head_of_the_urdf_weighs_what_it_does() -> None:
