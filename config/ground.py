@@ -3,14 +3,14 @@
 import math
 from importlib.util import find_spec
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import gaussian_filter
 
+from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Floats
-from snakewalk.config.errors import ConfigError
+from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import (
     ElevationGround,
@@ -131,13 +131,15 @@ def _elevation_m(world: str, source: str) -> Floats:
     where = f"world {world}: ground: source {source}"
     path = _jacksboro(where) if source == "jacksboro" else Path(source)
     try:
-        with np.load(path) as data:
-            elevation = np.asarray(data["elevation"], dtype=float)
+        held, _ = read_arrays(path, {"elevation"})
+        elevation = np.asarray(held["elevation"], dtype=float)
+    except InputError as error:
+        raise ConfigError(f"{where}: {error}") from None
     except OSError as error:
         raise ConfigError(f"{where}: {path}: {error.strerror or error}") from None
     except KeyError:
         raise ConfigError(f"{where}: {path}: holds no array named 'elevation'") from None
-    except (ValueError, TypeError, AttributeError, EOFError, BadZipFile):
+    except (ValueError, TypeError):
         raise ConfigError(
             f"{where}: {path}: is not an .npz with an array 'elevation' of numbers"
         ) from None

@@ -8,6 +8,9 @@ from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.resample import equal_arc_length, tangent_angles
 
+MOST_FRAMES = 500_000
+"""Frames of a track, gaps included (ours): 4.6 hours at 30 Hz."""
+
 
 @dataclass(frozen=True, slots=True)
 class Track:
@@ -83,8 +86,13 @@ def track_from_points(
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
         raise InputError(f"{name}: the frame rate must be above 0 Hz, not {rate_hz}")
     number = np.arange(len(points)) if frame is None else frame
-    if np.any(np.diff(number) <= 0):
+    if np.any(number[1:] <= number[:-1]):
         raise InputError(f"{name}: frame numbers must increase, one row of points for each frame")
+    span = int(number[-1]) - int(number[0]) + 1 if len(number) else 0
+    if span > MOST_FRAMES:
+        raise InputError(
+            f"{name}: its frames span {span}; a track has at most {MOST_FRAMES}: give a part of it"
+        )
     whole = np.asarray(np.isfinite(points).all(axis=(1, 2)))
     whole[whole] = [_distinct(body) for body in points[whole]]
     if int(whole.sum()) < 2:
@@ -104,6 +112,22 @@ def track_from_points(
         source=source,
         licence=licence,
     )
+
+
+def frame_numbers(name: str, values: Floats) -> Ints:
+    """Frame numbers as integers.
+
+    Raises:
+        InputError: some are not whole, or too large to count frames.
+
+    """
+    odd = ~((np.rint(values) == values) & (np.abs(values) < 2.0**53))
+    if odd.any():
+        raise InputError(
+            f"{name}: {int(odd.sum())} of {len(values)} frame numbers are no whole numbers, such "
+            f"as {values[odd][0]:g}"
+        )
+    return values.astype(np.int64)
 
 
 def _distinct(body: Floats) -> bool:

@@ -1,12 +1,12 @@
 """The actions of one robot on one ground, and their file."""
 
 import json
-import zipfile
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
+from snakewalk.config.archive import read_arrays
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.repertoire.segment import Segment
@@ -87,16 +87,16 @@ def load_repertoire(path: Path) -> Repertoire:
             f"{path}: no such file; make one by: snakewalk repertoire record -o {path}"
         )
     try:
-        with np.load(path, allow_pickle=False) as file:
-            about = json.loads(str(file["about"]))
-            if about.get("format") != FORMAT:
-                raise InputError(f"{path}: format {about.get('format')}; expected {FORMAT}")
-            about = {key: about[key] for key in (*_HEAD, "segments")}
-            segments = tuple(
-                Segment(**plain, **{name: file[f"{k}/{name}"] for name in _ARRAYS})
-                for k, plain in enumerate(about["segments"])
-            )
-    except (KeyError, TypeError, AttributeError, ValueError, EOFError, zipfile.BadZipFile):
+        held, _ = read_arrays(path)
+        about = json.loads(str(held["about"]))
+        if about.get("format") != FORMAT:
+            raise InputError(f"{path}: format {about.get('format')}; expected {FORMAT}")
+        about = {key: about[key] for key in (*_HEAD, "segments")}
+        segments = tuple(
+            Segment(**plain, **{name: held[f"{k}/{name}"] for name in _ARRAYS})
+            for k, plain in enumerate(about["segments"])
+        )
+    except (KeyError, TypeError, AttributeError, ValueError):
         raise InputError(
             f"{path}: not a repertoire; snakewalk repertoire record makes one"
         ) from None

@@ -3,16 +3,19 @@
 import json
 import struct
 from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
 
 from mcap.exceptions import McapError
-from mcap.records import Channel, Message
-from mcap.stream_reader import StreamReader
+from mcap.records import Channel, Chunk, McapRecord, Message
+from mcap.stream_reader import StreamReader, breakup_chunk
 from pydantic import ValidationError
-from zstandard import ZstdError
+from zstandard import ZstdError, decompress, frame_content_size
 
+from snakewalk.config.archive import check_expansion
 from snakewalk.config.errors import InputError
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.schema import FORMAT
@@ -22,7 +25,11 @@ from snakewalk.controller.runlog.writer import part_path
 _MAGIC: Final = bytes([137, 77, 67, 65, 80, 48, 13, 10])
 _HEAD: Final = struct.Struct("<BQ")  # opcode and length before every record
 _FOOTER: Final = 2
-_BROKEN = (McapError, ZstdError, ValueError, struct.error)
+_CHUNK: Final = 6
+_CHUNK_HEAD: Final = struct.Struct("<16xQ4xI")  # two times, bytes unpacked, CRC, length of a name
+_CHUNK_LENGTH: Final = 8  # after the packing's name, before the packed bytes
+_ZSTD_HEAD: Final = 18  # at most
+_BROKEN = (McapError, ZstdError, ValueError, KeyError, RecursionError, struct.error)
 Rows = dict[str, list[dict[str, Any]]]
 
 
@@ -35,19 +42,23 @@ def read_log(path: Path) -> RunRecord:
 
     Raises:
         LogError: there is no such file, it is no log of ours, or not even its start is left.
+        InputError: it would expand too far (``archive.check_expansion``).
 
     """
     if path.is_dir():
         raise LogError(f"{path}: is a folder; a run's log is {path / 'log.mcap'}")
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read(len(_MAGIC))
+            if data == _MAGIC:  # a device that has no end is no log
+                data += file.read()
     except OSError as error:
         part = part_path(path)
         hint = f"; a run that was killed left {part}" if part.is_file() else ""
         raise LogError(f"{path}: {error.strerror or error}{hint}") from None
     if not data.startswith(_MAGIC[: len(data)]) or not data:
         raise LogError(f"{path}: is not an MCAP log")
-    rows, last_s, complete = _rows(data)
+    rows, last_s, complete = _rows(path, data)
     if not rows["/config"]:
         raise LogError(f"{path}: breaks off before it says what ran: nothing can be recovered")
     config = rows["/config"][0]
@@ -56,35 +67,74 @@ def read_log(path: Path) -> RunRecord:
     note = "" if complete else f"the log is cut or damaged; its last row is of {last_s:.2f} s"
     try:
         return record_of(rows, complete=complete, note=note)
-    except (KeyError, ValidationError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, ValidationError) as error:
         raise LogError(f"{path}: is not a log of this version: {error}") from None
 
 
-def _rows(data: bytes) -> tuple[Rows, float, bool]:
+def _rows(path: Path, data: bytes) -> tuple[Rows, float, bool]:
     """Rows by topic, time of the last one, and whether the file is whole."""
-    end, complete = _whole_records(data)
+    end, complete, unpacked = _whole_records(data)
+    check_expansion(path, len(data), unpacked, text=True)
     rows: Rows = defaultdict(list)
     topics: dict[int, str] = {}
     last_ns = 0
     try:
-        for record in StreamReader(BytesIO(data[:end]), validate_crcs=True).records:
+        for record in _records(path, data[:end]):
             if isinstance(record, Channel):
                 topics[record.id] = record.topic
             elif isinstance(record, Message):
-                rows[topics[record.channel_id]].append(json.loads(record.data))
+                row = json.loads(record.data)
+                if not isinstance(row, dict):
+                    raise ValueError("a row is a JSON object")
+                rows[topics[record.channel_id]].append(row)
                 last_ns = max(last_ns, record.log_time)
     except _BROKEN:
         complete = False  # the end of a cut file comes as an error too; damage fails a CRC
     return rows, last_ns * 1e-9, complete
 
 
-def _whole_records(data: bytes) -> tuple[int, bool]:
-    """Bytes up to the end of the last record that is all there, and whether that is the footer."""
-    at, opcode = len(_MAGIC), 0
+def _records(path: Path, data: bytes) -> Iterator[McapRecord]:
+    """Records of a log, also those in chunks; no chunk is unpacked to more than it says."""
+    for record in StreamReader(BytesIO(data), emit_chunks=True, validate_crcs=True).records:
+        if not isinstance(record, Chunk):
+            yield record
+            continue
+        if record.compression not in ("zstd", ""):
+            raise LogError(f"{path}: is packed with {record.compression!r}; a log is with zstd")
+        yield from breakup_chunk(_unpacked(record), validate_crc=True)
+
+
+def _unpacked(chunk: Chunk) -> Chunk:
+    """Unpack a chunk to as many bytes as it says, and its frame says, too, if it says any."""
+    if not chunk.compression:
+        return chunk
+    if frame_content_size(chunk.data) not in (-1, chunk.uncompressed_size):
+        raise ValueError("a chunk and its frame differ in size")
+    data = decompress(chunk.data, max_output_size=chunk.uncompressed_size)
+    return replace(chunk, compression="", data=data)
+
+
+def _said_bytes(chunk: bytes) -> int:
+    """Bytes that a chunk says it takes unpacked; the lesser, where its frame says otherwise."""
+    said, name_length = _CHUNK_HEAD.unpack_from(chunk)
+    frame = _CHUNK_HEAD.size + name_length + _CHUNK_LENGTH
+    try:
+        framed = frame_content_size(chunk[frame : frame + _ZSTD_HEAD])
+    except ZstdError:
+        framed = -1
+    return int(said if framed < 0 else min(said, framed))
+
+
+def _whole_records(data: bytes) -> tuple[int, bool, int]:
+    """Bytes of whole records, whether the footer ends them, and their bytes unpacked, as told."""
+    at, opcode, unpacked = len(_MAGIC), 0, 0
     while at + _HEAD.size <= len(data) and opcode != _FOOTER:
         opcode, length = _HEAD.unpack_from(data, at)
         if at + _HEAD.size + length > len(data):
-            return at, False
+            return at, False, unpacked
+        chunk = opcode == _CHUNK and length >= _CHUNK_HEAD.size
+        start = at + _HEAD.size
+        unpacked += _said_bytes(data[start : start + length]) if chunk else length
         at += _HEAD.size + length
     complete = opcode == _FOOTER and data[at:] == _MAGIC
-    return at + (len(_MAGIC) if complete else 0), complete
+    return at + (len(_MAGIC) if complete else 0), complete, unpacked

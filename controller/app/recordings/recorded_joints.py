@@ -1,11 +1,11 @@
 """Joint angles over time of a recording, for one robot."""
 
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
@@ -46,13 +46,15 @@ def _stored_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | No
     if Path(track).suffix != ".npz" or not Path(track).is_file():
         return None
     try:
-        with np.load(track, allow_pickle=False) as data:
-            if "joints_rad" not in data or "rate_hz" not in data or "robot" not in data:
-                return None
-            joints = np.asarray(data["joints_rad"], dtype=float)
-            rate_hz, name = float(data["rate_hz"]), str(data["robot"])
-    except (BadZipFile, ValueError, OSError):
+        held, _ = read_arrays(Path(track), {"joints_rad", "rate_hz", "robot"})
+        if len(held) < 3:
+            return None
+        joints = np.asarray(held["joints_rad"], dtype=float)
+        rate_hz, name = float(held["rate_hz"]), str(held["robot"])
+    except (TypeError, ValueError, OSError):
         return None  # load_track raises with the reason
     if name != robot.name or joints.ndim != 2 or len(joints) < 2:
         return None
+    if not (np.isfinite(joints).all() and 0.0 < rate_hz < np.inf):
+        raise InputError(f"{track}: joints_rad and rate_hz must be finite, and the rate above 0 Hz")
     return np.arange(len(joints)) / rate_hz, joints

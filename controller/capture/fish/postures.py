@@ -1,11 +1,11 @@
 """Postures of a fish over time: what matching finds and what segments are cut from."""
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.fish.model import turn_shares
@@ -153,13 +153,12 @@ def load_postures(path: Path) -> Postures:
 
     """
     try:
-        with np.load(path, allow_pickle=False) as data:
-            held = {name: np.asarray(data[name]) for name in data.files}
+        held, _ = read_arrays(path)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; snakewalk fish match writes one") from None
     except IsADirectoryError:
         raise InputError(f"{path}: is a folder; postures are an .npz") from None
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile):
+    except (ValueError, OSError):
         raise InputError(
             f"{path}: holds no postures; snakewalk fish match writes them, as .npz"
         ) from None

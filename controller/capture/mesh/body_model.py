@@ -4,12 +4,12 @@ Its half width is the distance from the skeleton to the silhouette's boundary in
 half height follows from a constant ratio, or is measured the same way in a view from the side.
 """
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.resample import SEGMENTS, equal_arc_length
@@ -80,11 +80,10 @@ def read_silhouettes(file: Path) -> Silhouettes:
 
     """
     try:
-        with np.load(file, allow_pickle=False) as data:
-            held = {name: np.asarray(data[name]) for name in data.files}
+        held, _ = read_arrays(file)
     except FileNotFoundError:
         raise InputError(f"{file}: no such file") from None
-    except (ValueError, OSError, EOFError, AttributeError, zipfile.BadZipFile):
+    except (ValueError, OSError):
         raise InputError(f"{file}: a body is made of an .npz with skeletons and widths") from None
     if "width" in held and held["width"].dtype.kind == "f":
         held.setdefault("radius_px", 0.5 * held["width"])

@@ -1,6 +1,8 @@
 """A mesh as files: Wavefront OBJ with its material and texture beside it, or one binary glTF."""
 
 import io
+import json
+import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -9,12 +11,18 @@ import numpy as np
 import trimesh
 from PIL import Image as Pillow
 
+from snakewalk.config.archive import check_expansion
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.mesh.mesh import Mesh
 
 SKIN_RGB = (0.66, 0.48, 0.20)
 """Of a body without a picture."""
+MOST_PIXELS: Final = 8192**2
+"""Of a mesh's pictures (ours)."""
+_ITEM_BYTES: Final = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+_WIDTH: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+"""glTF's kinds of numbers (bytes) and of items (numbers)."""
 MESH_ENDINGS: Final = (".obj", ".glb")
 _AXES: Final = {f"{sign}{axis}": (k, factor)
                 for sign, factor in (("", 1.0), ("+", 1.0), ("-", -1.0))
@@ -51,8 +59,13 @@ def read_mesh(file: Path, forward: str | None = None, up: str | None = None) -> 
     if not file.is_file():
         raise InputError(f"{file}: no such file")
     try:
+        size = file.stat().st_size
+        check_expansion(file, size, _unpacked_glb(file) if file.suffix.lower() == ".glb" else size)
         scene: Any = trimesh.load_scene(file)
+        _check_pictures(file, scene)
         solid: Any = scene.to_mesh()
+    except InputError:
+        raise
     except Exception as error:  # trimesh raises whatever its parsers meet
         raise InputError(f"{file}: cannot be read as a mesh: {error}") from None
     if len(solid.faces) == 0 or not np.isfinite(solid.vertices).all():
@@ -66,7 +79,8 @@ def read_mesh(file: Path, forward: str | None = None, up: str | None = None) -> 
     if not np.isclose(x @ z, 0.0):
         raise InputError(f"{file}: --forward {ahead} and --up {above} are one axis")
     turned = np.stack([x, np.cross(z, x), z])
-    texture = _picture_of(solid.visual)
+    picture = _picture_of(solid.visual)
+    texture = None if picture is None else np.asarray(picture.convert("RGB"))
     uv = getattr(solid.visual, "uv", None)
     vertices = np.asarray(solid.vertices, dtype=float) @ turned.T
     normals = np.asarray(solid.vertex_normals, dtype=float) @ turned.T
@@ -82,6 +96,43 @@ def read_mesh(file: Path, forward: str | None = None, up: str | None = None) -> 
     return GivenMesh(mesh, joined, texture if uv is not None else None, ahead, above)
 
 
+def _unpacked_glb(file: Path) -> int:
+    """Bytes of numbers that a binary glTF says its meshes have, once for each node that shows one.
+
+    Views may overlap, accessors without a view are zeros, and many nodes may show one mesh.
+    """
+    with file.open("rb") as stream:
+        _, _, _, length, _ = struct.unpack("<5I", stream.read(20))
+        said = json.loads(stream.read(length))
+    views = [abs(int(view["byteLength"])) for view in said.get("bufferViews", [])]
+    accessors = [
+        abs(int(a["count"])) * _WIDTH[a["type"]] * _ITEM_BYTES[a["componentType"]]
+        for a in said.get("accessors", [])
+    ]
+    meshes = [
+        sum(
+            accessors[index]
+            for primitive in mesh["primitives"]
+            for index in (*primitive["attributes"].values(), primitive.get("indices"))
+            if index is not None
+        )
+        for mesh in said.get("meshes", [])
+    ]
+    shown = [meshes[node["mesh"]] for node in said.get("nodes", []) if "mesh" in node]
+    return int(sum(views) + sum(accessors) + sum(meshes) + sum(shown))
+
+
+def _check_pictures(file: Path, scene: Any) -> None:
+    """Check how large a mesh's pictures are, before any is unpacked."""
+    found = {id(p): p for g in scene.geometry.values() if (p := _picture_of(g.visual)) is not None}
+    pixels = sum(picture.width * picture.height for picture in found.values())
+    if pixels > MOST_PIXELS:
+        raise InputError(
+            f"{file}: its pictures have {pixels / 1e6:.0f} million pixels; at most "
+            f"{MOST_PIXELS / 1e6:.0f} million are read"
+        )
+
+
 def _axis(name: str, option: str) -> Any:
     if name not in _AXES:
         raise InputError(f"--{option} {name}: expected one of +x, -x, +y, -y, +z, -z")
@@ -89,11 +140,10 @@ def _axis(name: str, option: str) -> Any:
     return sign * np.eye(3)[axis]
 
 
-def _picture_of(visual: Any) -> Image | None:
-    """The picture that a mesh wears, as RGB; None if it wears none."""
+def _picture_of(visual: Any) -> Any:
+    """The picture that a mesh wears, as Pillow has it; None if it wears none."""
     material = getattr(visual, "material", None)
-    picture = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    return None if picture is None else np.asarray(picture.convert("RGB"))
+    return getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
 
 
 def mesh_files(file: Path, textured: bool) -> list[Path]:

@@ -1,18 +1,24 @@
 """Recordings as named arrays: .npz and MATLAB files of bodies, .npy files of joint angles."""
 
-import zipfile
+import math
+import struct
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.archive import MOST_BYTES, check_expansion, read_arrays
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.formats import KNOWN
 from snakewalk.controller.capture.resample import body_points
 from snakewalk.controller.capture.track import Track, track_from_points
 
+_MAT_HEAD = 128
+_MAT_PACKED = 15
+_PIECE = 1_000_000
 SKELETON_RATE_HZ = 30.0
 JOINT_RATE_HZ = 32.0
 """Defaults: neither kind of file holds a frame rate."""
@@ -40,20 +46,24 @@ def save_track(path: Path, track: Track) -> None:
 def load_npz(file: Path, rate_hz: float | None, least_score: float | None = None) -> Track:
     """Load the arrays of an .npz by ``track_from_arrays``; see ``load.load_file``."""
     try:
-        with np.load(file, allow_pickle=False) as data:
-            held = {name: np.asarray(data[name]) for name in data.files if name in ARRAYS}
-            others = [name for name in data.files if name not in ARRAYS]
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        held, others = read_arrays(file, ARRAYS)
+    except (ValueError, OSError) as error:
         raise InputError(f"{file}: is not an .npz of plain arrays: {error}") from None
     return track_from_arrays(file, held, rate_hz, least_score, others)
 
 
 def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
     """Load the variables of a MATLAB file up to version 7 by ``track_from_arrays``; 7.3 is HDF5."""
-    from scipy.io import loadmat  # noqa: PLC0415  slow to import
+    from scipy.io import loadmat, whosmat  # noqa: PLC0415  slow to import
 
+    size = file.stat().st_size
+    check_expansion(file, size, _unpacked_mat(file.read_bytes()))
     try:
+        said = 8 * sum(math.prod(shape) for _, shape, _ in whosmat(file))
+        check_expansion(file, size, said)  # of a cell or struct, too, whose fields may be none
         held = loadmat(file)
+    except InputError:
+        raise
     except Exception as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(
@@ -61,6 +71,34 @@ def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Tr
         ) from None
     arrays = {name: np.asarray(data) for name, data in held.items() if not name.startswith("__")}
     return track_from_arrays(file, arrays, rate_hz, least_score)
+
+
+def _unpacked_mat(data: bytes) -> int:
+    """Bytes that a MATLAB file takes unpacked; variables are packed one by one."""
+    order = "<" if data[126:128] == b"IM" else ">"
+    at, size = _MAT_HEAD, 0
+    while at + 8 <= len(data):
+        kind, length = struct.unpack_from(f"{order}II", data, at)
+        at += 8
+        if kind == _MAT_PACKED:
+            size += _unpacked(memoryview(data)[at : at + length])
+        else:
+            size += length
+        at += length
+    return size
+
+
+def _unpacked(packed: memoryview) -> int:
+    """Bytes that a zlib stream takes unpacked, counted piece by piece; stops where it is broken."""
+    stream, size = zlib.decompressobj(), 0
+    rest: bytes | memoryview = packed
+    try:
+        while rest and size <= MOST_BYTES:
+            size += len(stream.decompress(rest, _PIECE))
+            rest = stream.unconsumed_tail
+    except zlib.error:
+        pass
+    return size
 
 
 def track_from_arrays(
@@ -154,7 +192,7 @@ def load_npy(file: Path, rate_hz: float | None) -> Track:
     every frame faces along x in the mean, its head at the origin.
     """
     try:
-        held = np.load(file, allow_pickle=False)
+        held = np.load(file, mmap_mode="r", allow_pickle=False)  # maps no more than is there
     except (ValueError, OSError, EOFError) as error:
         raise InputError(f"{file}: is not an .npy of plain numbers: {error}") from None
     joints = _floats(file, "joint angles", np.asarray(held))

@@ -16,7 +16,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.keypoints import track_from_keypoints
-from snakewalk.controller.capture.track import Track
+from snakewalk.controller.capture.track import Track, frame_numbers
 
 PCUTOFF = 0.6
 """DeepLabCut's own default: below this likelihood it does not draw a point."""
@@ -58,7 +58,8 @@ def load_rows(
                     f"number or nothing, found {text!r}"
                 ) from None
     numbers = [row[0] for row in rows[depth:]]
-    frame = np.array(numbers, dtype=np.int64) if all(n.isdigit() for n in numbers) else None
+    digits = all(n.isdecimal() for n in numbers)
+    frame = frame_numbers(str(file), np.array(numbers, dtype=float)) if digits else None
     return _track(file, columns, values, frame, rate_hz, least_score)
 
 

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.archive import check_expansion
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.arrays import track_from_arrays
 from snakewalk.controller.capture.readers.deeplabcut import load_group
@@ -18,6 +19,9 @@ def load_hdf5(file: Path, rate_hz: float | None, least_score: float | None) -> T
     """Load an HDF5 file of any of these three kinds; see ``load.load_file``."""
     try:
         with h5py.File(file, "r") as held:
+            sizes: list[int] = []
+            held.visititems(lambda _, data: sizes.append(getattr(data, "nbytes", 0)))
+            check_expansion(file, file.stat().st_size, sum(sizes))
             if "tracks" in held and "track_occupancy" in held:
                 return load_analysis(file, held, rate_hz, least_score)
             tables = [g for g in held.values() if isinstance(g, h5py.Group) and "table" in g]

@@ -13,7 +13,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.keypoints import track_from_keypoints
-from snakewalk.controller.capture.track import Track
+from snakewalk.controller.capture.track import Track, frame_numbers
 
 
 def load_table(
@@ -36,7 +36,7 @@ def load_table(
         None if scores is None else scores[order],
         rate_hz=rate_hz,
         least_score=0.0 if least_score is None else least_score,
-        frame=frame[order].astype(np.int64),
+        frame=frame_numbers(str(file), frame[order]),
     )
 
 

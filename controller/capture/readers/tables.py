@@ -10,7 +10,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.deeplabcut import is_deeplabcut, load_rows
 from snakewalk.controller.capture.readers.formats import KNOWN
 from snakewalk.controller.capture.readers.sleap import load_table
-from snakewalk.controller.capture.track import Track, track_from_points
+from snakewalk.controller.capture.track import Track, frame_numbers, track_from_points
 
 _MIDLINE = {("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0}
 
@@ -62,7 +62,11 @@ def _numbers(file: Path, rows: list[list[str]], columns: list[int]) -> Floats:
 def _midline(file: Path, table: Floats, scale_m: float, rate_hz: float | None) -> Track:
     """Rows of t (s), frame, point, x, y; point 1 is the head."""
     if not np.isfinite(table[:, :3]).all():
-        raise InputError(f"{file}: t, frame and point must be given in every row")
+        lost = int((~np.isfinite(table[:, :3])).any(axis=1).sum())
+        raise InputError(
+            f"{file}: t, frame and point must be given in every row; {lost} of {len(table)} rows "
+            "lack one, or have one that is not finite"
+        )
     if len(np.unique(table[:, 1:3], axis=0)) < len(table):
         raise InputError(f"{file}: a point twice in a frame: more than one animal; export one")
     table = table[np.lexsort((table[:, 2], table[:, 1]))]
@@ -77,11 +81,15 @@ def _midline(file: Path, table: Floats, scale_m: float, rate_hz: float | None) -
         if len(frames) < 2:
             raise InputError(f"{file}: holds 1 frame; a motion needs at least 2")
         step = np.diff(table[first, 0]) / np.diff(frames)
-        if not np.median(step) > 0.0:
-            raise InputError(f"{file}: t must increase from frame to frame, in seconds")
+        back = np.flatnonzero(~(step > 0.0))
+        if len(back):
+            raise InputError(
+                f"{file}: t must increase from frame to frame, in seconds; it does not in "
+                f"{len(back)} of {len(step)} steps, first after frame {frames[back[0]]:g}"
+            )
         rate_hz = float(1.0 / np.median(step))
     return track_from_points(
-        file.stem, points, rate_hz, scale_m=scale_m, frame=frames.astype(np.int64)
+        file.stem, points, rate_hz, scale_m=scale_m, frame=frame_numbers(str(file), frames)
     )
 
 

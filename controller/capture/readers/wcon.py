@@ -6,6 +6,7 @@ point and "R" the last; ``ox, oy`` (else ``cx, cy``) is added to the points; nul
 """
 
 import json
+import math
 import re
 import zipfile
 from pathlib import Path
@@ -13,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from snakewalk.config.archive import DAMAGE, check_members
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.resample import equal_arc_length
-from snakewalk.controller.capture.track import Track, track_from_points
+from snakewalk.controller.capture.track import Track, frame_numbers, track_from_points
 
 
 def load_wcon(file: Path, text: str, rate_hz: float | None) -> Track:
@@ -49,12 +51,15 @@ def load_wcon(file: Path, text: str, rate_hz: float | None) -> Track:
             ) from None
     if len(bodies) < 2:
         raise InputError(f"{file}: a recording needs 2 or more times, found {len(bodies)}")
+    lost = sum(not math.isfinite(at) for at, _ in bodies)
+    if lost:
+        raise InputError(f"{file}: {lost} of {len(bodies)} times t are no finite numbers")
     bodies.sort(key=lambda body: body[0])
     time = second * np.array([at for at, _ in bodies])
     step = float(np.median(np.diff(time)))
     if not step > 0.0:
         raise InputError(f"{file}: a time twice: more than one body at a time")
-    frame = np.rint((time - time[0]) / step).astype(np.int64)
+    frame = frame_numbers(str(file), np.rint((time - time[0]) / step))
     if np.any(np.diff(frame) == 0):
         raise InputError(f"{file}: times must be about evenly spaced, here by {step:g} s")
     return track_from_points(
@@ -73,8 +78,11 @@ def zipped_text(file: Path) -> str | None:
             names = archive.namelist()
             if any(name.endswith(".npy") for name in names) or not names:
                 return None
-            return archive.read(names[0]).decode("utf-8-sig")
-    except (zipfile.BadZipFile, UnicodeDecodeError, OSError, RuntimeError):
+            member = archive.getinfo(names[0])
+            check_members(file, [member], text=True)
+            with archive.open(member) as stream:
+                return stream.read(member.file_size).decode("utf-8-sig")
+    except (*DAMAGE, OSError):
         return None
 
 

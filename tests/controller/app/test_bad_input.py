@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 
 from snakewalk.controller.app.cli.main import main
 
@@ -38,6 +39,17 @@ ROWS = [
     ("analyse worm-like --rate 30", "--rate 30: worm-like says its own rate"),
     ("track one.csv", "one.csv: holds 1 frame"),
     ("track back.csv", "back.csv: t must increase from frame to frame"),
+    ("track jump.csv", "it does not in 1 of 4 steps, first after frame 2"),
+    ("track inf.csv", "11 of 55 rows lack one, or have one that is not finite"),
+    ("track gaps.csv", "gaps: only 1 of 5 frames hold a midline"),
+    ("track half.csv", "half.csv: 1 of 5 frame numbers are no whole numbers, such as 2.5"),
+    ("track far.csv", "its frames span 9000001; a track has at most 500000"),
+    ("run --track far.csv", "its frames span 9000001; a track has at most 500000"),
+    ("track nan.wcon", "nan.wcon: 1 of 2 times t are no finite numbers"),
+    ("track bomb.npz", "bomb.npz: its 0.0197 MB would expand to 20 MB; at most 100 times"),
+    ("run --track bomb.npz", "bomb.npz: its 0.0197 MB would expand to 20 MB; at most 100 times"),
+    ("report bomb.mcap", "bomb.mcap: its 0.00"),
+    ("replay deep.mcap", "deep.mcap: breaks off before it says what ran"),
     ("sweep rolling -o /nosuch/a.csv", "/nosuch: no such folder"),
     ("tune rolling -o /proc/a.toml", "/proc: takes no file"),
     ("walk --picture /nosuch/a.png", "/nosuch: no such folder"),
@@ -77,6 +89,34 @@ def test_bad_input_is_told_and_nothing_is_written(
     for name, frames in (("one.csv", [0]), ("back.csv", [0, 1])):
         rows = [f"{-frame},{frame},{i},{x[i]},{frame}" for frame in frames for i in range(len(x))]
         Path(name).write_text("\n".join(["t,frame,point,x_m,y_m", *rows]) + "\n")
+    for name, times, numbers in (
+        ("jump.csv", [0, 1, 2, 1.5, 4], range(5)),
+        ("inf.csv", [0, 1, np.inf, 3, 4], range(5)),
+        ("gaps.csv", range(5), range(5)),
+        ("half.csv", range(5), [0, 1, 2, 2.5, 4]),
+        ("far.csv", range(5), [0, 1, 2, 3, 9_000_000]),
+    ):
+        shown = x + (np.inf if name == "gaps.csv" else 0.0)
+        rows = [
+            f"{at},{frame},{i},{(shown if k else x)[i]},{k}"
+            for k, (at, frame) in enumerate(zip(times, numbers, strict=True))
+            for i in range(len(x))
+        ]
+        Path(name).write_text("\n".join(["t,frame,point,x_m,y_m", *rows]) + "\n")
+    Path("nan.wcon").write_text(
+        '{"units": {"t": "s", "x": "m", "y": "m"}, "data": {"id": "a", "t": [0, NaN], '
+        '"x": [[0, 1, 2, 3], [0, 1, 2, 3]], "y": [[0, 0, 0, 0], [0, 0, 0, 0]]}}'
+    )
+    if "bomb.npz" in words:
+        np.savez_compressed("bomb.npz", points=np.zeros(20_000_000, bool))
+    for name, row in (("bomb.mcap", b" " * 20_000_000), ("deep.mcap", b"[" * 100_000)):
+        if name not in words:
+            continue
+        with Path(name).open("wb") as file:
+            writer = Writer(file)
+            writer.start()
+            writer.add_message(writer.register_channel("/config", "json", 0), 0, row, 0)
+            writer.finish()
     before = sorted(tmp_path.rglob("*"))
     monkeypatch.setattr("sys.argv", ["snakewalk", *words.split()])
     with pytest.raises(SystemExit) as end:

@@ -299,6 +299,8 @@ def _read_picture(image: Path) -> Image:
             return np.asarray(picture.convert("RGB"))
     except FileNotFoundError:
         raise InputError(f"{image}: no such file") from None
+    except Pillow.DecompressionBombError as error:
+        raise InputError(f"{image}: {error}") from None
     except (UnidentifiedImageError, OSError, SyntaxError):
         raise InputError(f"{image}: is no picture that can be read") from None
 

@@ -1,0 +1,123 @@
+"""Compressed files that come from outside: how far they may expand, and ``.npz`` read within that.
+
+A few kilobytes of zeros, well packed, fill the memory of a robot's computer. What a file says it
+expands to is compared with its size before anything is unpacked, and no more than that is unpacked.
+"""
+
+import math
+import struct
+import zipfile
+import zlib
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.errors import InputError
+
+FREE_BYTES: Final = 16_000_000
+"""Any file may expand to this (ours): a mask of zeros is packed a thousandfold."""
+MOST_RATIO: Final = 100
+MOST_BYTES: Final = 1_000_000_000
+"""Above ``FREE_BYTES``: unpacked over packed, and unpacked, at most (ours)."""
+MOST_TEXT_RATIO: Final = 20
+MOST_TEXT_BYTES: Final = 500_000_000
+"""The same of JSON (ours): it takes several times its size in memory."""
+DAMAGE: Final = (
+    ValueError,
+    EOFError,
+    KeyError,
+    NotImplementedError,  # an unknown packing
+    RuntimeError,  # a password
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What reading a damaged archive raises, besides ``OSError``."""
+
+
+def check_expansion(file: Path, packed: int, unpacked: int, *, text: bool = False) -> None:
+    """Check how many bytes a file would expand to, before it does.
+
+    Args:
+        file: for the fault.
+        packed: bytes of the file.
+        unpacked: bytes that its content says it takes.
+        text: whether the content is JSON.
+
+    Raises:
+        InputError: more than ``FREE_BYTES``, and more than the ratio or the size allowed.
+
+    """
+    ratio, most = (MOST_TEXT_RATIO, MOST_TEXT_BYTES) if text else (MOST_RATIO, MOST_BYTES)
+    if unpacked > max(FREE_BYTES, min(ratio * packed, most)):
+        raise InputError(
+            f"{file}: its {packed / 1e6:.3g} MB would expand to {unpacked / 1e6:,.0f} MB; at most "
+            f"{ratio} times the size of the file is unpacked, and at most {most / 1e6:.0f} MB "
+            f"({FREE_BYTES / 1e6:.0f} MB of any file)"
+        )
+
+
+def check_members(file: Path, members: Sequence[zipfile.ZipInfo], *, text: bool = False) -> None:
+    """Check what members of a zip say they expand to.
+
+    Raises:
+        InputError: too much (``check_expansion``).
+        ValueError: a packing other than deflate, whose output nothing bounds.
+
+    """
+    if any(m.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for m in members):
+        raise ValueError("is packed in another way than deflate")
+    check_expansion(file, file.stat().st_size, sum(m.file_size for m in members), text=text)
+
+
+def read_arrays(
+    file: Path, names: Collection[str] | None = None
+) -> tuple[dict[str, Any], list[str]]:
+    """Read arrays of numbers and text from an .npz, and name the arrays that were not asked for.
+
+    Args:
+        file: the .npz.
+        names: of the arrays wanted, as far as they are there; None wants all.
+
+    Raises:
+        InputError: it would expand too far.
+        OSError: it cannot be opened.
+        ValueError: it is no .npz of plain arrays, or is damaged.
+
+    """
+    try:
+        with zipfile.ZipFile(file) as archive:
+            members = {
+                member.filename.removesuffix(".npy"): member
+                for member in archive.infolist()
+                if member.filename.endswith(".npy")
+            }
+            wanted = {n: m for n, m in members.items() if names is None or n in names}
+            check_members(file, list(wanted.values()))
+            held = {name: _array(archive, member) for name, member in wanted.items()}
+    except DAMAGE as error:
+        raise ValueError(str(error) or type(error).__name__) from None
+    return held, [name for name in members if name not in held]
+
+
+def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
+    """One array; its header may not promise more than the archive holds."""
+    with archive.open(member) as stream:
+        version = np.lib.format.read_magic(stream)
+        if version not in ((1, 0), (2, 0)):
+            raise ValueError(f"{member.filename}: is of version {version} of .npy")
+        read_header = (
+            np.lib.format.read_array_header_1_0
+            if version == (1, 0)
+            else np.lib.format.read_array_header_2_0
+        )
+        shape, _, dtype = read_header(stream)
+    if dtype.hasobject:
+        raise ValueError(f"{member.filename}: holds Python objects")
+    if math.prod(shape) * max(dtype.itemsize, 1) > member.file_size:
+        raise ValueError(f"{member.filename}: says {shape}, and holds less")
+    with archive.open(member) as stream:
+        return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
