@@ -22,6 +22,8 @@ from snakewalk.controller.shape.states import StateRange, energy_kept, state_ran
 TARGET_SHIFT = 4.0
 """Points that the pattern should move between the frames that are compared."""
 COEFFICIENTS = 7
+LEAST_TRAVEL = 0.2
+"""Of the pulse speed: recorded animals that go somewhere lie at 0.7 or more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +47,41 @@ class Analysis:
         return float(self.pulse.typical * self.track.rate_hz / self.track.angles_rad.shape[1])
 
     @property
+    def pulse_not_told(self) -> str | None:
+        """Why the pulse speed, and all that is divided by it, is unknown; None where it is not."""
+        if self.wave.coarse:
+            return self.wave.not_told
+        if not np.isfinite(self.pulse.points_per_frame).any():
+            return "no part of the body shows how far the pattern moved"
+        return None
+
+    @property
+    def travel_not_told(self) -> str | None:
+        """Why travel and sliding are unknown; None where they are not."""
+        if self.advance is None:
+            return "places are not recorded"
+        if self.pulse_not_told is not None:
+            return self.pulse_not_told
+        travel = self._over_pulse(self.advance.along)
+        if travel is None:
+            return "the pattern does not move along the body"
+        if travel < LEAST_TRAVEL:
+            return (
+                f"over the ground the body goes at {travel:.2f} of the pulse speed: it holds "
+                "station in a flow, drifts, or bends on the spot"
+            )
+        return None
+
+    @property
     def travel(self) -> float | None:
         """Speed of the points along the body over the pulse speed, where both are known.
 
-        1: every point passes where the head passed. 0: the wave runs on the spot.
+        1: every point passes where the head passed. Where the body stays behind its wave by far,
+        the water may run as fast the other way: the ground does not tell how the body slides.
         """
-        return None if self.advance is None else self._over_pulse(self.advance.along)
+        if self.advance is None or self.travel_not_told is not None:
+            return None
+        return self._over_pulse(self.advance.along)
 
     @property
     def sliding(self) -> float | None:
@@ -59,7 +90,7 @@ class Analysis:
         0: no sliding. Up to 1: the body glides on in its shape. Below 0: the head advances less
         than the wave runs back, so the body slips.
         """
-        if self.advance is None:
+        if self.advance is None or self.travel_not_told is not None:
             return None
         ratio = self._over_pulse(self.advance.head_speed(self.pulse.points_per_frame))
         return None if ratio is None or abs(ratio) < 1e-3 else 1.0 - 1.0 / ratio
@@ -91,7 +122,7 @@ class Analysis:
         return None if abs(moved) < 1e-9 else float((weight * speed[both]).sum()) / moved
 
     def facts(self) -> dict[str, Any]:
-        """Plain numbers, for the table and JSON."""
+        """Plain numbers, for the table and JSON; None where ``*_not_told`` has the reason."""
         track, wave, pulse = self.track, self.wave, self.pulse
         u = pulse.points_per_frame
         known = np.isfinite(u)
@@ -99,8 +130,16 @@ class Analysis:
         spread = np.percentile(u[known], [25.0, 75.0]) * scale if known.any() else [np.nan] * 2
         angle, lateral = self.undulation.angle_rad, self.undulation.lateral
         at = [0, 25, 50, 75, 99]
+        no_wave, no_pulse = wave.not_told, self.pulse_not_told
         points, correlation = (None, None) if self.error_slope is None else self.error_slope
         rms = np.sqrt(np.nanmean(pulse.body_error_rad**2)) if known.any() else np.nan
+
+        def of_wave(value: float) -> float | None:
+            return None if no_wave else round(value, 3)
+
+        def of_pulse(value: float | None, digits: int) -> float | None:
+            return None if no_pulse else _number(value, digits)
+
         return {
             "recording": track.name,
             "frames": track.frames,
@@ -108,24 +147,27 @@ class Analysis:
             "rate_hz": round(track.rate_hz, 3),
             "rate_assumed": track.rate_assumed,
             "length_m": None if track.length_m is None else round(track.length_m, 6),
-            "frequency_hz": round(wave.frequency_hz, 3),
-            "waves_on_body": round(wave.waves, 3),
-            "wavelength_body_lengths": round(1.0 / max(wave.waves, 1e-9), 3),
-            "wave_number_rad_per_body_length": round(2.0 * np.pi * wave.waves, 3),
-            "wave_towards_tail": wave.towards_tail,
+            "frequency_hz": of_wave(wave.frequency_hz),
+            "waves_on_body": of_wave(wave.waves),
+            "wavelength_body_lengths": of_wave(1.0 / max(wave.waves, 1e-9)),
+            "wave_number_rad_per_body_length": of_wave(2.0 * np.pi * wave.waves),
+            "wave_towards_tail": None if no_wave else wave.towards_tail,
             "wave_share": round(wave.share, 3),
-            "time_towards_head": round(wave.headward, 3),
-            "pulse_body_lengths_s": _number(self.pulse_body_lengths_s, 4),
-            "pulse_quartiles_body_lengths_s": [_number(float(q), 4) for q in spread],
-            "pulse_points_per_frame": _number(pulse.typical, 3),
+            "wave_not_told": no_wave,
+            "time_towards_head": of_wave(wave.headward),
+            "pulse_body_lengths_s": of_pulse(self.pulse_body_lengths_s, 4),
+            "pulse_quartiles_body_lengths_s": [of_pulse(float(q), 4) for q in spread],
+            "pulse_points_per_frame": of_pulse(pulse.typical, 3),
+            "pulse_not_told": no_pulse,
             "pulse_frames_compared": pulse.step,
             "pulse_measured_share": round(float(known.mean()), 3),
-            "wave_speed_body_lengths_s": round(wave.pulse_body_lengths_s, 4),
-            "one_pulse_error_rad": _number(float(rms), 4),
-            "one_pulse_error_over_slope_points": _number(points, 3),
-            "one_pulse_error_correlation": _number(correlation, 3),
+            "wave_speed_body_lengths_s": None if no_wave else round(wave.pulse_body_lengths_s, 4),
+            "one_pulse_error_rad": of_pulse(float(rms), 4),
+            "one_pulse_error_over_slope_points": of_pulse(points, 3),
+            "one_pulse_error_correlation": of_pulse(correlation, 3),
             "travel": _number(self.travel, 3),
             "sliding_weight": _number(self.sliding, 3),
+            "travel_not_told": self.travel_not_told,
             "angle_amplitude_rad": [round(float(angle[k]), 3) for k in at],
             "lateral_amplitude_body_lengths": [round(float(lateral[k]), 4) for k in [*at[:4], -1]],
             "bend_k_rad": round(float(np.median(track.bend_rad)), 3),

@@ -48,10 +48,12 @@ class RecordingFacts:
     rate_hz: float
     rate_assumed: bool
     length_mm: float | None
-    waves_on_body: float
-    wave_hz: float
+    waves_on_body: float | None
+    wave_hz: float | None
     wave_share: float
-    time_towards_head: float
+    time_towards_head: float | None
+    wave_not_told: str | None
+    """Why the wave's figures are None; the joints' smoothing still takes the strongest pattern."""
     bend_k_rad: float
     bend_k_most_rad: float
     energy_kept: float
@@ -106,10 +108,11 @@ def examine(
         rate_hz=round(track.rate_hz, 3),
         rate_assumed=track.rate_assumed,
         length_mm=None if track.length_m is None else round(1e3 * track.length_m, 1),
-        waves_on_body=round(wave.waves, 2),
-        wave_hz=round(wave.frequency_hz, 2),
+        waves_on_body=None if wave.not_told else round(wave.waves, 2),
+        wave_hz=None if wave.not_told else round(wave.frequency_hz, 2),
         wave_share=round(wave.share, 2),
-        time_towards_head=round(wave.headward, 2),
+        time_towards_head=None if wave.not_told else round(wave.headward, 2),
+        wave_not_told=wave.not_told,
         bend_k_rad=round(float(np.median(track.bend_rad)), 2),
         bend_k_most_rad=round(float(track.bend_rad.max()), 2),
         energy_kept=round(float(energy_kept(track.angles_rad).mean()), 4),

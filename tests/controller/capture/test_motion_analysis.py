@@ -187,6 +187,44 @@ def test_the_synthesis_sliding_weight_is_measured_again(sliding: float) -> None:
     assert found.sliding == pytest.approx(sliding, abs=0.02)
 
 
+@pytest.mark.parametrize("travel", [0.0, -0.6])
+def test_who_holds_station_in_a_flow_has_no_sliding_told(travel: float) -> None:
+    """Swimming at 0.8 against water of 0.8 or of 1.4: the ground knows nothing of the water."""
+    moving = wave_track(travel)
+    drift = 0.01 * np.sin(np.arange(moving.frames))[:, None, None] * [1.0, 0.5]
+    found = analyse(track_from_points("held", moving.points + drift, moving.rate_hz))
+    facts = found.facts()
+    assert (facts["travel"], facts["sliding_weight"]) == (None, None)
+    assert "holds station in a flow" in facts["travel_not_told"]
+    assert facts["frequency_hz"] == pytest.approx(0.8, rel=0.01)  # the wave is what it is
+    assert facts["wave_not_told"] is None
+
+
+def test_what_is_not_told_is_no_number_anywhere(tmp_path: Path) -> None:
+    """Frames too far apart, and noise: null with the reason in JSON, words in the table."""
+    coarse = wave_track(0.8, rate_hz=2.6)
+    noise = np.random.default_rng(0).normal(0.0, 0.006, (251, 101, 2))
+    save_track(tmp_path / "coarse.npz", coarse)
+    points = wave_track(0.8).points + noise
+    save_track(tmp_path / "noisy.npz", track_from_points("noisy", points, 40.0, scale_m=1.0))
+    files = [str(tmp_path / name) for name in ("coarse.npz", "noisy.npz")]
+    done = snakewalk("analyse", *files, "--picture", str(tmp_path), "--json")
+    assert done.returncode == 0, done.stderr
+    assert "NaN" not in done.stdout
+    few, noisy = json.loads(done.stdout)
+    assert few["pulse_not_told"] == few["wave_not_told"] == few["travel_not_told"]
+    assert "frames a cycle are too few" in few["wave_not_told"]
+    assert "of the bending" in noisy["wave_not_told"]
+    for facts in (few, noisy):
+        for key in ("frequency_hz", "waves_on_body", "wave_towards_tail", "time_towards_head"):
+            assert facts[key] is None
+    for key in ("pulse_body_lengths_s", "travel", "sliding_weight", "one_pulse_error_rad"):
+        assert few[key] is None
+    assert (tmp_path / "coarse.png").read_bytes().startswith(b"\x89PNG")
+    for command in ("analyse", "track"):
+        assert "not told: 3.2 frames" in " ".join(snakewalk(command, files[0]).stdout.split())
+
+
 def test_nothing_to_analyse_is_one_line() -> None:
     still = track_from_points("still", np.stack([body_points(travelling(1.0)[0])] * 6), 10.0)
     with pytest.raises(InputError, match="still: no motion"):

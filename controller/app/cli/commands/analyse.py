@@ -79,23 +79,28 @@ def _show(facts: dict[str, Any]) -> None:
     length = "no scale" if facts["length_m"] is None else f"{1e3 * facts['length_m']:.4g} mm long"
     low, high = facts["pulse_quartiles_body_lengths_s"]
     direction = "towards the tail" if facts["wave_towards_tail"] else "towards the head"
-    travel, sliding = facts["travel"], facts["sliding_weight"]
+    no_wave, no_pulse, no_travel = (
+        facts[f"{what}_not_told"] and f"not told: {facts[f'{what}_not_told']}"
+        for what in ("wave", "pulse", "travel")
+    )
     rows = {
         "frames": f"{facts['frames']}, {facts['frames_left_out']} left out, "
         f"{facts['rate_hz']:g} Hz{assumed}, {length}",
-        "frequency": f"{facts['frequency_hz']} Hz",
-        "wave": f"{facts['waves_on_body']} on the body: {facts['wavelength_body_lengths']} body "
+        "frequency": no_wave or f"{facts['frequency_hz']} Hz",
+        "wave": no_wave
+        or f"{facts['waves_on_body']} on the body: {facts['wavelength_body_lengths']} body "
         f"lengths, {facts['wave_number_rad_per_body_length']} rad a body length, {direction}; "
         f"it is {facts['wave_share']:.0%} of the bending",
-        "pulse speed": f"{facts['pulse_body_lengths_s']} body lengths/s (half of it {low} to "
+        "pulse speed": no_pulse
+        or f"{facts['pulse_body_lengths_s']} body lengths/s (half of it {low} to "
         f"{high}), {facts['pulse_points_per_frame']} points a frame; known at "
         f"{facts['pulse_measured_share']:.0%} of body and time",
-        "one pulse speed for the body": f"leaves {facts['one_pulse_error_rad']} rad; goes with the "
+        "one pulse speed for the body": no_pulse
+        or f"leaves {facts['one_pulse_error_rad']} rad; goes with the "
         f"slope along the body by {facts['one_pulse_error_correlation']}",
-        "frequency x wavelength": f"{facts['wave_speed_body_lengths_s']} body lengths/s",
-        "travel": "places are not recorded"
-        if travel is None
-        else f"{travel} of the pulse speed; sliding weight w_d {sliding}",
+        "frequency x wavelength": no_wave or f"{facts['wave_speed_body_lengths_s']} body lengths/s",
+        "travel": no_travel
+        or f"{facts['travel']} of the pulse speed; sliding weight w_d {facts['sliding_weight']}",
         "angle amplitude": _along(facts["angle_amplitude_rad"], "rad"),
         "sideways amplitude": _along(facts["lateral_amplitude_body_lengths"], "body lengths"),
         "bend K": f"{facts['bend_k_rad']} rad",
@@ -106,7 +111,7 @@ def _show(facts: dict[str, Any]) -> None:
     }
     if facts["picture"]:
         rows["picture"] = facts["picture"]
-    if facts["time_towards_head"] > 0.1:
+    if not no_wave and facts["time_towards_head"] > 0.1:
         rows["note"] = (
             f"the wave runs towards the head {facts['time_towards_head']:.0%} of the time"
         )

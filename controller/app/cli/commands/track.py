@@ -68,7 +68,9 @@ def _show(facts: "RecordingFacts") -> None:
         f"{facts.rate_hz:g} Hz{assumed}, {length}",
         "wave": f"{facts.waves_on_body} on the body, {facts.wave_hz} Hz, "
         f"{facts.wave_share:.0%} of the bending; towards the head "
-        f"{facts.time_towards_head:.0%} of the time",
+        f"{facts.time_towards_head:.0%} of the time"
+        if facts.time_towards_head is not None
+        else f"not told: {facts.wave_not_told}",
         "bend K": f"{facts.bend_k_rad} rad, at most {facts.bend_k_most_rad}",
         "in 7 coefficients": f"{facts.energy_kept:.2%} of the energy",
         "states": f"{facts.states_kept} of {facts.frames} usable by {facts.robot}"
@@ -82,7 +84,7 @@ def _show(facts: "RecordingFacts") -> None:
     }
     if facts.head_and_tail_swapped:
         rows["warning"] = f"head and tail change places {facts.head_and_tail_swapped} times"
-    elif facts.time_towards_head > 0.5:
+    elif facts.time_towards_head is not None and facts.time_towards_head > 0.5:
         rows["warning"] = "the wave runs towards the head: an animal going backwards, or tail first"
     table = Table(title=facts.recording, title_justify="left", box=None, show_header=False)
     for key, text in rows.items():

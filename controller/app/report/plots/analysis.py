@@ -39,9 +39,8 @@ def draw_analysis(found: Analysis, file: Path) -> None:
 
     """
     check_picture(file)
-    track, pulse = found.track, found.pulse
+    track, pulse, unknown = found.track, found.pulse, found.pulse_not_told
     scale = track.rate_hz / track.angles_rad.shape[1]
-    usual = abs(pulse.typical) * scale
     with style():
         figure = Figure(figsize=(10.5, 8.1), layout="constrained", dpi=76)
         (tracks, angles), (swings, speeds), (against, errors) = figure.subplots(
@@ -52,23 +51,35 @@ def draw_analysis(found: Analysis, file: Path) -> None:
         body_map(figure, angles, track, swing, "rad")
         angles.set_title("tangent angle about the mean heading")
         _swings(swings, found)
-        known = np.isfinite(pulse.points_per_frame)
-        most = float(np.percentile(np.abs(pulse.points_per_frame[known]), 95.0)) * scale
-        body_map(
-            figure,
-            speeds,
-            track,
-            pulse.points_per_frame * scale,
-            "body lengths a second",
-            kept=pulse.frame,
-            limit=max(1e-9, min(max(most, usual), 3.0 * usual)),
-        )
-        speeds.set_title("pulse speed, positive towards the tail; grey: not known")
-        body_map(figure, errors, track, pulse.body_error_rad, "rad", kept=pulse.frame)
-        errors.set_title("error of one pulse speed for the whole body")
-        _error_by_slope(against, found)
+        if unknown is None:
+            _speeds(figure, speeds, found, scale)
+            body_map(figure, errors, track, pulse.body_error_rad, "rad", kept=pulse.frame)
+            errors.set_title("error of one pulse speed for the whole body")
+            _error_by_slope(against, found)
+        else:
+            for axes in (speeds, errors, against):
+                axes.set_axis_off()
+            speeds.text(0.0, 0.5, f"pulse speed not told:\n{unknown}", fontsize=9, wrap=True)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
+
+
+def _speeds(figure: Figure, axes: Axes, found: Analysis, scale: float) -> None:
+    """Draw the pulse speed of body and time, body lengths a second."""
+    pulse = found.pulse
+    known = np.isfinite(pulse.points_per_frame)
+    usual = abs(pulse.typical) * scale
+    most = float(np.percentile(np.abs(pulse.points_per_frame[known]), 95.0)) * scale
+    body_map(
+        figure,
+        axes,
+        found.track,
+        pulse.points_per_frame * scale,
+        "body lengths a second",
+        kept=pulse.frame,
+        limit=max(1e-9, min(max(most, usual), 3.0 * usual)),
+    )
+    axes.set_title("pulse speed, positive towards the tail; grey: not known")
 
 
 def _tracks(axes: Axes, found: Analysis) -> None:
