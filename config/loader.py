@@ -94,7 +94,9 @@ def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
         *tables, last = key.split(".")
         table = data
         for name in tables:
-            if not isinstance(table.get(name), dict):
+            if table.get(name) is None:  # a table left out, or an unknown one: the schema says
+                table[name] = {}
+            if not isinstance(table[name], dict):
                 raise ConfigError(f"{source}: {key}: {name} is no table of it")
             table = table[name]
         table[last] = value

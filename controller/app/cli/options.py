@@ -4,12 +4,13 @@ import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.app.result_files import LOG
 
 if TYPE_CHECKING:
@@ -51,6 +52,35 @@ World = Annotated[str | None, typer.Option(help="shipped world, or a TOML file")
 TrackFile = Annotated[
     str | None, typer.Option("--track", help="shipped recording, or a file of midlines or angles")
 ]
+
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="replace a value of the run's, robot's or world's file, e.g. "
+        "world.ground.slope_deg=10; may be given again",
+        metavar="KEY=VALUE",
+    ),
+]
+
+
+def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") -> dict[str, Any]:
+    """Read an option's KEY=VALUE pairs, the last of a key; a value is JSON, or else text.
+
+    Raises:
+        InputError: there is no key, or no value.
+
+    """
+    values: dict[str, Any] = {}
+    for text in given or []:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not (key and equals and value):
+            raise InputError(f"{option} {text}: expected {form}")
+        try:
+            values[key] = json.loads(value)
+        except (ValueError, RecursionError):  # no JSON; too long a number; too deep a list
+            values[key] = value
+    return values
 
 
 def show(result: Mapping[str, object], as_json: bool) -> None:

@@ -1,7 +1,9 @@
 """The one factory of runs: from a configuration, or a command's options, to a ``PreparedRun``."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -32,10 +34,21 @@ from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.drivers.bus.budget import chain_budget
 
 C = TypeVar("C", RunConfig, RobotConfig, WorldConfig)
+_FIELDS = {
+    "run": tuple(RunConfig.model_fields),
+    "robot": tuple(RobotConfig.model_fields),
+    "world": tuple(WorldConfig.model_fields),
+}
+"""Keys and tables at the top of each file."""
 
 GAIT_PITCH_SHARE = 0.75
 """Goal current of the pitch joints in a motion that lifts, of the current at which safety stops
 (1.5 A of an XM430; ours): soft ones would not carry the links."""
+
+_OWN_MOTION = {"run.robot": "--robot", "run.motion": "the command"}
+_OF_A_GAIT = _OWN_MOTION | {"run.gait": "--param, --seconds, --then, --by, --look-heading-rad"}
+_OF_A_RECORDING = _OWN_MOTION | {"run.track": "TRACK", "run.playback": "--speed"}
+"""Keys that a gait's or a recording's run takes from its command, by the options that give them."""
 
 
 def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
@@ -71,17 +84,15 @@ def prepare_walk(
     """Load a run with its robot and world; ``changes`` replace fields of the run where not None.
 
     ``keys`` replace single values of the three files: ``run.seed``, ``robot.link_mass_kg``,
-    ``world.ground.slope_rad``. ``on_paper`` allows motions that no robot makes by itself.
+    ``world.ground.slope_rad``, or ``slope_deg``. ``on_paper`` allows motions that no robot makes by
+    itself.
 
     Raises:
         ConfigError: every fault of a file at once.
         InputError: what the configuration asks cannot be made, or does not fit the wire.
 
     """
-    keys = {} if keys is None else keys
-    for key in keys:
-        if key.partition(".")[0] not in {"run", "robot", "world"}:
-            raise InputError(f"{key}: a key begins with run., robot. or world.")
+    keys = _checked_keys(keys)
     run = load_run(name)
     beside = Path(name).parent if name.endswith(".toml") else None
     options = {key: value for key, value in changes.items() if value is not None}
@@ -105,6 +116,48 @@ def prepare_walk(
     _refuse_legs(robot)
     _check_servos(run, robot)
     return WalkRun(run, robot, _with_keys_of("world", load_world(run.world, beside), keys))
+
+
+def _checked_keys(
+    keys: Mapping[str, object] | None, refused: Mapping[str, str] | None = None
+) -> dict[str, object]:
+    """Return keys of the three files, angles in rad; ``refused`` keys or tables have options.
+
+    Raises:
+        InputError: a key is of none of the files, or is refused; one line each.
+
+    """
+    faults: list[str] = []
+    for key in keys or {}:
+        file, dot, rest = key.partition(".")
+        if file not in _FIELDS or not (dot and all(rest.split("."))):
+            faults.append(f"{key}: a key begins with run., robot. or world.{_meant(file, rest)}")
+        for own, option in (refused or {}).items():
+            if key == own or key.startswith(f"{own}."):
+                faults.append(f"{key}: is given by {option}")
+    if faults:
+        raise InputError(faults)
+    return dict(_in_rad(key, value) for key, value in (keys or {}).items())
+
+
+def _meant(first: str, rest: str) -> str:
+    """Say which key was meant where the first word is that of no file."""
+    files = get_close_matches(first, _FIELDS, 1, 0.7)
+    if files and rest:
+        return f"; did you mean {files[0]}.{rest}?"
+    for file, fields in _FIELDS.items():
+        for near in get_close_matches(first, fields, 1, 0.7):
+            return f"; did you mean {'.'.join(filter(None, (file, near, rest)))}?"
+    return ""
+
+
+def _in_rad(key: str, value: object) -> tuple[str, object]:
+    """Files have radians; people think of slopes in degrees."""
+    if not key.endswith("_deg"):
+        return key, value
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        value = math.radians(value)
+    return f"{key.removesuffix('_deg')}_rad", value
 
 
 def _with_keys_of(file: str, config: C, keys: Mapping[str, object]) -> C:
@@ -133,10 +186,12 @@ def prepare_gait(
     make_operator: MakeOperator | None = None,
     then: Sequence[tuple[float, str, dict[str, Any]]] = (),
     by: Literal["blend", "cpg"] = "blend",
+    keys: Mapping[str, object] | None = None,
 ) -> GaitRun:
     """Prepare a gait, or a shipped or own set of parameters (``config/gaits``), by name.
 
-    ``then`` holds (time, name, parameters) of the gaits that follow, ``by`` how the gait changes.
+    ``then`` holds (time, name, parameters) of the gaits that follow, ``by`` how the gait changes,
+    ``keys`` values of run, robot and world that are replaced, as of ``prepare_walk``.
 
     Raises:
         InputError: no such gait, parameters out of range, a robot that lacks joints, changes out of
@@ -145,6 +200,7 @@ def prepare_gait(
     """
     if make_operator is not None and (then or by == "cpg"):
         raise InputError("--live changes gaits by keys and joins: leave out --then and --by cpg")
+    keys = _checked_keys(keys, _OF_A_GAIT)
     gait, known = _gait_by_name(name, parameters)
     if known is not None:
         robot, world = robot or known.robot, world or known.world
@@ -153,7 +209,7 @@ def prepare_gait(
     pitch = any(each.needs.pitch for each in gaits)
     legs = any(each.needs.legs for each in gaits)
     own = "salamander" if legs else "alternating16" if pitch else "yaw16"
-    body = load_robot(robot or own)
+    body = _with_keys_of("robot", load_robot(robot or own), keys)
     for each in gaits:
         each.check(body)
     run = checked(
@@ -181,10 +237,12 @@ def prepare_gait(
         },
         "command line",
     )
+    run = _with_keys_of("run", run, keys)
     _check_servos(run, body)
     soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
     body = _with_gains(body, pitch=pitch, soft=soft)
-    return GaitRun(run, body, load_world(run.world), make_operator)
+    ground = _with_keys_of("world", load_world(run.world), keys)
+    return GaitRun(run, body, ground, make_operator)
 
 
 def is_gait(name: str) -> bool:
@@ -201,15 +259,21 @@ def with_compliance(run: RunConfig, on: bool | None) -> RunConfig:
 
 
 def prepare_playback(
-    track: str, *, robot: str | None = None, world: str | None = None, speed: float | None = None
+    track: str,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    speed: float | None = None,
+    keys: Mapping[str, object] | None = None,
 ) -> PlaybackRun:
-    """Prepare to play a recording.
+    """Prepare to play a recording; ``keys`` as of ``prepare_walk``.
 
     Raises:
         InputError: no such recording, joints that do not bend so far, too fast for them.
 
     """
-    body = load_robot(robot or "yaw16")
+    keys = _checked_keys(keys, _OF_A_RECORDING)
+    body = _with_keys_of("robot", load_robot(robot or "yaw16"), keys)
     fields = {
         "name": Path(track).stem,
         "robot": body.name,
@@ -218,11 +282,13 @@ def prepare_playback(
         "motion": "playback",
         "playback": {"speed": speed},
     }
-    run = checked(RunConfig, fields, "command line")
+    run = _with_keys_of("run", checked(RunConfig, fields, "command line"), keys)
     _refuse_legs(body)
     _check_servos(run, body)
-    prepared = PlaybackRun(run, body, load_world(run.world))
+    prepared = PlaybackRun(run, body, _with_keys_of("world", load_world(run.world), keys))
     Recorded(body, *prepared.joint_track).needs.check(body, "this recording")
+    if "run.time_limit_s" in keys:
+        return prepared
     limit = {"time_limit_s": prepared.duration_s + 30.0}
     return replace(prepared, run=run.model_copy(update=limit))
 

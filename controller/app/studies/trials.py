@@ -135,9 +135,7 @@ def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> WalkRun |
     seconds = options.pop("seconds", None)
     if not case.is_gait:
         options |= {"motion": case.motion, "seed": seed}
-        return prepare_walk(case.run, keys=dict(map(_in_rad, case.keys)), **options)
-    if case.keys:
-        raise InputError(f"{case.run}: --over replaces keys of walks, and this is a gait")
+        return prepare_walk(case.run, keys=dict(case.keys), **options)
     world = options.get("world")
     return prepare_gait(
         case.run,
@@ -145,15 +143,8 @@ def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> WalkRun |
         world=None if world is None else str(world),
         seconds=float(str(seconds)) if seconds is not None else GAIT_SECONDS,
         seed=seed,
+        keys=dict(case.keys),
     )
-
-
-def _in_rad(key_value: tuple[str, Value]) -> tuple[str, Value]:
-    """Files have radians; people think of slopes in degrees."""
-    key, value = key_value
-    if not key.endswith("_deg") or isinstance(value, str | bool):
-        return key, value
-    return f"{key.removesuffix('_deg')}_rad", math.radians(value)
 
 
 def parse_over(text: str) -> tuple[str, tuple[Value, ...]]:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.options import Force, Json, Robot, console, show
+from snakewalk.controller.app.cli.options import Force, Json, Robot, console, key_values, show
 from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
 if TYPE_CHECKING:
@@ -110,16 +109,7 @@ def show_gait(
 
 def parameters(given: list[str] | None) -> dict[str, Any]:
     """Read NAME=VALUE pairs; the gait's model says what a value must be."""
-    values: dict[str, Any] = {}
-    for text in given or []:
-        name, equals, value = text.partition("=")
-        if not equals or not name or not value:
-            raise InputError(f"--param {text}: expected NAME=VALUE")
-        try:
-            values[name] = json.loads(value)
-        except json.JSONDecodeError:
-            values[name] = value
-    return values
+    return key_values("--param", given, "NAME=VALUE")
 
 
 def _needs(gait: "type[Gait]") -> list[str]:

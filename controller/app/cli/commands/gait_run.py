@@ -20,7 +20,9 @@ from snakewalk.controller.app.cli.options import (
     Robot,
     RunFolder,
     RunPort,
+    Set,
     World,
+    key_values,
     show,
     write_artifacts,
 )
@@ -36,6 +38,7 @@ def run_gait(
     robot: Robot = None,
     world: World = None,
     param: Param = None,
+    set_: Set = None,
     then: Annotated[
         list[str] | None,
         typer.Option(help="NAME@SECONDS [,PARAM=VALUE...]: change gait; may be given again"),
@@ -81,6 +84,7 @@ def run_gait(
             make_operator=_operator(stack, live, gamepad),
             then=[_change(text) for text in then or []],
             by="cpg" if by == "cpg" else "blend",
+            keys=key_values("--set", set_),
         )
         prepared = replace(prepared, run=with_compliance(prepared.run, compliance))
         run = prepared.run

@@ -16,9 +16,11 @@ from snakewalk.controller.app.cli.options import (
     Robot,
     RunName,
     Seed,
+    Set,
     TrackFile,
     World,
     console,
+    key_values,
     show,
 )
 from snakewalk.controller.app.result_files import refuse_to_overwrite
@@ -31,6 +33,7 @@ def plan(
     track: TrackFile = None,
     seed: Seed = None,
     motion: Motion = None,
+    set_: Set = None,
     with_: Annotated[
         str | None, typer.Option("--with", help="repertoire: search over recorded actions")
     ] = None,
@@ -52,8 +55,8 @@ def plan(
     if with_ not in {None, "repertoire"}:
         raise InputError(f"--with {with_}: no such planner; there is: repertoire")
     if with_ is not None:
-        if motion is not None or track is not None or seed is not None:
-            raise InputError("--with repertoire: takes no --motion, --track or --seed")
+        if motion is not None or track is not None or seed is not None or set_:
+            raise InputError("--with repertoire: takes no --motion, --track, --seed or --set")
         _plan_with_repertoire(
             run, repertoire=repertoire, robot=robot, world=world, beam=beam, physics=physics,
             out=out, carry=carry, force=force, as_json=as_json,
@@ -64,7 +67,10 @@ def plan(
     from snakewalk.controller.app.runs.factory import prepare_walk  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.terrain.summary import path_relief, path_warnings  # noqa: PLC0415
 
-    prepared = prepare_walk(run, seed=seed, motion=motion, robot=robot, world=world, track=track)
+    prepared = prepare_walk(
+        run, keys=key_values("--set", set_), seed=seed, motion=motion, robot=robot, world=world,
+        track=track,
+    )  # fmt: skip
     ahead = prepared.forecast()
     found: dict[str, object] = {
         "run": prepared.run.name,

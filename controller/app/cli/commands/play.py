@@ -12,7 +12,9 @@ from snakewalk.controller.app.cli.options import (
     Robot,
     RunFolder,
     RunPort,
+    Set,
     World,
+    key_values,
     show,
     write_artifacts,
 )
@@ -26,6 +28,7 @@ def play(
     speed: Annotated[
         str, typer.Option(help="times the animal's own; auto: as fast as the joints can, at most 1")
     ] = "auto",
+    set_: Set = None,
     port: RunPort = None,
     film: Film = True,
     out: RunFolder = None,
@@ -37,7 +40,9 @@ def play(
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_playback  # noqa: PLC0415
 
-    prepared = prepare_playback(track, robot=robot, world=world, speed=_speed(speed))
+    prepared = prepare_playback(
+        track, robot=robot, world=world, speed=_speed(speed), keys=key_values("--set", set_)
+    )
     with (
         run_folder(f"play-{prepared.run.name}", out) as folder,
         TimeBar(prepared.run.name, prepared.duration_s) as bar,

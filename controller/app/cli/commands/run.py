@@ -20,8 +20,10 @@ from snakewalk.controller.app.cli.options import (
     RunName,
     RunPort,
     Seed,
+    Set,
     TrackFile,
     World,
+    key_values,
     show,
     write_artifacts,
 )
@@ -39,6 +41,7 @@ def run(
     pose: Annotated[
         str | None, typer.Option(help="what measures the head: simulator, camera or joints")
     ] = None,
+    set_: Set = None,
     out: RunFolder = None,
     compliance: Compliant = None,
     film: Film = True,
@@ -54,8 +57,9 @@ def run(
 
     check_look(look)
     prepared = prepare_walk(
-        run, seed=seed, motion=motion, robot=robot, world=world, track=track, pose=pose
-    )
+        run, keys=key_values("--set", set_), seed=seed, motion=motion, robot=robot, world=world,
+        track=track, pose=pose,
+    )  # fmt: skip
     prepared = replace(prepared, run=with_compliance(prepared.run, compliance))
     changed = [Path(each).stem for each in (robot, world, track) if each is not None]
     parts = [prepared.run.name, *changed, prepared.run.motion, f"seed{prepared.run.seed}"]

@@ -13,8 +13,10 @@ from snakewalk.controller.app.cli.options import (
     Robot,
     RunName,
     Seed,
+    Set,
     TrackFile,
     World,
+    key_values,
     show,
 )
 from snakewalk.controller.app.result_files import atomic_write, check_picture, refuse_to_overwrite
@@ -40,6 +42,7 @@ def synthesise(
             help="walk; walk-printed: aimed as [PT] prints it; kp: the older state graph of [KP]"
         ),
     ] = None,
+    set_: Set = None,
     frames: Annotated[
         int | None, typer.Option(min=2, help="exactly so many; default: to the last waypoint")
     ] = None,
@@ -57,8 +60,9 @@ def synthesise(
     from snakewalk.controller.app.runs.factory import prepare_walk  # noqa: PLC0415
 
     prepared = prepare_walk(
-        run, on_paper=True, seed=seed, motion=motion, robot=robot, world=world, track=track
-    )
+        run, keys=key_values("--set", set_), on_paper=True, seed=seed, motion=motion, robot=robot,
+        world=world, track=track,
+    )  # fmt: skip
     if prepared.run.motion not in _SYNTHESISED:
         raise InputError(f"--motion {prepared.run.motion}: {', '.join(_SYNTHESISED)}")
     name = Path(prepared.run.name) if output is None else output

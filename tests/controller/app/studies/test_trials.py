@@ -129,6 +129,14 @@ def test_keys_replace_values_of_the_three_files() -> None:
     assert found.world.friction.across == plain.world.friction.across
 
 
+def test_keys_replace_values_of_a_gait_s_files() -> None:
+    """The digest tells the rows of a kept table apart."""
+    cases = [Case("rolling", "gait", keys=(("world.friction.across", v),)) for v in (0.3, 0.6)]
+    found = [prepare_case(case, 3, 0.0, {}) for case in cases]
+    assert [each.world.friction.across for each in found] == [0.3, 0.6]
+    assert study.config_digest(cases[0], {}) != study.config_digest(cases[1], {})
+
+
 @pytest.mark.parametrize(
     ("key", "value", "fault"),
     [
