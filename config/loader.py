@@ -12,6 +12,7 @@ from typing import Any, Final, Literal, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticSerializationError, to_json
 
+from snakewalk.config.base import NAME_PATTERN
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.gait import GaitSetConfig
 from snakewalk.config.robot import RobotConfig
@@ -210,7 +211,8 @@ def _line(model: type[BaseModel], path: str, text: str, fault: dict[str, Any]) -
         "tuple_type": "must be a list: [ ... ]",
         "model_type": "must be a table",
         "union_tag_invalid": f"kind {tag!r} is none of {known}",
-        "string_pattern_mismatch": "holds '/', a control character or a leading dot",
     }
+    if context.get("pattern") == NAME_PATTERN:
+        said["string_pattern_mismatch"] = "holds '/', a control character or a leading dot"
     what = said.get(str(fault["type"]), str(fault["msg"]).removeprefix("Value error, "))
     return f"{path}: {where}: {what}{shown}" if where else f"{path}: {what}{shown}"

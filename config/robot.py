@@ -215,6 +215,8 @@ class LimbJoint(NamedTuple):
     side: Literal["left", "right"]
     place: int
     """0 at the hip."""
+    has_foot: bool
+    """Whether the link behind it ends in the foot."""
 
 
 class RobotConfig(Strict):
@@ -393,7 +395,7 @@ class RobotConfig(Strict):
     def limb_joints(self) -> tuple[LimbJoint, ...]:
         """Joints of the legs in the order of the bus, behind those of the spine."""
         return tuple(
-            LimbJoint(index, side, place)
+            LimbJoint(index, side, place, place == len(pair.joint_axes) - 1)
             for index, pair in enumerate(self.limbs)
             for side in _SIDES
             for place in range(len(pair.joint_axes))

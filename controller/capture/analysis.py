@@ -131,7 +131,7 @@ class Analysis:
         angle, lateral = self.undulation.angle_rad, self.undulation.lateral
         at = [0, 25, 50, 75, 99]
         no_wave, no_pulse = wave.not_told, self.pulse_not_told
-        points, correlation = (None, None) if self.error_slope is None else self.error_slope
+        points, correlation = self.error_slope or (None, None)
         rms = np.sqrt(np.nanmean(pulse.body_error_rad**2)) if known.any() else np.nan
 
         def of_wave(value: float) -> float | None:

@@ -1,6 +1,7 @@
 """Base of the gaits: joint angles over a phase, the joints that they need, and their source."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -51,6 +52,14 @@ class Needs:
                 f"{what} needs two pairs of legs; robot {robot.name} has {len(robot.limbs)} "
                 "(tables [[limbs]])"
             )
+
+
+def fitting_robot(needs: Iterable[Needs]) -> str:
+    """Name of the shipped robot that has the joints which all of some motions need."""
+    wanted = list(needs)
+    if any(each.legs for each in wanted):
+        return "salamander"
+    return "alternating16" if any(each.pitch for each in wanted) else "yaw16"
 
 
 Frequency = Annotated[float, Field(ge=0.0, le=2.0, description="cycles a second")]

@@ -164,6 +164,11 @@ def decode_state(data: Bytes, zero: Floats, scale: Floats, out: Floats) -> None:
         out[2, row] = (_signed(data, row, 6, 4) - zero[row]) * scale[2, row] + 0.0
 
 
+def voltages_v(blocks: Bytes) -> Floats:
+    """Supply (n,) of slow blocks (n, 3): Present Input Voltage is the first two bytes."""
+    return np.asarray((blocks[:, 1].astype(np.uint16) << 8 | blocks[:, 0]) * VOLTAGE_UNIT_V)
+
+
 class Readings:
     """Newest value of every quantity of J joints; NaN before the first."""
 
@@ -213,8 +218,7 @@ class Readings:
     def update_slow(self, reply: GroupReadReply, measured_at_s: float) -> None:
         """Take the slow blocks: Present Input Voltage (2 bytes), Present Temperature (1)."""
         ok = reply.valid
-        low, high = reply.data[ok, 0], reply.data[ok, 1].astype(np.uint16)
-        self._voltage[ok] = (high << 8 | low) * VOLTAGE_UNIT_V
+        self._voltage[ok] = voltages_v(reply.data[ok])
         self._temperature[ok] = reply.data[ok, 2]
         self._slow_at_s[ok] = measured_at_s
 

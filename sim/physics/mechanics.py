@@ -108,7 +108,7 @@ def foot_geoms(model: mujoco.MjModel, robot: RobotConfig) -> list[int]:
     return [
         model.geom(f"foot{robot.link_count + k}").id
         for k, joint in enumerate(robot.limb_joints)
-        if joint.place == len(robot.limbs[joint.pair].joint_axes) - 1
+        if joint.has_foot
     ]
 
 

@@ -114,6 +114,21 @@ def _collect(
         qfrc[3 + k] += rotation[1, k] * m0 + rotation[1, 3 + k] * m1 + rotation[1, 6 + k] * m2
 
 
+def _sliding_link(
+    integers: NDArray[np.int32],
+    at: int,
+    geom_body: NDArray[np.int32],
+    role: NDArray[np.int32],
+) -> int:
+    """Link whose belly meets the ground in a contact, whose geoms stand at ``at``; -1: no such.
+
+    An obstacle's and a foot's have MuJoCo's own friction, two links' none.
+    """
+    if role[integers[at]] != GROUND or role[integers[at + 1]] == FOOT:
+        return -1
+    return int(geom_body[integers[at + 1]]) - 1
+
+
 def _add_friction(
     contacts: tuple[Any, ...],
     qfrc: Floats,
@@ -137,18 +152,16 @@ def _add_friction(
     still = stop_drag(centre[1 : spine + 1], mass_kg, radius_m, step_s)
     depth[:] = 0.0
     for c in range(count):
-        pair = integers[2 * size * c + at_geom : 2 * size * c + at_geom + 2]
-        if role[pair[0]] != GROUND or role[pair[1]] == FOOT:
-            continue  # an obstacle's or a foot's, with MuJoCo's own friction, or two links'
-        i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
+        i = _sliding_link(integers, 2 * size * c + at_geom, geom_body, role)
+        if i < 0:
+            continue
         depth[i] += max(-reals[size * c + at_dist], LEAST_DEPTH_M)
     _move(v, w, before, qvel, chain, parents, step_s)
     wrench[:] = 0.0
     for c in range(count):
-        pair = integers[2 * size * c + at_geom : 2 * size * c + at_geom + 2]
-        if role[pair[0]] != GROUND or role[pair[1]] == FOOT:
+        i = _sliding_link(integers, 2 * size * c + at_geom, geom_body, role)
+        if i < 0:
             continue
-        i = geom_body[integers[2 * size * c + at_geom + 1]] - 1
         share = max(-reals[size * c + at_dist], LEAST_DEPTH_M) / depth[i]
         p = reals[size * c + at_place : size * c + at_place + 3]
         n = reals[size * c + at_up : size * c + at_up + 3]
@@ -353,6 +366,7 @@ register_jitable(_move)
 
 register_jitable(_collect)
 
+register_jitable(_sliding_link)
 register_jitable(_add_friction)
 
 register_jitable(_weigh)

@@ -268,7 +268,7 @@ def _legs(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
         end = pair.segments_m[joint.place] * (1.0 if joint.side == "left" else -1.0)
         thick = pair.foot_radius_m
         _add(body, _CAPSULE, (thick, 0, 0), (), BACK[k % 2], (0, 0, 0, 0, end, 0))
-        if joint.place == len(pair.joint_axes) - 1:
+        if joint.has_foot:
             _add(body, _SPHERE, (1.02 * thick, 0, 0), (0, end, 0), HEAD)
 
 

@@ -28,7 +28,7 @@ from snakewalk.controller.app.runs.prepared_run import PreparedRun
 from snakewalk.controller.app.runs.source_run import MakeSource, SourceRun
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.capture.readers.load import track_beside
-from snakewalk.controller.gaits.gait import Gait
+from snakewalk.controller.gaits.gait import Gait, fitting_robot
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.drivers.bus.budget import chain_budget
@@ -207,9 +207,8 @@ def prepare_gait(
     changes = [(at_s, _gait_by_name(other, values)[0]) for at_s, other, values in then]
     gaits = [gait, *(other for _, other in changes)]
     pitch = any(each.needs.pitch for each in gaits)
-    legs = any(each.needs.legs for each in gaits)
-    own = "salamander" if legs else "alternating16" if pitch else "yaw16"
-    body = _with_keys_of("robot", load_robot(robot or own), keys)
+    own = robot or fitting_robot(each.needs for each in gaits)
+    body = _with_keys_of("robot", load_robot(own), keys)
     for each in gaits:
         each.check(body)
     run = checked(

@@ -117,7 +117,8 @@ def find_servos(port: BytePort, latency_s: float) -> dict[int, str]:
     """
     bus = DynamixelBus(port, latency_s=latency_s)
     found = bus.scan()
-    shared = [str(each) for each in found if bus.probe(each).doubled or bus.probe(each).damaged]
+    probes = [bus.probe(each) for each in found]
+    shared = [str(probe.servo_id) for probe in probes if probe.doubled or probe.damaged]
     if shared:
         raise InputError(
             f"{port.name}: replies of ID {', '.join(shared)} come doubled or damaged: two servos "

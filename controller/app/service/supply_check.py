@@ -8,9 +8,9 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.app.service.finding import Finding
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.joint_codec import voltages_v
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import DriverError
-from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.types import JointCommand
@@ -45,8 +45,7 @@ def supply_under_load(bus: DynamixelBus, robot: RobotConfig, safety: SafetyConfi
                 goal = start.position_rad + _AMPLITUDE_RAD * math.sin(phase)
                 link.write(JointCommand(time_s, goal))
                 reply = voltage.read()
-                raw = reply.data[:, 0].astype(float) + 256.0 * reply.data[:, 1]
-                measured_v = np.where(reply.valid, raw * VOLTAGE_UNIT_V, np.inf)
+                measured_v = np.where(reply.valid, voltages_v(reply.data), np.inf)
                 lowest_v = np.minimum(lowest_v, measured_v)
     except DriverError as fault:
         return Finding(check, "fail", f"the wiggle ended: {fault}", "remove the cause first")

@@ -68,6 +68,7 @@ ROWS = [
     ("plan flat-square --set seed=3", "did you mean run.seed?"),
     ("plan flat-square --set run.behavior.sliding=0", "did you mean behaviour?"),
     ("plan flat-square --set run.name=../x", "name: holds '/'"),
+    ("plan flat-square --set robot.joint_axes=yxy", "should match pattern '^[yp]*$'"),
     ("plan flat-slalom --with repertoire --set run.seed=3", "takes no --motion"),
     ("play worm-like --set run.robot=yaw16", "run.robot: is given by --robot"),
     ("play worm-like --set world.friction.along=-1", "world flat: friction.along: "),

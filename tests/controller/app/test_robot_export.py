@@ -99,3 +99,13 @@ def test_show_says_what_each_joint_is(tmp_path: Path) -> None:
     assert [each["sign"] for each in shown["joints"]] == [-1, 1]
     plain = CliRunner().invoke(app, ["robot", "show", str(file)]).stdout
     assert "XM430-W350" in plain
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+def test_show_knows_every_joint_of_every_shipped_robot(robot: RobotConfig) -> None:
+    ran = CliRunner().invoke(app, ["robot", "show", robot.name, "--json"])
+    assert ran.exit_code == 0
+    shown = json.loads(ran.stdout)
+    assert [each["id"] for each in shown["joints"]] == list(robot.servo_ids)
+    assert "".join(each["axis"] for each in shown["joints"]) == robot.all_axes
+    assert shown["links"] == robot.link_count

@@ -54,17 +54,16 @@ def show_robot(name: RobotName, as_json: Json = False) -> None:
             "limit_rad": limit,
         }
         for k, (axis, i, m, s, z, limit) in enumerate(
-            zip(robot.joint_axes, *columns, strict=True), start=1
+            zip(robot.all_axes, *columns, strict=True), start=1
         )
     ]
-    links = robot.joint_count + 1
     facts: dict[str, object] = {
         "robot": robot.name,
-        "links": links,
+        "links": robot.link_count,
         "link_length_m": robot.link_length_m,
         "body_radius_m": robot.body_radius_m,
         "length_m": round(robot.length_m, 4),
-        "mass_kg": round(links * robot.link_mass_kg, 4),
+        "mass_kg": round(robot.mass_kg, 4),
         "baud": robot.servo.baud,
         "supply_v": robot.servo.supply_v,
     }
