@@ -1,17 +1,38 @@
-"""The configuration's reference, from the schema: ``python -m snakewalk.config.document``."""
+"""The configuration's reference, from the schema: ``python -m snakewalk.config.document``.
 
+The same as JSON Schema: with it editors complete and check files while one writes.
+"""
+
+from collections.abc import Mapping
 from itertools import takewhile
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from snakewalk.config.faults import FaultPlan
+from snakewalk.config.gait import GaitSetConfig
 from snakewalk.config.loader import Kind, locate, shipped
+from snakewalk.config.recording import RecordingConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
+from snakewalk.config.skin import SkinConfig
+from snakewalk.config.synthesis import SynthesisConfig
 from snakewalk.config.world import WorldConfig
+
+SCHEMAS: Final[Mapping[str, type[BaseModel]]] = {
+    "run": RunConfig,
+    "robot": RobotConfig,
+    "world": WorldConfig,
+    "synthesis": SynthesisConfig,
+    "gait": GaitSetConfig,
+    "recording": RecordingConfig,
+    "skin": SkinConfig,
+    "faults": FaultPlan,
+}
+"""Model by the name of its file; a synthesis is also a table of a run."""
 
 _HEAD = """# Configuration
 
@@ -36,6 +57,25 @@ pulse_body_lengths_s = 0.2       [servo]
                                  gear_drag_n_m_s = 0.006
 ```
 
+`snakewalk init mine` writes a run, a robot and a world to change, each with every key, its
+default and its meaning (`--robot`, `--from RUN`: like another one), and `snakewalk run
+mine/run.toml` runs them as they are.
+
+**In an editor.** `snakewalk schema run` (`robot`, `world`, `synthesis`, `gait`, `recording`,
+`skin`, `faults`) prints the JSON Schema of such a file. `init` writes those of its three files
+into `mine/schema/` and names them in each file's first line, `#:schema schema/run.json`: that is
+all that the extension *Even Better TOML* of VS Code needs, and `taplo check run.toml` on a
+command line, to complete keys, show their meaning and mark what is wrong. For files elsewhere a
+`.taplo.toml` says it:
+
+```
+[[rule]]
+include = ["robots/*.toml"]
+schema.path = "schema/robot.json"
+```
+
+What holds between keys (a walk needs waypoints, IDs differ) only `snakewalk plan` tells.
+
 Units are in the names: `_m`, `_rad`, `_s`, `_a` (ampere), `_v`, `_c` (Celsius), `_kg`, `_n_m`.
 This page is written from the schema by `python -m snakewalk.config.document`; a test keeps it true.
 """
@@ -50,6 +90,20 @@ def reference() -> str:
     for kind in kinds:
         parts += _shipped(kind)
     return "\n".join(parts)
+
+
+def json_schema(kind: str) -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a kind of file: keys, types, ranges, words on each.
+
+    What holds between keys (waypoints of a walk, IDs that differ) only the loader knows.
+    """
+    model = SCHEMAS[kind]
+    head = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": f"snakewalk: {kind}",
+        "description": (model.__doc__ or "").partition("\n")[0],
+    }
+    return model.model_json_schema() | head
 
 
 def _shipped(kind: Kind) -> list[str]:
@@ -78,8 +132,8 @@ def _tables(title: str, model: type[BaseModel]) -> list[str]:
     ]
     inner: list[str] = []
     for name, field in model.model_fields.items():
-        nested = _models(field.annotation)
-        row = _row_model(field.annotation)
+        nested = table_models(field.annotation)
+        row = row_model(field.annotation)
         if row is not None:
             place = _title(title, name, row, 1).replace("`[", "`[[").replace("]`", "]]`")
             inner += _tables(place, row)
@@ -89,17 +143,15 @@ def _tables(title: str, model: type[BaseModel]) -> list[str]:
             continue
         default = "required" if field.is_required() else f"`{_text(field.default)}`"
         description = field.description or ""
-        lines.append(
-            f"| `{name}` | {_kind(field.annotation)}{_bounds(field)} | {default} | {description} |"
-        )
+        lines.append(f"| `{name}` | {value_kind(field)} | {default} | {description} |")
     return [*lines, "", *inner]
 
 
-def _row_model(annotation: Any) -> type[BaseModel] | None:
-    """Schema of the rows where a key is a list of tables."""
+def row_model(annotation: Any) -> type[BaseModel] | None:
+    """Return the schema of the rows where a key is a list of tables."""
     if get_origin(annotation) is not tuple:
         return None
-    return next(iter(_models(get_args(annotation)[0])), None)
+    return next(iter(table_models(get_args(annotation)[0])), None)
 
 
 def _title(title: str, name: str, model: type[BaseModel], choices: int) -> str:
@@ -115,13 +167,14 @@ def _sentence(model: type[BaseModel]) -> str:
     return (model.__doc__ or "").strip().partition("\n")[0]
 
 
-def _models(annotation: Any) -> list[type[BaseModel]]:
+def table_models(annotation: Any) -> list[type[BaseModel]]:
+    """Schemas of the tables that a key may hold."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     if get_origin(annotation) is Annotated:
-        return _models(get_args(annotation)[0])
+        return table_models(get_args(annotation)[0])
     if get_origin(annotation) in {Union, UnionType}:
-        return [model for part in get_args(annotation) for model in _models(part)]
+        return [model for part in get_args(annotation) for model in table_models(part)]
     return []
 
 
@@ -141,6 +194,11 @@ def _kind(annotation: Any) -> str:
         return "table"
     names = {float: "number", int: "whole number", str: "text", bool: "true or false"}
     return names.get(annotation, str(annotation))
+
+
+def value_kind(field: FieldInfo) -> str:
+    """What a key takes, in words, with its bounds."""
+    return f"{_kind(field.annotation)}{_bounds(field)}"
 
 
 def _bounds(field: FieldInfo) -> str:

@@ -27,13 +27,13 @@ def _is_rows(value: Any) -> bool:
 
 
 def _line(key: str, value: Any) -> str:
-    return f"{key} = {_text(value)}"
+    return f"{key} = {toml_value(value)}"
 
 
-def _text(value: Any) -> str:
+def toml_value(value: Any) -> str:
     """A value as TOML writes it: text, numbers and lists as JSON does."""
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, tuple | list):
-        return f"[{', '.join(map(_text, value))}]"
+        return f"[{', '.join(map(toml_value, value))}]"
     return json.dumps(value, ensure_ascii=False)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 from typer import rich_utils
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from snakewalk.controller.app.cli.commands.analyse import analyse
 from snakewalk.controller.app.cli.commands.body import body
@@ -22,16 +22,18 @@ from snakewalk.controller.app.cli.commands.bus import (
 from snakewalk.controller.app.cli.commands.calibrate import calibrate
 from snakewalk.controller.app.cli.commands.capture import capture
 from snakewalk.controller.app.cli.commands.doctor import doctor
+from snakewalk.controller.app.cli.commands.files.init import init
+from snakewalk.controller.app.cli.commands.files.schema import schema
 from snakewalk.controller.app.cli.commands.fish import film, match, synthesise
 from snakewalk.controller.app.cli.commands.gait import list_gaits, show_gait
 from snakewalk.controller.app.cli.commands.gait_fit import fit_gait
 from snakewalk.controller.app.cli.commands.gait_run import run_gait
 from snakewalk.controller.app.cli.commands.listing import export_robot, list_, show_robot
+from snakewalk.controller.app.cli.commands.logs.replay import replay
+from snakewalk.controller.app.cli.commands.logs.report import report
 from snakewalk.controller.app.cli.commands.plan import plan
 from snakewalk.controller.app.cli.commands.play import play
 from snakewalk.controller.app.cli.commands.repertoire import record, run_plan, show_file
-from snakewalk.controller.app.cli.commands.replay import replay
-from snakewalk.controller.app.cli.commands.report import report
 from snakewalk.controller.app.cli.commands.run import run
 from snakewalk.controller.app.cli.commands.scan import scan
 from snakewalk.controller.app.cli.commands.sweep import sweep
@@ -40,6 +42,7 @@ from snakewalk.controller.app.cli.commands.track import track
 from snakewalk.controller.app.cli.commands.trials import trials
 from snakewalk.controller.app.cli.commands.tune import tune
 from snakewalk.controller.app.cli.commands.walk import walk
+from snakewalk.controller.app.cli.options import check_files
 
 _JOB, _MOTION, _RECORDINGS, _BUS = "The job", "Motion", "Recordings", "The bus"
 """Groups of the commands in ``--help``."""
@@ -58,7 +61,25 @@ class _Commands(TyperGroup):
             raise SystemExit(130) from None
 
 
-app = typer.Typer(
+class _Command(TyperCommand):
+    """A command; faults in the files that it names are told before anything heavy is imported."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Check the files of run, robot and world, then run the command."""
+        named = {key: value for key, value in ctx.params.items() if isinstance(value, str)}
+        check_files(named.get("run"), named.get("robot"), named.get("world"))
+        return super().invoke(ctx)
+
+
+class _App(typer.Typer):
+    """Commands with this check."""
+
+    def command(self, *args: Any, **options: Any) -> Any:
+        """Register a command."""
+        return super().command(*args, cls=_Command, **options)
+
+
+app = _App(
     cls=_Commands,
     no_args_is_help=True,
     rich_markup_mode="rich",
@@ -88,6 +109,15 @@ def _examples(*lines: str) -> str:
 
 
 app.command("list", epilog=_examples("list --json"), rich_help_panel=_JOB)(list_)
+
+app.command(
+    epilog=_examples("init mine", "init mine --robot xl330-16", "init mine --from ramp-10-up"),
+    rich_help_panel=_JOB,
+)(init)
+
+app.command(epilog=_examples("schema run", "schema robot -o robot.json"), rich_help_panel=_JOB)(
+    schema
+)
 
 app.command(
     epilog=_examples(
@@ -178,7 +208,7 @@ app.command(
     epilog=_examples("calibrate --robot alternating16 -o my-robot.toml"), rich_help_panel=_BUS
 )(calibrate)
 
-bus = typer.Typer(no_args_is_help=True, help="Servos and their settings.")
+bus = _App(no_args_is_help=True, help="Servos and their settings.")
 
 app.add_typer(bus, name="bus", rich_help_panel=_BUS)
 
@@ -215,7 +245,7 @@ app.command(
     rich_help_panel=_MOTION,
 )(play)
 
-gait_app = typer.Typer(no_args_is_help=True, help="Gaits: list, show, run, fit.")
+gait_app = _App(no_args_is_help=True, help="Gaits: list, show, run, fit.")
 
 app.add_typer(gait_app, name="gait", rich_help_panel=_MOTION)
 
@@ -239,7 +269,7 @@ gait_app.command(
     epilog=_examples("gait fit CURVE.csv --picture fit.png", "gait fit CURVE.csv -o joints.npz"),
 )(fit_gait)
 
-robot_app = typer.Typer(no_args_is_help=True, help="A robot: show it, export it.")
+robot_app = _App(no_args_is_help=True, help="A robot: show it, export it.")
 
 app.add_typer(robot_app, name="robot", rich_help_panel=_JOB)
 
@@ -251,7 +281,7 @@ robot_app.command(
     "export", epilog=_examples("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml")
 )(export_robot)
 
-fish_app = typer.Typer(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
+fish_app = _App(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
 
 app.add_typer(fish_app, name="fish", rich_help_panel=_RECORDINGS)
 
@@ -273,7 +303,7 @@ fish_app.command(
     epilog=_examples("fish film tank --side", "fish film eel --motion MIDLINES.csv --build eel")
 )(film)
 
-repertoire = typer.Typer(no_args_is_help=True, help="Actions recorded from the physics.")
+repertoire = _App(no_args_is_help=True, help="Actions recorded from the physics.")
 
 app.add_typer(repertoire, name="repertoire", rich_help_panel=_MOTION)
 

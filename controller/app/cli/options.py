@@ -64,6 +64,27 @@ Set = Annotated[
 ]
 
 
+def check_files(run: str | None, robot: str | None, world: str | None) -> None:
+    """Load the files of a user's own that a command names; shipped ones have no faults.
+
+    The robot and the world are those of the run where none is given.
+
+    Raises:
+        ConfigError: every fault of the first file that has one.
+
+    """
+    from snakewalk.config.loader import load_robot, load_run, load_world  # noqa: PLC0415  --help stays quick
+
+    beside = None
+    if run is not None and run.endswith(".toml"):
+        beside, given = Path(run).parent, load_run(run)
+        robot, world = robot or given.robot, world or given.world
+    if robot is not None and robot.endswith(".toml"):
+        load_robot(robot, beside)
+    if world is not None and world.endswith(".toml"):
+        load_world(world, beside)
+
+
 def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") -> dict[str, Any]:
     """Read an option's KEY=VALUE pairs, the last of a key; a value is JSON, or else text.
 

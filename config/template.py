@@ -1,0 +1,98 @@
+"""A configuration as a TOML file to begin with: its values, and every other key as a comment."""
+
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any, Final, Literal, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from snakewalk.config.document import row_model, table_models, value_kind
+from snakewalk.config.robot_file import toml_value
+
+_COLUMN: Final = 42
+"""Where the words behind a key begin."""
+
+
+def template(config: BaseModel, comment: str, without: Collection[str] = ()) -> str:
+    """Text of a TOML file that reads back to ``config`` and shows what else could be said.
+
+    Keys with their default stand as comments; ``comment`` is the head of the file; the tables
+    ``without`` are left out.
+    """
+    lines = [f"# {line}".rstrip() for line in comment.splitlines()]
+    values = config.model_dump()
+    given = config.model_dump(exclude_defaults=True)
+    lines += _table(type(config), values, given, "", without)
+    return "\n".join(lines) + "\n"
+
+
+def _table(
+    model: type[BaseModel],
+    values: Mapping[str, Any],
+    given: Mapping[str, Any] | None,
+    place: str,
+    without: Collection[str] = (),
+) -> Iterator[str]:
+    """Lines of a table, then of the tables in it; all are comments where nothing is given."""
+    inner: list[str] = []
+    for key, field in model.model_fields.items():
+        where = f"{place}.{key}".removeprefix(".")
+        row, choices = row_model(field.annotation), table_models(field.annotation)
+        if key in without:
+            continue
+        if row is not None:
+            inner += _rows(row, (given or {}).get(key, ()), where)
+        elif choices:
+            inner += _inner(field, choices, values.get(key), (given or {}).get(key), where)
+        else:
+            value = values.get(key, field.default)
+            is_kind = (
+                get_origin(field.annotation) is Literal and len(get_args(field.annotation)) == 1
+            )
+            yield _line(key, value, field, given is not None and (key in given or is_kind))
+    yield from inner
+
+
+def _inner(
+    field: FieldInfo, choices: list[type[BaseModel]], values: Any, given: Any, where: str
+) -> Iterator[str]:
+    """A table in a table; of several kinds the one that is there, else the first, as comments."""
+    kinds = [str(one.model_fields["kind"].default) for one in choices if "kind" in one.model_fields]
+    model = choices[0] if values is None else _kind_of(choices, values)
+    yield ""
+    if len(kinds) > 1:
+        yield f"# kinds of {where}: {', '.join(kinds)}; their keys: docs/configuration.md"
+    elif model.__doc__:
+        yield f"# {model.__doc__.splitlines()[0]}"
+    is_there = (
+        values is not None
+    )  # an empty table then, so that its keys are not taken for another's
+    yield f"[{where}]" if is_there else f"# [{where}]"
+    yield from _table(model, values or {}, (given or {}) if is_there else None, where)
+
+
+def _kind_of(choices: list[type[BaseModel]], values: Mapping[str, Any]) -> type[BaseModel]:
+    """The schema whose ``kind`` a table has."""
+    return next(
+        one
+        for one in choices
+        if len(choices) == 1 or one.model_fields["kind"].default == values["kind"]
+    )
+
+
+def _rows(model: type[BaseModel], rows: Sequence[Mapping[str, Any]], where: str) -> Iterator[str]:
+    """Tables of which there may be several; one as comments where there is none."""
+    for row in rows or ({},):
+        yield ""
+        yield f"[[{where}]]" if row else f"# [[{where}]]"
+        yield from _table(model, row, row or None, where)
+
+
+def _line(key: str, value: Any, field: FieldInfo, is_given: bool) -> str:
+    shown = "" if value is None or value is PydanticUndefined else toml_value(value)
+    left = f"{key} = {shown}" if is_given else f"# {key} = {shown}".rstrip()
+    kind = re.sub(r"`(-?\d+)`", r"\1", value_kind(field)).replace("`", '"')
+    words = [kind, field.description or ""]
+    return f"{left:<{_COLUMN}} # {'; '.join(word for word in words if word)}"

@@ -1,0 +1,1 @@
+"""Commands that read logs of runs: page and film, the same goals again, runs side by side."""
