@@ -18,6 +18,8 @@ EXTRAS: Final = {
     "pygltflib": ("pygltflib", "vision"),
     "distributed": ("Dask", "sweep"),
     "dask": ("Dask", "sweep"),
+    "rosbags": ("rosbags", "export"),
+    "pyarrow": ("pyarrow", "export"),
 }
 """Module to (name of the package, extra of ``pyproject.toml`` that brings it)."""
 

@@ -90,6 +90,8 @@ NEEDY = [
     (("capture", "film.mp4"), "vision"),
     (("fish", "match", "film.mp4"), "vision"),
     (("fish", "film", "tank"), "vision"),
+    (("export", "log.mcap", "--ros2", "b.mcap"), "export"),
+    (("export", "log.mcap", "--parquet", "tables"), "export"),
     (("run", "flat-slalom", "--pose", "camera", "--port", "/dev/null"), "vision"),
 ]
 """Commands, and the extra that each needs."""
@@ -97,13 +99,14 @@ NEEDY = [
 ON_SERVOS = ("--port", "/dev/null", "--json")
 GAIT = ("gait", "run", "lateral-undulation", "--seconds", "2", "--out", "gait", *ON_SERVOS)
 JOB = ("run", "flat-slalom", "--motion", "serpenoid", "--pose", "joints", "--out", "j", *ON_SERVOS)
+EXPORT = ("export", "gait/log.mcap", "--csv", "tables", "--foxglove", "f.mcap", "--json")
 HELP = [(*words, "--help") for words in commands()]
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, ...], Result]:
     """Every command above, each once, in one interpreter: importing takes longer than running."""
-    words = [GAIT, JOB, *BASE, *(words for words, _ in NEEDY), *HELP]
+    words = [GAIT, JOB, EXPORT, *BASE, *(words for words, _ in NEEDY), *HELP]
     return dict(zip(words, call(tmp_path_factory.mktemp("base"), *words), strict=True))
 
 
@@ -117,6 +120,12 @@ def test_a_motion_runs_on_servos(results: dict[tuple[str, ...], Result]) -> None
     assert result["film"] is None
     assert "snakewalk: no film: films need MuJoCo and PyAV: pip install" in ran.err
     assert "snakewalk: no report: the report needs matplotlib: pip install" in ran.err
+
+
+def test_a_log_becomes_tables_and_a_scene(results: dict[tuple[str, ...], Result]) -> None:
+    ran = results[EXPORT]
+    assert ran.code == 0, ran.err
+    assert json.loads(ran.out)["written"]["tables/cycle.csv"] > 100
 
 
 def test_a_job_runs_on_servos_by_its_joints_alone(results: dict[tuple[str, ...], Result]) -> None:

@@ -29,6 +29,7 @@ from snakewalk.controller.app.cli.commands.gait import list_gaits, show_gait
 from snakewalk.controller.app.cli.commands.gait_fit import fit_gait
 from snakewalk.controller.app.cli.commands.gait_run import run_gait
 from snakewalk.controller.app.cli.commands.listing import export_robot, list_, show_robot
+from snakewalk.controller.app.cli.commands.logs.export import export
 from snakewalk.controller.app.cli.commands.logs.replay import replay
 from snakewalk.controller.app.cli.commands.logs.report import report
 from snakewalk.controller.app.cli.commands.plan import plan
@@ -140,6 +141,15 @@ app.command(epilog=_examples("report runs/flat-square-walk-seed0/log.mcap"), ric
 app.command(
     epilog=_examples("replay runs/flat-square-walk-seed0/log.mcap --json"), rich_help_panel=_JOB
 )(replay)
+
+app.command(
+    epilog=_examples(
+        "export runs/flat-square-walk-seed0/log.mcap --csv tables",
+        "export LOG --parquet tables --foxglove body.mcap",
+        "export LOG --ros2 bag.mcap --json",
+    ),
+    rich_help_panel=_JOB,
+)(export)
 
 app.command(
     epilog=_examples(

@@ -1,1 +1,1 @@
-"""Commands that read logs of runs: page and film, the same goals again, runs side by side."""
+"""Commands that read logs of runs: page and film, the same goals again, side by side, exports."""

@@ -1,0 +1,67 @@
+"""A short log of a body that is bent in yaw and pitch, thrown about in space."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.loader import load_robot, load_run, load_world
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runlog.record import PlanSummary, RunRecord
+from snakewalk.controller.runlog.writer import RunLog
+from snakewalk.drivers.types import BodyPose, JointState
+
+ROWS = 20
+
+
+@pytest.fixture(scope="session")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("export") / "log.mcap"
+    rng = np.random.default_rng(7)
+    run, robot, world = load_run("flat-square"), load_robot("alternating16"), load_world("flat")
+    joints = robot.joint_count
+    plan = PlanSummary(np.array([[0.0, 0.0], [2.0, 1.0]]), np.array([[2.0, 1.0]]), 0.3)
+    ground = HeightField(rng.normal(0.0, 0.1, (4, 5)), 0.7, -1.0, -1.0)
+    zeros = np.zeros(joints, dtype=np.uint8)
+    with RunLog(path) as file:
+        file.config(
+            *(run, robot, world),
+            backend="sim",
+            plan=plan,
+            ground=ground,
+            torque_constant_n_m_a=1.78,
+        )
+        file.event(0.0, "start", 'torque on; "quoted", ünïcode')
+        for k in range(ROWS):
+            time_s = 0.02 * k
+            angles = rng.uniform(-1.2, 1.2, joints)
+            state = JointState(
+                time_s,
+                np.where(np.arange(joints) == 15, np.nan, angles),  # one joint is never read
+                rng.normal(size=joints),
+                rng.normal(size=joints),
+                np.full(joints, 30.0 + k // 10),
+                np.full(joints, 12.0),
+                (np.arange(joints) == 3).astype(np.uint8) * 32 if k else zeros,
+                zeros,
+                np.zeros(joints),
+                np.ones(joints, dtype=bool),
+                np.zeros(joints),
+            )
+            file.cycle(time_s, angles, angles / 3.0, state, deadline_s=time_s, lateness_s=0.0)
+            turn = Rotation.random(random_state=k).as_matrix()
+            head = rng.normal(size=3)
+            angles[15] = 0.0
+            body = body_in_world(robot, BodyPose(time_s, head, turn), angles)
+            file.pose(time_s, head, turn, links_m=body.link_m, centre_m=body.centre_m)
+        file.path_replanned(0.2, [[0.0, 1.0, 0.5], [2.0, 2.0, 0.4]])
+        file.event(0.38, "trip", "joint 7: current", level="error")
+    return path
+
+
+@pytest.fixture(scope="session")
+def record(log: Path) -> RunRecord:
+    return read_log(log)
