@@ -29,6 +29,7 @@ from snakewalk.controller.app.cli.commands.gait import list_gaits, show_gait
 from snakewalk.controller.app.cli.commands.gait_fit import fit_gait
 from snakewalk.controller.app.cli.commands.gait_run import run_gait
 from snakewalk.controller.app.cli.commands.listing import export_robot, list_, show_robot
+from snakewalk.controller.app.cli.commands.logs.compare import compare
 from snakewalk.controller.app.cli.commands.logs.export import export
 from snakewalk.controller.app.cli.commands.logs.replay import replay
 from snakewalk.controller.app.cli.commands.logs.report import report
@@ -150,6 +151,14 @@ app.command(
     ),
     rich_help_panel=_JOB,
 )(export)
+
+app.command(
+    epilog=_examples(
+        "compare runs/flat-square-walk-seed0/log.mcap runs/flat-square-walk-seed1/log.mcap",
+        "compare runs/*/log.mcap --picture compared.png --json",
+    ),
+    rich_help_panel=_JOB,
+)(compare)
 
 app.command(
     epilog=_examples(

@@ -1,0 +1,95 @@
+"""Runs side by side: their numbers, what differs in their configurations, and their curves."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.metrics.path_error import path_error_m
+from snakewalk.controller.metrics.summary import RunSummary, summary
+from snakewalk.controller.metrics.tracking import tracking_error_rad
+from snakewalk.controller.runlog.record import RunRecord
+
+
+@dataclass(frozen=True, slots=True)
+class ComparedRun:
+    """What a comparison keeps of a log, which may be large."""
+
+    name: str
+    """That tells it from the others."""
+    summary: RunSummary
+    settings: Mapping[str, Any]
+    """Values of run, robot and world by dotted key, with the bus and the software."""
+    waypoints_m: Floats
+    """(w, 2)"""
+    waypoint_radius_m: float
+    centre_m: Floats
+    """(P, 2) track of the centre of mass."""
+    pose_s: Floats
+    """(P,) times of what the pose tells:"""
+    path_error_m: Floats
+    """(P,)"""
+    speed_m_s: Floats
+    """(P,)"""
+    cycle_s: Floats
+    """(T,) times of what the control cycles tell:"""
+    current_a: Floats
+    """(T,) of the joint with the highest, without its sign."""
+    tracking_rms_rad: Floats
+    """(T,) over the joints, measured minus sent."""
+
+
+def compared_run(record: RunRecord, name: str) -> ComparedRun:
+    """Keep of a record what is compared."""
+    header, pose, cycle = record.header, record.pose, record.cycle
+    settings: dict[str, Any] = {"bus": header.backend, "software": header.software}
+    for table, config in (("run", header.run), ("robot", header.robot), ("world", header.world)):
+        settings |= _flat(config.model_dump(mode="json"), table)
+    off_rad = tracking_error_rad(cycle)
+    known = np.isfinite(off_rad)
+    count = np.maximum(known.sum(axis=1), 1)
+    squares = np.where(known, off_rad, 0.0) ** 2
+    rms_rad = np.sqrt(squares.sum(axis=1) / count)
+    rms_rad[~known.any(axis=1)] = np.nan
+    current_a = np.where(np.isfinite(cycle.current_a), np.abs(cycle.current_a), -1.0)
+    largest_a = current_a.max(axis=1, initial=-1.0)
+    return ComparedRun(
+        name=name,
+        summary=summary(record),
+        settings=settings,
+        waypoints_m=header.plan.waypoints_m,
+        waypoint_radius_m=header.plan.waypoint_radius_m,
+        centre_m=pose.centre_m[:, :2],
+        pose_s=pose.time_s,
+        path_error_m=path_error_m(record),
+        speed_m_s=pose.speed_m_s,
+        cycle_s=cycle.time_s,
+        current_a=np.where(largest_a < 0.0, np.nan, largest_a),
+        tracking_rms_rad=rms_rad,
+    )
+
+
+def log_names(logs: Sequence[Path]) -> list[str]:
+    """Names that tell logs apart: the folder of ``log.mcap``, else the file, else the path."""
+    short = [log.absolute().parent.name if log.stem == "log" else log.stem for log in logs]
+    twice = {name for name, count in Counter(short).items() if count > 1}
+    return [str(log) if name in twice else name for log, name in zip(logs, short, strict=True)]
+
+
+def differing(runs: Sequence[ComparedRun]) -> dict[str, list[Any]]:
+    """Settings that are not the same in all runs, a value a run; None where one has no such key."""
+    keys = dict.fromkeys(key for run in runs for key in run.settings)
+    values = {key: [run.settings.get(key) for run in runs] for key in keys}
+    return {key: row for key, row in values.items() if any(one != row[0] for one in row)}
+
+
+def _flat(table: Mapping[str, Any], name: str) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        where = f"{name}.{key}"
+        found |= _flat(value, where) if isinstance(value, Mapping) else {where: value}
+    return found
