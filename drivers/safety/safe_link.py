@@ -2,6 +2,7 @@
 
 import signal
 import threading
+from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -23,9 +24,10 @@ the watchdogs would leave the servos holding with torque on."""
 class SafeLink:
     """A ``JointLink`` around another; use as a context manager, which switches torque off at exit.
 
-    On a veto, on an error of the link below, or on ``request_stop`` it latches: torque goes off,
-    ``tripped`` says why, ``write`` raises; ``read`` goes on, for the log. Only ``reset`` by an
-    operator and a new ``enable`` let it move again. Inside the context SIGTERM, SIGINT, SIGHUP,
+    On a veto, on an error of the link below, on ``request_stop``, or when ``stop_requested``
+    (called at each read and write) returns a reason, it latches: torque goes off, ``tripped`` says
+    why, ``write`` raises; ``read`` goes on, for the log. Only ``reset`` by an operator and a new
+    ``enable`` let it move again. Inside the context SIGTERM, SIGINT, SIGHUP,
     SIGQUIT and SIGTSTP unwind the program through the exit; if it is killed, the servos' bus
     watchdog stops them.
 
@@ -39,6 +41,7 @@ class SafeLink:
         limits: SafetyLimits,
         clock: Clock,
         recovery: Recovery[Any] | None = None,
+        stop_requested: Callable[[], str | None] = lambda: None,
     ) -> None:
         self.tripped: str | None = None
         """Why it has latched; None while it lets commands pass."""
@@ -54,6 +57,7 @@ class SafeLink:
         self._following = FollowingError(limits)
         self._memory: SafetyMemory | None = None
         self._stop_requested: str | None = None
+        self._asked_to_stop = stop_requested
         self._touched = False
         self._handlers: dict[signal.Signals, object] = {}
 
@@ -101,7 +105,7 @@ class SafeLink:
             DriverError: what the link below raises.
 
         """
-        self._refuse_if_tripped()
+        self._refuse_to_start()
         self._touched = True
         state = self._link.enable()
         self._state, self._memory = state, SafetyMemory.at_rest(state)
@@ -156,8 +160,9 @@ class SafeLink:
         self._refuse_if_tripped()
         if self._memory is None or self._state is None:
             raise SafetyTrippedError("torque is off: enable first")
-        if self._stop_requested is not None:
-            self._trip(self._stop_requested)
+        stop = self._stop()
+        if stop is not None:
+            self._trip(stop)
             self._refuse_if_tripped()
         if self._recovery is not None:
             # the program, or the machine, stood still between the read and here
@@ -199,7 +204,7 @@ class SafeLink:
         state = None
         if self._recovery is not None and self._memory is not None:
             try:
-                state = self._recovery.recover(reason, lambda: self._stop_requested)
+                state = self._recovery.recover(reason, self._stop)
             except DriverError as again:
                 fault = again
                 reason = f"{reason}; while going on: {again}"
@@ -214,7 +219,7 @@ class SafeLink:
 
     def _check(self, state: JointState, memory: SafetyMemory) -> None:
         fault, self._memory = check_state(state, memory, self._limits, self._clock.now_s())
-        fault = self._stop_requested or fault or self._following.update(state, memory.goal_rad)
+        fault = self._stop() or fault or self._following.update(state, memory.goal_rad)
         if fault is not None:
             self._trip(fault)
 
@@ -226,6 +231,17 @@ class SafeLink:
             self.disable()
         except DriverError as fault:
             self.tripped += f" (torque off failed: {fault})"
+
+    def _stop(self) -> str | None:
+        """Why somebody has asked for a stop; None where nobody has."""
+        return self._stop_requested or self._asked_to_stop()
+
+    def _refuse_to_start(self) -> None:
+        """Latch before torque is on where a stop was asked for; torque off is sent all the same."""
+        stop = None if self.tripped is not None else self._stop()
+        if stop is not None:
+            self._trip(stop)
+        self._refuse_if_tripped()
 
     def _refuse_if_tripped(self) -> None:
         if self.tripped is not None:

@@ -12,6 +12,7 @@ from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.drivers.types import JointCommand
 
 ROBOT = RobotConfig(name="trio", joint_axes="yyy")
@@ -25,7 +26,11 @@ def main(device: str, how: str) -> None:
     with SerialPort(device) as port:
         bus = DynamixelBus(port, latency_s=0.1)
         chain = ServoChain(bus, ROBOT, watchdog_s=WATCHDOG_S)
-        with SafeLink(chain, SafetyLimits.from_config(ROBOT, safety), port.clock) as link:
+        limits = SafetyLimits.from_config(ROBOT, safety)
+        with (
+            StopButton("swing", device) as button,
+            SafeLink(chain, limits, port.clock, stop_requested=button.pressed) as link,
+        ):
             link.enable()
             for tick in ticks(port.clock, 0.02, port.clock.now_s() + 60.0):
                 link.read()

@@ -9,6 +9,10 @@ from typer import rich_utils
 from typer.core import TyperCommand, TyperGroup
 
 from snakewalk.controller.app.cli.commands.analyse import analyse
+from snakewalk.controller.app.cli.commands.bench.calibrate import calibrate
+from snakewalk.controller.app.cli.commands.bench.doctor import doctor
+from snakewalk.controller.app.cli.commands.bench.scan import scan
+from snakewalk.controller.app.cli.commands.bench.stop import stop
 from snakewalk.controller.app.cli.commands.body import body
 from snakewalk.controller.app.cli.commands.bus import (
     backup,
@@ -19,9 +23,7 @@ from snakewalk.controller.app.cli.commands.bus import (
     serve,
     sniff,
 )
-from snakewalk.controller.app.cli.commands.calibrate import calibrate
 from snakewalk.controller.app.cli.commands.capture import capture
-from snakewalk.controller.app.cli.commands.doctor import doctor
 from snakewalk.controller.app.cli.commands.files.init import init
 from snakewalk.controller.app.cli.commands.files.schema import schema
 from snakewalk.controller.app.cli.commands.fish import film, match, synthesise
@@ -37,7 +39,6 @@ from snakewalk.controller.app.cli.commands.plan import plan
 from snakewalk.controller.app.cli.commands.play import play
 from snakewalk.controller.app.cli.commands.repertoire import record, run_plan, show_file
 from snakewalk.controller.app.cli.commands.run import run
-from snakewalk.controller.app.cli.commands.scan import scan
 from snakewalk.controller.app.cli.commands.sweep import sweep
 from snakewalk.controller.app.cli.commands.synthesise import synthesise as synthesise_walk
 from snakewalk.controller.app.cli.commands.track import track
@@ -134,6 +135,11 @@ app.command(
     epilog=_examples("run", "run flat-slalom --seed 3", "run my-run.toml --port /dev/ttyUSB0"),
     rich_help_panel=_JOB,
 )(run)
+
+app.command(
+    epilog=_examples("stop", "stop --port /dev/ttyUSB0 --json", "stop runs/flat-square-walk-seed0"),
+    rich_help_panel=_JOB,
+)(stop)
 
 app.command(epilog=_examples("report runs/flat-square-walk-seed0/log.mcap"), rich_help_panel=_JOB)(
     report

@@ -1,6 +1,7 @@
 """Carry out a prepared run: folder, log, link, loop, summary."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outco
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.stop_button import StopButton
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +47,7 @@ def execute(
     port: str | None = None,
     *,
     force: bool = False,
+    stoppable: bool = True,
     confirm: Callable[[str], bool] | None = None,
     on_progress: OnProgress = lambda progress: None,
     on_event: OnEvent = lambda kind, text: None,
@@ -52,9 +55,10 @@ def execute(
     """Run on ``port``, or on the simulator where it is None; nothing else differs.
 
     The folder is made; one that holds a run's files is refused without ``force``, which deletes
-    them when the new log begins. ``confirm`` asks an operator whether an interrupted chain may go
-    on (``safety.recovery``); ``on_progress`` is called after each cycle, ``on_event`` with what the
-    motion decides by itself: a slower rate, an operator's change.
+    them when the new log begins. A ``stoppable`` run has a button that ``snakewalk stop`` presses;
+    the simulated runs of a study have none. ``confirm`` asks an operator whether an interrupted
+    chain may go on (``safety.recovery``); ``on_progress`` is called after each cycle, ``on_event``
+    with what the motion decides by itself: a slower rate, an operator's change.
 
     Raises:
         InputError: the plan breaks a limit, the port is not there, the servos are not the robot's,
@@ -76,7 +80,8 @@ def execute(
     log_path = folder / LOG
     clear_run(folder)
     torque_constant_n_m_a, winding = _motor(prepared.robot)
-    with RunLog(log_path) as log:
+    made = StopButton(prepared.run.name, port, folder) if stoppable else nullcontext()
+    with made as button, RunLog(log_path) as log:
         log.config(
             prepared.run,
             prepared.robot,
@@ -106,7 +111,8 @@ def execute(
         limits = SafetyLimits.from_config(prepared.robot, safety)
         with pose_provider(prepared, backend, log_event) as pose:
             source = prepared.make_source(log_event)
-            link = SafeLink(backend.chain, limits, clock, recovery)
+            pressed = button.pressed if button is not None else lambda: None
+            link = SafeLink(backend.chain, limits, clock, recovery, pressed)
             drive = Drive(
                 link=link,
                 clock=clock,
@@ -123,6 +129,8 @@ def execute(
             )
             try:
                 outcome = drive.run()
+                if button is not None:
+                    button.end(outcome.tripped or "it had come to its end")
             except (KeyboardInterrupt, SystemExit) as stop:  # a signal: the link is closed by now
                 torque = "torque is off" if link.was_enabled else "torque was not switched on"
                 failed = getattr(stop, "__notes__", [])

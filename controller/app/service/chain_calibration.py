@@ -164,6 +164,7 @@ def calibrate(
     latency_s: float = 0.004,
     current_a: float = CURRENT_A,
     sweep: bool = True,
+    stop_requested: Callable[[], str | None] = lambda: None,
     on_progress: Callable[[str], None] = lambda step: None,
 ) -> ChainCalibration:
     """Find out everything about the chain on ``port``.
@@ -176,6 +177,7 @@ def calibrate(
         latency_s: how long adapter and driver may hold bytes back.
         current_a: goal current of every servo.
         sweep: whether the ends of the ranges are looked for.
+        stop_requested: returns why the safe link has to latch, or None.
         on_progress: gets a line for each step.
 
     Raises:
@@ -187,7 +189,7 @@ def calibrate(
     on_progress("who is on the bus")
     servos = find_servos(port, latency_s)
     unknown = unknown_chain(like, servos, current_a)
-    bench = _Bench(port, unknown, latency_s)
+    bench = _Bench(port, unknown, latency_s, stop_requested)
     seen: dict[int, int] = {}
     signs: dict[int, Literal[1, -1]] = {}
     for row, servo_id in enumerate(unknown.servo_ids):
@@ -221,8 +223,15 @@ def calibrate(
 class _Bench:
     """Motions of one servo of an unknown chain; torque is off between them."""
 
-    def __init__(self, port: BytePort, robot: RobotConfig, latency_s: float) -> None:
+    def __init__(
+        self,
+        port: BytePort,
+        robot: RobotConfig,
+        latency_s: float,
+        stop_requested: Callable[[], str | None],
+    ) -> None:
         self._robot = robot
+        self._stop_requested = stop_requested
         self._clock = port.clock
         bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s)
         self._chain = ServoChain(bus, robot)
@@ -231,7 +240,8 @@ class _Bench:
     @contextmanager
     def _link(self) -> Iterator[tuple[SafeLink, Floats]]:
         """A safe link with torque on, and the pose that it holds; torque is off behind it."""
-        with SafeLink(self._chain, self._limits, self._clock) as link:
+        stop = self._stop_requested
+        with SafeLink(self._chain, self._limits, self._clock, stop_requested=stop) as link:
             yield link, np.array(link.enable().position_rad)
 
     def where_rad(self) -> Floats:

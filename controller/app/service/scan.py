@@ -47,6 +47,19 @@ def pick_port(port: str | None) -> str:
     raise PortError(f"--port: {shown}")
 
 
+def check_bauds(bauds: Sequence[int]) -> None:
+    """Refuse baud rates that servos do not have.
+
+    Raises:
+        ControlTableError: a line for each.
+
+    """
+    shown = ", ".join(map(str, BAUDS))
+    unknown = [f"--baud {rate}: servos have {shown}" for rate in bauds if rate not in BAUDS]
+    if unknown:
+        raise ControlTableError(unknown)
+
+
 def scan(
     port: BytePort,
     bauds: Sequence[int] = (),

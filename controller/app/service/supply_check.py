@@ -13,6 +13,7 @@ from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import DriverError
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.drivers.types import JointCommand
 
 _AMPLITUDE_RAD, _FREQUENCY_HZ, _CYCLES = 0.15, 2.0, 4
@@ -33,7 +34,10 @@ def supply_under_load(bus: DynamixelBus, robot: RobotConfig, safety: SafetyConfi
     limits, clock = SafetyLimits.from_config(robot, safety), bus.port.clock
     lowest_v = np.full(robot.joint_count, np.inf)
     try:
-        with SafeLink(chain, limits, clock) as link:
+        with (
+            StopButton("doctor", bus.port.name) as button,
+            SafeLink(chain, limits, clock, stop_requested=button.pressed) as link,
+        ):
             start = link.enable()
             voltage = bus.slow_cycle(robot.servo_ids, fast=chain.fast)
             begin_s = clock.now_s()

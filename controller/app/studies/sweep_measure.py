@@ -62,7 +62,7 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
         if vary is not None:
             prepared = _varied(prepared, np.random.default_rng(vary))
         with TemporaryDirectory() as folder:
-            finished = execute(prepared, Path(folder))
+            finished = execute(prepared, Path(folder), stoppable=False)
     except InputError as error:
         return Measurement(f"refused: {error.faults[0]}")
     record = finished.record

@@ -210,7 +210,7 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
 
 def _measured(trial: Trial, prepared: WalkRun | GaitRun) -> Trial:
     with TemporaryDirectory() as folder:
-        finished = execute(prepared, Path(folder))
+        finished = execute(prepared, Path(folder), stoppable=False)
         stood = ground_contact(finished.record, prepared.ground)
     numbers, outcome = finished.summary, finished.outcome
     complete = outcome.complete(trial.waypoints)

@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 
 from snakewalk.drivers.clock import WallClock
+from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
+from snakewalk.drivers.protocol.parser import PacketParser
+from snakewalk.drivers.safety.stop_button import stoppable_runs
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.serve.pty import PtyServer
 from snakewalk.sim.servo.bank import ServoBank
@@ -104,3 +107,35 @@ def test_an_exception_switches_torque_off(servos: Servos) -> None:
     assert servos.torque() == [0] * 3
     assert servos.child.returncode == 1
     assert "planner crashed" in servos.said()
+
+
+def test_a_pressed_button_latches_within_two_cycles_and_nothing_is_sent_after(
+    servos: Servos,
+) -> None:
+    """Counted on the wire: goals between the request and torque off, and after it."""
+    sent: list[str] = []
+    reader = PacketParser()
+
+    def tap(time_s: float, from_host: bool, data: bytes) -> None:
+        for packet in reader.feed(data) if from_host else ():
+            assert isinstance(packet, InstructionPacket)
+            address = int.from_bytes(packet.params[:2], "little")
+            if packet.instruction == Instruction.SYNC_WRITE and address in (116, 64):
+                sent.append("goals" if address == 116 else "torque off")
+
+    servos.line.taps.append(tap)
+    (button,) = (each for each in stoppable_runs() if each.run.process == servos.child.pid)
+    with button:
+        assert button.run.port == servos.server.path
+        servos.serve_until(lambda: len(sent) >= 5)
+        assert set(sent) == {"goals"}  # it runs
+        sent.clear()
+        button.press("a test")
+        servos.serve_until(lambda: servos.child.poll() is not None)
+        assert button.end is not None
+        assert "stop requested by a test" in button.end
+    assert sent.index("torque off") <= 2
+    assert "goals" not in sent[sent.index("torque off") :]
+    assert servos.torque() == [0] * 3
+    assert servos.child.returncode == 1
+    assert all(each.run.process != servos.child.pid for each in stoppable_runs())

@@ -52,7 +52,7 @@ def test_what_the_seed_does_not_change_counts_once() -> None:
 
 
 def test_a_run_that_raises_is_a_row_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object) -> None:
+    def fails(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by zero")
 
     monkeypatch.setattr(study, "execute", fails)

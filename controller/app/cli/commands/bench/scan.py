@@ -19,14 +19,9 @@ def scan(
 ) -> None:
     """List the servos on a bus, at every baud rate; changes nothing."""
     from snakewalk.controller.app.service import scan as scanning  # noqa: PLC0415  --help stays quick
-    from snakewalk.drivers.errors import ControlTableError  # noqa: PLC0415
     from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
-    from snakewalk.drivers.protocol.registers import BAUDS  # noqa: PLC0415
 
-    unknown = [rate for rate in baud or [] if rate not in BAUDS]
-    if unknown:
-        shown = ", ".join(map(str, BAUDS))
-        raise ControlTableError([f"--baud {rate}: servos have {shown}" for rate in unknown])
+    scanning.check_bauds(baud or ())
     device = scanning.pick_port(port)
     with (
         SerialPort(device, baud[0] if baud else 1_000_000) as line,

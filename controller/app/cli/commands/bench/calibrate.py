@@ -40,6 +40,7 @@ def calibrate(
     from snakewalk.controller.app.service import chain_calibration  # noqa: PLC0415
     from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
     from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.safety.stop_button import StopButton  # noqa: PLC0415
 
     if out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
@@ -49,7 +50,11 @@ def calibrate(
     like = load_robot(robot)
     if like.limbs:
         raise InputError(f"robot {like.name}: has legs; calibrate knows chains without")
-    with SerialPort(pick_port(port), baud or like.servo.baud) as line:
+    device = pick_port(port)
+    with (
+        SerialPort(device, baud or like.servo.baud) as line,
+        StopButton(out.stem, device) as button,
+    ):
         found = chain_calibration.calibrate(
             line,
             like,
@@ -58,6 +63,7 @@ def calibrate(
             latency_s=line.latency_s,
             current_a=current,
             sweep=sweep,
+            stop_requested=button.pressed,
             on_progress=lambda step: typer.echo(step, err=True),
         )
     if baud is not None:

@@ -1,0 +1,110 @@
+"""Emergency stop: has the runs of other programs latch. It imports little, to be quick.
+
+A run is asked through its stop button, and latches within a control cycle. One that does not
+answer is terminated (its safe link switches torque off on the way out), and if it does not end
+either it is killed; the bus watchdogs stop the servos then, and ``torque_off`` does the rest.
+"""
+
+import os
+import signal
+from collections.abc import Iterable
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from typing import Final, Literal
+
+from snakewalk.drivers.clock import WallClock
+from snakewalk.drivers.safety.stop_button import PressedButton, stoppable_runs
+
+How = Literal["latched", "terminated", "killed", "torque off"]
+LATCH_S: Final = 1.0
+"""How long a run may take to latch (ours): a cycle lasts some 10 ms, the set-up longer."""
+END_S: Final = 3.0
+"""How long a run that was terminated may take to switch torque off: it asks for 2 s (ours)."""
+_LOOK_S: Final = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class StopOutcome:
+    """What was stopped, and how."""
+
+    what: str
+    """Name of a run, or a port."""
+    how: How
+    text: str
+    """What is known of torque, for people."""
+    safe: bool
+    """Whether torque is known to be off."""
+    after_s: float | None = None
+    """From the request until the run had switched torque off; None where no run held the port."""
+    process: int | None = None
+    port: str | None = None
+    folder: str | None = None
+
+    def to_dict(self) -> dict[str, object]:
+        """For JSON."""
+        return asdict(self)
+
+
+def runs_of(port: str | None = None, run: str | None = None) -> list[PressedButton]:
+    """Open the buttons of the runs meant, the newest first.
+
+    Args:
+        port: the run that holds this device.
+        run: name, folder, log or process of a run.
+
+    With neither: all that hold a port; where none does, the newest in simulation.
+
+    """
+    every = list(stoppable_runs())
+    if port is not None:
+        meant = [button for button in every if button.run.port == os.path.realpath(port)]
+    elif run is not None:
+        meant = [button for button in every if _is_meant(button, run)]
+    else:
+        meant = [button for button in every if button.run.port is not None] or every[:1]
+    for button in every:
+        if button not in meant:
+            button.close()
+    return meant
+
+
+def _is_meant(button: PressedButton, run: str) -> bool:
+    known, path = button.run, os.path.realpath(run)
+    where = None if known.folder is None else os.path.realpath(known.folder)
+    return run in (known.name, str(known.process)) or where in (path, os.path.dirname(path))
+
+
+def stop_runs(buttons: Iterable[PressedButton], who: str) -> list[StopOutcome]:
+    """Press all buttons, then wait for each run; escalate where one does not answer."""
+    clock = WallClock()
+    with ExitStack() as stack:
+        opened = [stack.enter_context(button) for button in buttons]
+        for button in opened:
+            button.press(who)
+        return [_ended(button, clock) for button in opened]
+
+
+def _ended(button: PressedButton, clock: WallClock) -> StopOutcome:
+    how: How = "latched"
+    signals: tuple[tuple[signal.Signals | None, How, float], ...] = (
+        (None, "latched", LATCH_S),
+        (signal.SIGTERM, "terminated", END_S),
+        (signal.SIGKILL, "killed", END_S),
+    )
+    for number, name, patience_s in signals:
+        if number is not None and button.is_held:
+            how = name
+            os.kill(button.run.process, number)
+        until_s = clock.now_s() + patience_s
+        while button.end is None and button.is_held and clock.now_s() < until_s:
+            clock.sleep_until_s(clock.now_s() + _LOOK_S)
+        if button.end is not None or not button.is_held:
+            break
+    after_s, run, said = clock.now_s(), button.run, button.end
+    safe = said is not None and "torque off failed" not in said and "torque may be on" not in said
+    if said is None:
+        said = "it ended without a word" if not button.is_held else "it does not end"
+        safe = run.port is None and not button.is_held
+    return StopOutcome(
+        run.name, how, said, safe, round(after_s, 4), run.process, run.port, run.folder
+    )

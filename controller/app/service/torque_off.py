@@ -1,0 +1,80 @@
+"""Torque off on a port that no program holds: to all servos, at every baud rate."""
+
+from collections.abc import Callable, Iterable
+from typing import Final
+
+from snakewalk.controller.app.service.emergency_stop import StopOutcome
+from snakewalk.controller.app.service.scan import scan
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.errors import BusError, ControlTableError
+from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.drivers.protocol.packet import (
+    BITS_PER_BYTE,
+    BROADCAST_ID,
+    Instruction,
+    InstructionPacket,
+    encode_instruction,
+)
+from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD
+
+_LIKELY: Final = (1_000_000, FACTORY_BAUD)
+_USB_S: Final = 5e-3
+"""How long an adapter may keep bytes before it sends them (ours)."""
+_TORQUE_OFF = encode_instruction(
+    # Torque Enable(64) of the X and MX(2.0) series
+    InstructionPacket(BROADCAST_ID, Instruction.WRITE, bytes([64, 0, 0]))
+)
+
+
+def torque_off(
+    device: str,
+    bauds: Iterable[int] = (),
+    on_progress: Callable[[str], None] = lambda step: None,
+) -> StopOutcome:
+    """Switch torque off on every servo of a port.
+
+    The bytes go out first; then those who answer are asked whether their torque is off, and told
+    once more by their model's control table.
+
+    Raises:
+        PortError: it is not there, or a program that has no stop button holds it.
+
+    """
+    rates = tuple(bauds) or sorted(BAUDS, key=lambda rate: (rate not in _LIKELY, -rate))
+    with SerialPort(device, rates[0]) as port:
+        for rate in rates:
+            if port.setBaudRate(rate):
+                port.write(_TORQUE_OFF)
+                wire_s = len(_TORQUE_OFF) * BITS_PER_BYTE / rate
+                port.clock.sleep_until_s(port.clock.now_s() + wire_s + _USB_S)
+        for rate in rates:
+            on_progress(f"torque off is sent; who answers at {rate} baud?")
+            found = scan(port, [rate])
+            if found:
+                port.setBaudRate(rate)
+                failed = [
+                    fault
+                    for servo in found
+                    if (fault := _confirm(port, servo.servo_id, servo.model)) is not None
+                ]
+                text = f"torque is off: {len(found) - len(failed)} servos confirm it, {rate} baud"
+                return StopOutcome(
+                    device, "torque off", "; ".join([text, *failed]), not failed, port=device
+                )
+    return StopOutcome(
+        device,
+        "torque off",
+        f"torque off was sent at {len(rates)} baud rates, and nobody answers: is the power on?",
+        False,
+        port=device,
+    )
+
+
+def _confirm(port: SerialPort, servo_id: int, model: str) -> str | None:
+    """Read a servo's torque, switch it off once more where it is on; what is wrong, if anything."""
+    try:
+        bus = DynamixelBus(port, model, latency_s=port.latency_s)
+        bus.write_verified(servo_id, "Torque Enable", 0)
+    except (BusError, ControlTableError) as fault:
+        return f"servo {servo_id}: not confirmed: {fault}"
+    return None

@@ -1,0 +1,206 @@
+"""The stop button: a small private file through which another program latches a run's safe link.
+
+A program that moves servos makes one and keeps it locked; the lock is gone when the program is,
+and a file that nobody locks is no button. It is mapped into memory, so that looking at it in every
+cycle costs no call of the system, and who presses it can never delay the run.
+
+Layout: a byte that is 1 once pressed, a byte that is 1 once the run has ended, who pressed it and
+how it ended (length and text each), and as JSON what runs. A text is written before its byte.
+"""
+
+import fcntl
+import json
+import mmap
+import os
+import stat
+import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+from snakewalk.config.errors import InputError
+
+_BYTES: Final = 4096
+_PRESSED, _ENDED = 0, 1
+_WHO: Final = slice(16, 528)
+_END: Final = slice(528, 1552)
+_RUN: Final = slice(1552, _BYTES)
+_SUFFIX: Final = ".stop"
+
+
+@dataclass(frozen=True, slots=True)
+class StoppableRun:
+    """What a button belongs to."""
+
+    process: int
+    name: str
+    """Of the run, for people."""
+    port: str | None
+    """The device, links resolved; None in simulation."""
+    folder: str | None
+    """Where its log is; absolute."""
+
+
+class StopButton:
+    """The run's own button; a context manager, after which it does not exist any more.
+
+    Raises:
+        InputError: the folder of buttons is not this user's alone.
+
+    """
+
+    def __init__(self, name: str, port: str | None = None, folder: Path | None = None) -> None:
+        device = None if port is None else os.path.realpath(port)
+        where = None if folder is None else str(folder.absolute())
+        self.run = StoppableRun(os.getpid(), name, device, where)
+        place = button_folder()
+        self._file, made = tempfile.mkstemp(prefix=f"{os.getpid()}-", dir=place)  # mode 0600
+        # locked and filled before it gets a name that others look for
+        fcntl.flock(self._file, fcntl.LOCK_EX)
+        os.truncate(self._file, _BYTES)
+        self._map = mmap.mmap(self._file, _BYTES)
+        _write_text(self._map, _RUN, json.dumps(asdict(self.run)))
+        self.path = Path(made + _SUFFIX)
+        """Whoever is to be able to press it gets this."""
+        os.replace(made, self.path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        notes = getattr(error, "__notes__", [])
+        self.end("; ".join(notes) or (str(error) if error is not None else ""))
+
+    def pressed(self) -> str | None:
+        """Why it was pressed, for ``SafeLink(stop_requested=...)``; None while it was not."""
+        if not self._map[_PRESSED]:
+            return None
+        return f"stop requested by {_read_text(self._map, _WHO) or 'an operator'}"
+
+    def end(self, how: str) -> None:
+        """Take the button away, and tell who waits for it how the run ended; safe to call twice."""
+        if self._map.closed:
+            return
+        self.path.unlink(missing_ok=True)
+        _write_text(self._map, _END, how)
+        self._map[_ENDED] = 1
+        self._map.close()
+        os.close(self._file)
+
+
+class PressedButton:
+    """Another program's button, seen from outside; a context manager.
+
+    Raises:
+        OSError: there is no such file, or it is another user's.
+
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC)
+        try:
+            info = os.fstat(self._file)
+            if info.st_uid != os.getuid() or info.st_size != _BYTES:
+                raise PermissionError(f"{path}: is no stop button of this user")
+            self._map = mmap.mmap(self._file, _BYTES)
+            self.run = StoppableRun(**json.loads(_read_text(self._map, _RUN)))
+            self.since_s = info.st_mtime
+            """Time of day at which it was made, s."""
+        except BaseException:
+            os.close(self._file)
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of it; what was pressed stays pressed."""
+        self._map.close()
+        os.close(self._file)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the program that made it still holds it."""
+        try:
+            # shared: two who look at once do not take each other for the holder
+            fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        fcntl.flock(self._file, fcntl.LOCK_UN)
+        return False
+
+    @property
+    def end(self) -> str | None:
+        """How the run ended, as it says itself; None while it has not."""
+        return _read_text(self._map, _END) if self._map[_ENDED] else None
+
+    def press(self, who: str) -> None:
+        """Have the run's safe link switch torque off and latch, at its next read or write."""
+        _write_text(self._map, _WHO, who)
+        self._map[_PRESSED] = 1
+
+
+def button_folder() -> Path:
+    """Return the folder of this user's buttons, made if need be.
+
+    Raises:
+        InputError: it is somebody else's, or others may write to it.
+
+    """
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    own = Path(runtime) / "snakewalk" if runtime else None
+    if own is None or not own.parent.is_dir():
+        own = Path(tempfile.gettempdir()) / f"snakewalk-{os.getuid()}"
+    with suppress(FileExistsError):
+        own.mkdir(mode=0o700)
+    info = own.lstat()
+    if not stat.S_ISDIR(info.st_mode) or info.st_uid != os.getuid() or info.st_mode & 0o022:
+        raise InputError(
+            f"{own}: must be a folder of this user, which nobody else may write to; stop buttons "
+            "are in it (XDG_RUNTIME_DIR says where)"
+        )
+    return own
+
+
+def stoppable_runs() -> Iterator[PressedButton]:
+    """Yield the buttons of all programs of this user that run, the newest first; each is open.
+
+    Files that a killed program left are deleted.
+    """
+    found = []
+    for path in button_folder().glob(f"*{_SUFFIX}"):
+        with suppress(OSError, ValueError, TypeError):  # gone just now, or nothing of ours
+            button = PressedButton(path)
+            if button.is_held:
+                found.append(button)
+            else:
+                path.unlink(missing_ok=True)
+                button.close()
+    yield from sorted(found, key=lambda button: button.since_s, reverse=True)
+
+
+def _write_text(place: mmap.mmap, where: slice, text: str) -> None:
+    room = where.stop - where.start - 2
+    data = text.encode()[:room].decode(errors="ignore").encode()
+    place[where.start : where.start + 2 + len(data)] = len(data).to_bytes(2, "little") + data
+
+
+def _read_text(place: mmap.mmap, where: slice) -> str:
+    length = min(int.from_bytes(place[where.start : where.start + 2], "little"), where.stop)
+    return place[where.start + 2 : where.start + 2 + length].decode(errors="replace")

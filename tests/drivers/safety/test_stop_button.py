@@ -1,0 +1,120 @@
+"""The stop button: who sees it, who may press it, and what is left of it."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import SafetyConfig
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.errors import SafetyTrippedError
+from snakewalk.drivers.safety.limits import SafetyLimits
+from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.stop_button import (
+    PressedButton,
+    StopButton,
+    button_folder,
+    stoppable_runs,
+)
+from snakewalk.drivers.types import JointCommand
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+
+ROBOT = RobotConfig(name="trio", joint_axes="yyy")
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    return tmp_path / "snakewalk"
+
+
+def a_link(button: StopButton) -> tuple[SafeLink, SimLine]:
+    line = SimLine(ServoBank(ROBOT.servo_ids), BenchPlant(3))
+    chain = ServoChain(DynamixelBus(line, ROBOT.models_by_id), ROBOT)
+    limits = SafetyLimits.from_config(ROBOT, SafetyConfig())
+    return SafeLink(chain, limits, line.clock, stop_requested=button.pressed), line
+
+
+def test_a_button_is_private_seen_while_it_is_held_and_gone_after(own_folder: Path) -> None:
+    with StopButton("walk", "/dev/null", own_folder) as button:
+        assert button.path.stat().st_mode & 0o777 == 0o600
+        assert own_folder.stat().st_mode & 0o777 == 0o700
+        (seen,) = stoppable_runs()
+        assert seen.run == button.run
+        assert (seen.run.process, seen.run.port) == (os.getpid(), "/dev/null")
+        assert seen.is_held
+        assert seen.end is None
+    assert seen.end == ""
+    assert not seen.is_held
+    assert list(stoppable_runs()) == []
+    assert list(own_folder.iterdir()) == []
+    seen.close()
+
+
+def test_the_newest_comes_first_and_what_a_killed_program_left_is_deleted(own_folder: Path) -> None:
+    with StopButton("old") as old, StopButton("new") as new:
+        os.utime(old.path, (1.0, 1.0))
+        left = own_folder / "123-x.stop"
+        left.write_bytes(new.path.read_bytes())  # nobody locks it
+        runs = list(stoppable_runs())
+        assert [each.run.name for each in runs] == ["new", "old"]
+        assert not left.exists()
+        for each in runs:
+            each.close()
+
+
+def test_a_press_latches_until_the_run_ends_whatever_an_operator_resets() -> None:
+    with StopButton("walk") as button, PressedButton(button.path) as outside:
+        link, line = a_link(button)
+        with link:
+            state = link.enable()
+            link.write(JointCommand(line.clock.now_s(), state.position_rad))
+            outside.press("é" * 300)  # longer than its place
+            link.read()
+            assert link.tripped is not None
+            assert "stop requested by é" in link.tripped
+            assert line.bank["Torque Enable"].tolist() == [0] * 3
+            link.reset("somebody")
+            with pytest.raises(SafetyTrippedError, match="stop requested"):
+                link.enable()
+
+
+def test_a_press_before_torque_is_on_switches_it_off_where_an_earlier_program_left_it_on() -> None:
+    with StopButton("walk") as button, PressedButton(button.path) as outside:
+        link, line = a_link(button)
+        line.bank["Torque Enable"][:] = 1
+        outside.press("a test")
+        with link, pytest.raises(SafetyTrippedError, match="stop requested by a test"):
+            link.enable()
+        assert line.bank["Torque Enable"].tolist() == [0] * 3
+
+
+def test_a_folder_that_others_may_write_to_is_refused(own_folder: Path) -> None:
+    own_folder.mkdir()
+    own_folder.chmod(0o777)
+    with pytest.raises(InputError, match="nobody else may write"):
+        StopButton("walk")
+    own_folder.rmdir()
+    own_folder.symlink_to("/tmp")
+    with pytest.raises(InputError, match="nobody else may write"):
+        button_folder()
+
+
+def test_without_a_runtime_folder_it_is_in_the_folder_of_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert button_folder() == tmp_path / f"snakewalk-{os.getuid()}"
+
+
+@pytest.mark.parametrize("content", [b"", b"\0" * 4096, b"x" * 4096])
+def test_a_file_that_is_no_button_is_not_taken_for_one(own_folder: Path, content: bytes) -> None:
+    own_folder.mkdir(mode=0o700)
+    (own_folder / "1-x.stop").write_bytes(content)
+    assert list(stoppable_runs()) == []
