@@ -15,6 +15,7 @@ EXTRAS: Final = {
     "PIL": ("Pillow", "vision"),
     "h5py": ("h5py", "vision"),
     "trimesh": ("trimesh", "vision"),
+    "rasterio": ("Rasterio", "terrain"),
     "pygltflib": ("pygltflib", "vision"),
     "distributed": ("Dask", "sweep"),
     "dask": ("Dask", "sweep"),

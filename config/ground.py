@@ -1,6 +1,7 @@
 """From a world's description to its height field: a real elevation model, or a made shape."""
 
 import math
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -11,11 +12,12 @@ from scipy.ndimage import gaussian_filter
 from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import ConfigError, InputError
-from snakewalk.config.heightfield import HeightField
+from snakewalk.config.heightfield import HeightField, read_map
 from snakewalk.config.world import (
     ElevationGround,
     FlatGround,
     GapsGround,
+    MapGround,
     RampGround,
     RandomGround,
     StepsGround,
@@ -25,7 +27,9 @@ from snakewalk.config.world import (
 
 
 def build_ground(world: WorldConfig) -> HeightField | None:
-    """Height field of ``world``, centred on (0, 0), its lowest point at 0; None on a flat floor.
+    """Height field of ``world``, its lowest point at 0; None on a flat floor.
+
+    It is centred on (0, 0), but for a map, which lies where its file says.
 
     Raises:
         ConfigError: the source is missing or unreadable, or the crop leaves it.
@@ -34,6 +38,8 @@ def build_ground(world: WorldConfig) -> HeightField | None:
     match world.ground:
         case FlatGround() | WaterGround():
             return None
+        case MapGround() as ground:
+            return _mapped(world.name, ground)
         case ElevationGround() as ground:
             z, spacing_m = _cropped(world.name, ground), ground.spacing_m / ground.refine
         case RampGround() as ground:
@@ -46,6 +52,15 @@ def build_ground(world: WorldConfig) -> HeightField | None:
             z, spacing_m = _gaps(ground), ground.spacing_m
     half_w, half_h = (z.shape[1] - 1) * spacing_m / 2, (z.shape[0] - 1) * spacing_m / 2
     return HeightField(z - z.min(), spacing_m, -half_w, -half_h)
+
+
+def _mapped(world: str, ground: MapGround) -> HeightField:
+    try:
+        held = read_map(Path(ground.source))
+    except InputError as error:
+        raise ConfigError([f"world {world}: ground: {fault}" for fault in error.faults]) from None
+    z_m = ground.vertical_scale * (held.z_m - held.z_m.min())
+    return replace(held, z_m=z_m)
 
 
 def _ramp(ground: RampGround) -> Floats:

@@ -1,11 +1,23 @@
-"""The height field: elevation over a regular grid in the world's horizontal plane."""
+"""The height field: elevation over a regular grid in the world's horizontal plane; a map's file.
+
+A map's file is an ``.npz`` with ``z_m`` (rows, columns), row 0 with the smallest y, ``known`` of
+the same shape, and the numbers ``spacing_m``, ``x0_m``, ``y0_m``.
+"""
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.errors import InputError
+
+MOST_SAMPLES: Final = 4_000_000
+"""Of a map (ours): planner and simulator hold several arrays of its size."""
+_NUMBERS: Final = ("spacing_m", "x0_m", "y0_m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,10 +33,17 @@ class HeightField:
     spacing_m: float
     x0_m: float
     y0_m: float
+    known: Bools | None = None
+    """(rows, columns) whether a sample was measured; elsewhere ``z_m`` is filled in, and no path
+    leads there. None: all were."""
 
     def __post_init__(self) -> None:
         if self.z_m.ndim != 2 or min(self.z_m.shape) < 2 or not np.isfinite(self.z_m).all():
             raise ValueError("z_m must be a finite (rows >= 2, columns >= 2) array")
+        if self.known is not None:
+            if self.known.shape != self.z_m.shape or self.known.dtype != bool:
+                raise ValueError("known must be booleans of the shape of z_m")
+            self.known.setflags(write=False)
         self.z_m.setflags(write=False)
 
     @property
@@ -69,3 +88,43 @@ class HeightField:
         first, second = third - z00, z11 - third
         gx, gy = np.where(lower, first, second), np.where(lower, second, first)
         return z00 + gx * fu + gy * fv, gx / self.spacing_m, gy / self.spacing_m
+
+
+def write_map(file: Path, ground: HeightField) -> None:
+    """Write a height field as a map's file."""
+    known = np.ones(ground.z_m.shape, bool) if ground.known is None else ground.known
+    with file.open("wb") as stream:
+        np.savez_compressed(
+            stream,
+            z_m=ground.z_m.astype(np.float32),
+            known=known,
+            spacing_m=np.float64(ground.spacing_m),
+            x0_m=np.float64(ground.x0_m),
+            y0_m=np.float64(ground.y0_m),
+        )
+
+
+def read_map(file: Path) -> HeightField:
+    """Read a map's file.
+
+    Raises:
+        InputError: it cannot be read, lacks an array, or holds what is no map.
+
+    """
+    try:
+        held, _ = read_arrays(file, {"z_m", "known", *_NUMBERS})
+        z_m, known = held["z_m"].astype(float), held["known"]
+        spacing_m, x0_m, y0_m = (float(held[name]) for name in _NUMBERS)
+        if not (0.0 < spacing_m < np.inf and np.isfinite([x0_m, y0_m]).all()):
+            raise ValueError("spacing_m must be above 0, x0_m and y0_m must be finite")
+        if z_m.size > MOST_SAMPLES:
+            raise ValueError(f"holds {z_m.size} samples; {MOST_SAMPLES} are the most")
+        return HeightField(z_m, spacing_m, x0_m, y0_m, known)
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror or error}") from None
+    except KeyError as error:
+        raise InputError(f"{file}: holds no array named {error}") from None
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{file}: is no map: {error}") from None

@@ -17,7 +17,7 @@ from snakewalk.config.errors import ConfigError
 from snakewalk.config.gait import GaitSetConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.config.world import ElevationGround, WorldConfig
+from snakewalk.config.world import ElevationGround, MapGround, WorldConfig
 
 M = TypeVar("M", bound=BaseModel)
 Kind = Literal["robots", "worlds", "runs", "recordings", "gaits", "skins"]
@@ -113,7 +113,7 @@ def load_world(name_or_path: str, beside: Path | None = None) -> WorldConfig:
     """Load a world by shipped name or path."""
     path = locate("worlds", name_or_path, beside)
     world = load(path, WorldConfig)
-    if isinstance(world.ground, ElevationGround):
+    if isinstance(world.ground, ElevationGround | MapGround):
         source = path.parent / world.ground.source
         if source.is_file():  # beside the world that names it
             ground = world.ground.model_copy(update={"source": str(source)})

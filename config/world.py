@@ -48,6 +48,18 @@ class ElevationGround(Strict):
         return self.model_copy(update={"vertical_scale": self.vertical_scale * factor})
 
 
+class MapGround(Strict):
+    """Real ground as measured, with holes where nothing was: written by `snakewalk terrain`."""
+
+    kind: Literal["map"] = "map"
+    source: str = Field(description="an .npz with z_m, known, spacing_m, x0_m, y0_m")
+    vertical_scale: float = Field(1.0, gt=0.0, le=100.0, description="of the file's heights")
+
+    def with_relief(self, factor: float) -> Self:
+        """Return the same ground with its heights times ``factor``."""
+        return self.model_copy(update={"vertical_scale": self.vertical_scale * factor})
+
+
 class RampGround(Strict):
     """A plane that rises along x, between a level run-in and a level top; its middle at x = 0."""
 
@@ -265,7 +277,7 @@ class PlannerConfig(Strict):
     edge_margin_m: float = Field(0.3, ge=0.0, description="kept free along the border")
 
 
-ReliefGround = ElevationGround | RampGround | RandomGround | StepsGround | GapsGround
+ReliefGround = ElevationGround | MapGround | RampGround | RandomGround | StepsGround | GapsGround
 """What makes a height field; the others are level."""
 
 

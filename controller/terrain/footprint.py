@@ -27,6 +27,8 @@ class Footprint:
         mean_x, mean_y = fitted_gradient(ground, radius_m)
         self._layers = np.stack([mean_x, mean_y, *squares], axis=-1)
         steep = np.hypot(mean_x, mean_y) > np.tan(config.climb_limit_rad)
+        if ground.known is not None:
+            steep |= ~ground.known
         self._nearness = np.zeros(ground.z_m.shape)
         if steep.any():
             far_m = np.asarray(distance_transform_edt(~steep, sampling=ground.spacing_m), float)
@@ -59,6 +61,6 @@ class Footprint:
     def nearness(self, points_m: Floats) -> Floats:
         """Return 1 (...) on ground that cannot be climbed, falling to 0 over the clearance.
 
-        It is ground whose slope under the whole footprint exceeds the climb limit.
+        It is ground whose slope under the whole footprint exceeds the climb limit, or is unknown.
         """
         return interpolated(self._ground, self._nearness, *np.moveaxis(points_m, -1, 0))

@@ -176,6 +176,9 @@ def _fault(planner: TerrainPlanner, k: int, point: Floats) -> list[str]:
         why = f"is outside the world, {w:.1f} m by {h:.1f} m around (0, 0)"
     elif not relief.within(*point):
         why = f"is within {relief.config.edge_margin_m:g} m of the world's border"
+    elif not relief.known(*point):
+        reach = relief.config.slope_window_m
+        why = f"is within {reach:g} m of ground that the world's map does not know"
     else:
         slope = np.degrees(float(relief.slope_rad(*point)))
         variance, most = float(relief.variance_m2(*point)), relief.config.variance_limit_m2

@@ -7,12 +7,16 @@ is smaller than itself.
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.ndimage import binary_dilation
 from scipy.signal import fftconvolve
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.drivers.compiling import compiled, readonly_array
+
+_UNKNOWN_RISK = 1e9
+"""Of samples beside which something was not measured; finite, as it is interpolated."""
 
 
 class Relief:
@@ -30,6 +34,12 @@ class Relief:
         self._risk = np.maximum(
             self._variance / config.variance_limit_m2, self._slope / config.slope_limit_rad
         )
+        self._unknown = np.zeros(ground.z_m.shape)
+        if ground.known is not None:
+            # A slope is known if its whole window is: what is filled in proves nothing.
+            _, _, disc = _disc(ground, config.slope_window_m)
+            self._unknown[binary_dilation(~ground.known, disc > 0.0)] = 1.0
+        self._risk = np.where(self._unknown > 0.0, _UNKNOWN_RISK, self._risk)
 
     def variance_m2(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         """Elevation variance in a disc of ``variance_window_m`` around each point."""
@@ -47,6 +57,10 @@ class Relief:
     def safe(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points keep both limits and the margin."""
         return np.asarray(self.risk(x_m, y_m) <= 1.0)
+
+    def known(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
+        """Whether the whole slope window around points was measured."""
+        return np.asarray(self._at(self._unknown, x_m, y_m) <= 1.0 / _UNKNOWN_RISK)
 
     def within(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points lie on the field and ``edge_margin_m`` away from its border."""

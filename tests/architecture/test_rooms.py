@@ -25,9 +25,10 @@ ORDER = {
     ),
     "controller": (
         *("controller.kinematics", "controller.mechanics", "controller.shape"),
-        *("controller.terrain", "controller.gaits", "controller.capture", "controller.motion"),
-        *("controller.walk", "controller.localization", "controller.repertoire"),
-        *("controller.runlog", "controller.metrics", "controller.runtime", "controller.app"),
+        *("controller.terrain", "controller.gaits", "controller.capture", "controller.mapping"),
+        *("controller.motion", "controller.walk", "controller.localization"),
+        *("controller.repertoire", "controller.runlog", "controller.metrics"),
+        *("controller.runtime", "controller.app"),
     ),
 }
 """Rooms, from the ground up."""

@@ -24,6 +24,7 @@ from snakewalk.controller.app.cli.commands.bus import (
     sniff,
 )
 from snakewalk.controller.app.cli.commands.capture import capture
+from snakewalk.controller.app.cli.commands.files.elevation import elevation
 from snakewalk.controller.app.cli.commands.files.init import init
 from snakewalk.controller.app.cli.commands.files.schema import schema
 from snakewalk.controller.app.cli.commands.fish import film, match, synthesise
@@ -305,6 +306,19 @@ robot_app.command("show", epilog=_examples("robot show alternating16", "robot sh
 robot_app.command(
     "export", epilog=_examples("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml")
 )(export_robot)
+
+terrain_app = _App(no_args_is_help=True, help="Worlds from real ground: maps of files.")
+
+app.add_typer(terrain_app, name="terrain", rich_help_panel=_JOB)
+
+terrain_app.command(
+    "from",
+    epilog=_examples(
+        "terrain from dem.tif --scale 0.002 -o hill.toml --picture hill.png",
+        "terrain from scan.pcd --crop 20,50,80,150 --scale 0.05 --fill 0.3 -o slope.toml",
+        "terrain from heights.png --cell 0.05 --height-step 0.001 -o garden.toml",
+    ),
+)(elevation)
 
 fish_app = _App(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
 

@@ -1,5 +1,7 @@
 """The planner: plain on flat ground, around hills, held to its limits, clear when it cannot."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -225,3 +227,17 @@ def test_shipped_runs_on_made_ground_have_a_safe_path(run: str) -> None:
     assert 5.0 < path.length_m < 6.5
     assert planner.relief is not None
     assert planner.relief.safe(*looked_at(path).T).all()
+
+
+def test_a_path_goes_around_what_is_unknown_and_a_waypoint_in_it_is_refused() -> None:
+    ground = field(lambda x, y: 0.0 * x)
+    x, y = np.meshgrid(*2 * [np.linspace(-2.0, 2.0, ground.z_m.shape[0])])
+    hole = np.hypot(x, y - 0.1) < 0.4
+    planner = TerrainPlanner(replace(ground, known=~hole), CONFIG)
+    path = looked_at(planner.plan([(-1.5, 0.0), (1.5, 0.0)]))
+    assert np.hypot(path[:, 0], path[:, 1] - 0.1).min() > 0.4 + 0.5 * CONFIG.slope_window_m
+    with pytest.raises(InputError, match=r"within 0.1 m of ground that the world's map does not"):
+        planner.plan([(-1.5, 0.0), (0.1, 0.1)])
+    wall = TerrainPlanner(replace(ground, known=np.abs(x) > 0.2), CONFIG)
+    with pytest.raises(InputError, match="no smooth way over safe ground"):
+        wall.plan([(-1.5, 0.0), (1.5, 0.0)])

@@ -88,3 +88,22 @@ def test_risk_keeps_both_limits_and_the_margin() -> None:
     assert (np.maximum(abs(x), abs(y))[safe] <= 1.1 + 1e-6).all()
     assert relief.safe(0.0, 1.1)
     assert not relief.safe(0.0, 1.11)
+
+
+def test_ground_that_was_not_measured_is_never_safe() -> None:
+    """Level and filled in, it looks the best of all; no point within a slope window is safe."""
+    z = np.zeros((61, 61))
+    known = np.ones(z.shape, bool)
+    known[20:31, 25:41] = False
+    config = PlannerConfig(slope_window_m=0.1, edge_margin_m=0.0)
+    relief = Relief(HeightField(z, 0.05, -1.5, -1.5, known), config)
+    at = np.stack(np.meshgrid(np.arange(61), np.arange(61)), axis=-1)[~known] * 0.05 - 1.5
+    rng = np.random.default_rng(2)
+    near = at[rng.integers(len(at), size=3000)] + rng.uniform(-0.09, 0.09, (3000, 2)) / np.sqrt(2)
+    assert not relief.safe(*near.T).any()
+    assert not relief.known(*near.T).any()
+    row, column = np.nonzero(known)
+    points = np.stack([column, row], axis=-1) * 0.05 - 1.5
+    gap = np.hypot(*(points[:, None] - at).transpose(2, 0, 1)).min(axis=1)
+    assert relief.safe(*points[gap > 0.16].T).all()
+    assert relief.known(*points[gap > 0.16].T).all()

@@ -1,0 +1,270 @@
+"""Elevation map: measured heights on a regular grid, NaN where nothing was measured.
+
+Points, triangles and rasters come to it; a height field for planner and simulator goes from it.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final, Literal, Self, get_args
+
+import numpy as np
+from scipy.interpolate import RectBivariateSpline
+from scipy.ndimage import distance_transform_edt, map_coordinates
+from scipy.sparse import coo_array
+from scipy.sparse.linalg import cg
+
+from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.config.errors import InputError
+from snakewalk.config.heightfield import MOST_SAMPLES, HeightField
+from snakewalk.drivers.compiling import compiled, readonly_array
+
+CellHeight = Literal["lowest", "median", "highest"]
+"""Which of the points in a cell is its height."""
+_ROUNDS: Final = 2000
+"""Steps of the solver that fills holes, at most: of holes a thousand samples wide."""
+_QUANTILE: Final = {"lowest": 0.0, "median": 0.5, "highest": 1.0}
+
+
+@dataclass(frozen=True, slots=True)
+class ElevationMap:
+    """Heights ``z_m[row, column]`` at ``x0_m + column * spacing_m, y0_m + row * spacing_m``."""
+
+    z_m: Floats
+    """(rows, columns) heights; NaN where nothing was measured; row 0 has the smallest y."""
+    spacing_m: float
+    x0_m: float
+    y0_m: float
+
+    @classmethod
+    def of_points(
+        cls, points_m: Floats, spacing_m: float, height: CellHeight = "median", least: int = 1
+    ) -> Self:
+        """Grid the points (n, 3): a sample stands for the square of one spacing around it.
+
+        Args:
+            points_m: x, y, z.
+            spacing_m: between samples.
+            height: which of a square's points counts.
+            least: points without which a square is unknown.
+
+        Raises:
+            InputError: no points, too many samples, or fewer than two in a row or column.
+
+        """
+        if len(points_m) == 0:
+            raise InputError("map: no point is left to make it of")
+        low = points_m[:, :2].min(axis=0)
+        columns, rows = _shape(points_m[:, :2].max(axis=0) - low, spacing_m)
+        x, y = np.rint((points_m[:, :2] - low) / spacing_m).astype(np.int64).T
+        cell = y * columns + x
+        order = np.lexsort((points_m[:, 2], cell))
+        cell, z_m = cell[order], points_m[order, 2]
+        cells, first, count = np.unique(cell, return_index=True, return_counts=True)
+        chosen = first + _QUANTILE[height] * (count - 1)
+        lower, upper = np.floor(chosen).astype(np.int64), np.ceil(chosen).astype(np.int64)
+        held = np.full(rows * columns, np.nan)
+        held[cells] = np.where(count >= least, 0.5 * (z_m[lower] + z_m[upper]), np.nan)
+        return cls(held.reshape(rows, columns), spacing_m, float(low[0]), float(low[1]))
+
+    @classmethod
+    def of_triangles(
+        cls, vertices_m: Floats, faces: Ints, low_m: Floats, high_m: Floats, spacing_m: float
+    ) -> Self:
+        """Take the highest surface of a mesh at each sample.
+
+        Args:
+            vertices_m: (n, 3).
+            faces: (k, 3) numbers of vertices.
+            low_m: (2,) least x and y of the map.
+            high_m: (2,) greatest.
+            spacing_m: between samples.
+
+        Raises:
+            InputError: too many samples, or fewer than two in a row or column.
+
+        """
+        columns, rows = _shape(high_m - low_m, spacing_m)
+        z_m = np.full((rows, columns), -np.inf)
+        at = np.array(vertices_m, dtype=float)
+        at[:, :2] = (at[:, :2] - low_m) / spacing_m
+        _rasterise(at, np.ascontiguousarray(faces, dtype=np.int64), z_m)
+        z_m[np.isinf(z_m)] = np.nan
+        return cls(z_m, spacing_m, float(low_m[0]), float(low_m[1]))
+
+    @classmethod
+    def of_raster(cls, z_m: Floats, dx_m: float, dy_m: float, spacing_m: float) -> Self:
+        """Sample a raster with cells of any shape at another spacing; its first sample is (0, 0).
+
+        Finer samples lie on the cubic surface through the raster's; coarser ones are the medians of
+        those that they stand for. A finer sample is known if the four around it are.
+
+        Args:
+            z_m: (rows, columns), row 0 with the smallest y; NaN is unknown.
+            dx_m: between columns.
+            dy_m: between rows.
+            spacing_m: between the samples of the map.
+
+        Raises:
+            InputError: nothing is known, or the map's samples are too many or too few.
+
+        """
+        known = np.isfinite(z_m)
+        if not known.any():
+            raise InputError("map: no cell holds a height")
+        if math.isclose(dx_m, dy_m) and math.isclose(dx_m, spacing_m):
+            return cls(z_m, spacing_m, 0.0, 0.0)
+        if spacing_m > max(dx_m, dy_m):
+            row, column = np.nonzero(known)
+            points = np.stack([column * dx_m, row * dy_m, z_m[known]], axis=-1)
+            return cls.of_points(points, spacing_m)
+        rows, columns = z_m.shape
+        size = ((columns - 1) * dx_m, (rows - 1) * dy_m)
+        wide, high = _shape(np.array(size), spacing_m, floor=True)
+        x = np.arange(wide) * spacing_m / dx_m
+        y = np.arange(high) * spacing_m / dy_m
+        whole = z_m if known.all() else filled(z_m, ~known)
+        order = min(3, rows - 1), min(3, columns - 1)
+        spline = RectBivariateSpline(
+            np.arange(rows), np.arange(columns), whole, kx=order[0], ky=order[1]
+        )
+        fine = np.asarray(spline(y, x), dtype=float)
+        at = np.stack(np.meshgrid(y, x, indexing="ij"))
+        share = map_coordinates(known.astype(float), at, order=1, mode="nearest")
+        return cls(np.where(share > 1.0 - 1e-9, fine, np.nan), spacing_m, 0.0, 0.0)
+
+    @property
+    def known(self) -> Bools:
+        """(rows, columns) whether a height was measured."""
+        return np.asarray(np.isfinite(self.z_m))
+
+    def centred(self) -> Self:
+        """Return the same map with its middle at (0, 0)."""
+        rows, columns = self.z_m.shape
+        half = 0.5 * self.spacing_m
+        return replace(self, x0_m=-(columns - 1) * half, y0_m=-(rows - 1) * half)
+
+    def height_field(self, fill_m: float = 0.0) -> HeightField:
+        """Return the height field; its lowest point is at 0, its holes are filled but unknown.
+
+        Args:
+            fill_m: a hole that a disc of this width does not fit into counts as known.
+
+        Raises:
+            InputError: nothing is known.
+
+        """
+        known = self.known
+        if not known.any():
+            raise InputError("map: no cell holds a height")
+        z_m = self.z_m if known.all() else filled(self.z_m, ~known)
+        trusted = known
+        if fill_m > 0.0:
+            trusted = known | ~_opened(~known, 0.5 * fill_m / self.spacing_m)
+        return HeightField(z_m - z_m.min(), self.spacing_m, self.x0_m, self.y0_m, trusted)
+
+
+def filled(z_m: Floats, holes: Bools) -> Floats:
+    """Fill holes with the smoothest surface: Laplace's equation, level towards the border.
+
+    A plane with holes inside becomes the plane, to a thousandth of its relief.
+
+    Args:
+        z_m: (rows, columns); some are finite.
+        holes: (rows, columns) what is to be filled.
+
+    """
+    nearest = distance_transform_edt(holes, return_distances=False, return_indices=True)
+    base = float(np.mean(z_m[~holes]))
+    out = z_m[tuple(nearest)] - base
+    index = np.where(holes, np.cumsum(holes).reshape(holes.shape) - 1, -1)
+    count = int(holes.sum())
+    weight, right = np.zeros(count), np.zeros(count)
+    pairs = []
+    for axis in (0, 1):
+        below, above = (
+            np.moveaxis(index, axis, 0)[part] for part in (slice(None, -1), slice(1, None))
+        )
+        low, high = (np.moveaxis(out, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
+        for here, there, value in ((below, above, high), (above, below, low)):
+            inside = here >= 0
+            np.add.at(weight, here[inside], 1.0)
+            edge = inside & (there < 0)
+            np.add.at(right, here[edge], value[edge])
+        both = (below >= 0) & (above >= 0)
+        pairs.append(np.stack([below[both], above[both]]))
+    low, high = np.concatenate(pairs, axis=1)
+    diagonal = np.arange(count)
+    laplace = coo_array(
+        (
+            np.concatenate([weight, -np.ones(2 * len(low))]),
+            (np.concatenate([diagonal, low, high]), np.concatenate([diagonal, high, low])),
+        ),
+        shape=(count, count),
+    ).tocsr()
+    solved, _ = cg(laplace, right, x0=out[holes], rtol=1e-6, maxiter=_ROUNDS)
+    whole = np.array(z_m, dtype=float)
+    whole[holes] = solved + base
+    return whole
+
+
+def _opened(holes: Bools, radius: float) -> Bools:
+    """Keep the parts of holes (rows, columns) that a disc of a radius, in samples, fits into.
+
+    Beyond the border everything is a hole.
+    """
+    far = math.ceil(radius) + 1
+    wide = np.pad(holes, far, constant_values=True)
+    inner = np.asarray(distance_transform_edt(wide)) > radius
+    if not inner.any():
+        return np.zeros_like(holes)
+    back = np.asarray(distance_transform_edt(~inner)) <= radius
+    return np.asarray((back & wide)[far:-far, far:-far])
+
+
+def _shape(size_m: Floats, spacing_m: float, *, floor: bool = False) -> tuple[int, int]:
+    """Columns and rows of an extent in x and y."""
+    cells = np.floor(size_m / spacing_m + 1e-9) if floor else np.rint(size_m / spacing_m)
+    columns, rows = (int(count) + 1 for count in cells)
+    if columns * rows > MOST_SAMPLES:
+        enough = spacing_m * math.sqrt(columns * rows / MOST_SAMPLES)
+        raise InputError(
+            f"map: {columns} by {rows} samples {spacing_m:g} m apart are over {MOST_SAMPLES}: take "
+            f"a spacing of {enough:.2g} m or more, or a smaller crop"
+        )
+    if min(columns, rows) < 2:
+        raise InputError(
+            f"map: {size_m[0]:.3g} m by {size_m[1]:.3g} m hold fewer than 2 by 2 samples "
+            f"{spacing_m:g} m apart: take a smaller spacing or a larger scale"
+        )
+    return columns, rows
+
+
+@compiled(
+    f"void({readonly_array(dimensions=2, layout='C')},"
+    f" {readonly_array('int64', dimensions=2, layout='C')}, float64[:, ::1])"
+)
+def _rasterise(vertices: Floats, faces: Ints, z_m: Floats) -> None:
+    """Raise samples (rows, columns) to the triangles above them; x and y are in samples."""
+    rows, columns = z_m.shape
+    for f in range(len(faces)):
+        ax, ay, az = vertices[faces[f, 0]]
+        bx, by, bz = vertices[faces[f, 1]]
+        cx, cy, cz = vertices[faces[f, 2]]
+        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        if area == 0.0:  # upright
+            continue
+        left = max(int(np.ceil(min(ax, bx, cx) - 1e-9)), 0)
+        right = min(int(np.floor(max(ax, bx, cx) + 1e-9)), columns - 1)
+        bottom = max(int(np.ceil(min(ay, by, cy) - 1e-9)), 0)
+        top = min(int(np.floor(max(ay, by, cy) + 1e-9)), rows - 1)
+        for row in range(bottom, top + 1):
+            for column in range(left, right + 1):
+                v = ((column - ax) * (cy - ay) - (cx - ax) * (row - ay)) / area
+                w = ((bx - ax) * (row - ay) - (column - ax) * (by - ay)) / area
+                if v >= -1e-9 and w >= -1e-9 and v + w <= 1.0 + 1e-9:
+                    z = az + v * (bz - az) + w * (cz - az)
+                    z_m[row, column] = max(z_m[row, column], z)
+
+
+CELL_HEIGHTS: Final = get_args(CellHeight)
+"""Choices of a cell's height."""

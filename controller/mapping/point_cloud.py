@@ -1,0 +1,184 @@
+"""Point clouds: PCD of the Point Cloud Library in all three encodings, PLY, and tables of x, y, z.
+
+PCD is read here: trimesh does not, and its other readers bring a viewer with them. The format is
+that of pointclouds.org, "The PCD (Point Cloud Data) file format"; ``binary_compressed`` is LZF.
+"""
+
+import math
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from snakewalk.config.archive import MOST_BYTES, check_expansion
+from snakewalk.config.arrays import Bytes, Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.drivers.compiling import compiled, readonly_array
+
+_KINDS: Final = {
+    **{("F", size): f"<f{size}" for size in (4, 8)},
+    **{("I", size): f"<i{size}" for size in (1, 2, 4, 8)},
+    **{("U", size): f"<u{size}" for size in (1, 2, 4, 8)},
+}
+_HEADER_BYTES: Final = 4096
+"""A header is searched for its last line so far (ours)."""
+
+
+def read_pcd(file: Path) -> Floats:
+    """Points (n, 3), in the file's unit, of a PCD file.
+
+    Raises:
+        InputError: it is none, is damaged, or would expand too far.
+        OSError: the file cannot be opened.
+
+    """
+    data = file.read_bytes()
+    try:
+        points = _pcd(file, data)
+    except (ValueError, KeyError, IndexError, struct.error, OverflowError) as error:
+        raise InputError(f"{file}: is no whole PCD file: {error}") from None
+    return points[np.isfinite(points).all(axis=1)]
+
+
+def _pcd(file: Path, data: bytes) -> Floats:
+    header, start = _header(data)
+    names = header["FIELDS"]
+    sizes = [int(size) for size in header["SIZE"]]
+    counts = [int(count) for count in header.get("COUNT", ["1"] * len(names))]
+    kinds = [_KINDS[key] for key in zip(header["TYPE"], sizes, strict=True)]
+    if not {"x", "y", "z"} <= set(names):
+        raise ValueError(f"its fields are {' '.join(names)}; x, y and z are needed")
+    if len(set(names)) < len(names):  # padding may be named the same again
+        names = [n if n in "xyz" else f"{n}{k}" for k, n in enumerate(names)]
+    if min(counts) < 1 or len(counts) != len(names):
+        raise ValueError("COUNT must be 1 or more of each field")
+    total = int(header["POINTS"][0]) if "POINTS" in header else _extent(header)
+    row = np.dtype([(n, k, (c,)) for n, k, c in zip(names, kinds, counts, strict=True)])
+    if total < 0:
+        raise ValueError(f"says {total} points")
+    encoding = header["DATA"][0]
+    body = data[start:]
+    if encoding == "ascii":
+        return _ascii(body, names, counts, total)
+    check_expansion(file, len(data), total * row.itemsize)
+    if encoding == "binary":
+        if len(body) < total * row.itemsize:
+            raise ValueError(f"says {total} points, and holds {len(body) // row.itemsize}")
+        points = np.frombuffer(body, row, total)
+        return np.stack([points[axis][:, 0].astype(float) for axis in "xyz"], axis=-1)
+    if encoding != "binary_compressed":
+        raise ValueError(f"DATA {encoding} is none of ascii, binary, binary_compressed")
+    packed, unpacked = struct.unpack("<II", body[:8])
+    if unpacked != total * row.itemsize or packed > len(body) - 8:
+        raise ValueError("the sizes of its compressed data do not fit its points")
+    plain = np.zeros(unpacked, np.uint8)
+    if _expand(np.frombuffer(body[8 : 8 + packed], np.uint8), plain) != unpacked:
+        raise ValueError("its compressed data are damaged")
+    columns, at = [], 0
+    for name, kind, count in zip(names, kinds, counts, strict=True):
+        width = np.dtype(kind).itemsize * count * total
+        if name in "xyz":
+            columns.append((name, plain[at : at + width].view(kind)[::count].astype(float)))
+        at += width
+    return np.stack([values for _, values in sorted(columns)], axis=-1)
+
+
+def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
+    """Words behind each key, and where the data begin."""
+    mark = data[:_HEADER_BYTES].find(b"\nDATA ")
+    end = data.find(b"\n", mark + 1) + 1
+    if mark < 0 or end == 0:
+        raise ValueError("it has no header with a line DATA")
+    lines = data[:end].decode("ascii").splitlines()
+    words = [line.split() for line in lines if line.strip() and not line.startswith("#")]
+    return {key: rest for key, *rest in words}, end
+
+
+def _extent(header: Mapping[str, list[str]]) -> int:
+    return int(header["WIDTH"][0]) * int(header["HEIGHT"][0])
+
+
+def _ascii(body: bytes, names: list[str], counts: list[int], total: int) -> Floats:
+    first = dict(zip(names, np.cumsum([0, *counts[:-1]]).tolist(), strict=True))
+    rows = [line.split() for line in body.splitlines()[:total]]
+    if len(rows) < total:
+        raise ValueError(f"says {total} points, and holds {len(rows)}")
+    held = [[float(row[first[axis]]) for axis in "xyz"] for row in rows]
+    return np.array(held, dtype=float).reshape(-1, 3)
+
+
+@compiled(f"int64({readonly_array('uint8', layout='C')}, uint8[::1])")
+def _expand(packed: Bytes, plain: Bytes) -> int:
+    """Expand LZF; the number of bytes written, or -1 if the data are damaged.
+
+    A control byte below 32 stands before that many and one plain bytes; any other is a reference
+    back, its three high bits the length, its five low ones the high bits of the distance.
+    """
+    at, out = 0, 0
+    while at < len(packed):
+        control = int(packed[at])
+        at += 1
+        if control < 32:
+            length = control + 1
+            if at + length > len(packed) or out + length > len(plain):
+                return -1
+            for k in range(length):
+                plain[out + k] = packed[at + k]
+            at += length
+        else:
+            length = control >> 5
+            if length == 7:
+                if at >= len(packed):
+                    return -1
+                length += int(packed[at])
+                at += 1
+            if at >= len(packed):
+                return -1
+            back = out - ((control & 31) << 8) - int(packed[at]) - 1
+            at += 1
+            length += 2
+            if back < 0 or out + length > len(plain):
+                return -1
+            for k in range(length):  # byte by byte: the copy may reach into itself
+                plain[out + k] = plain[back + k]
+        out += length
+    return out
+
+
+def read_ply(file: Path) -> tuple[Floats, Any]:
+    """Vertices (n, 3) and faces (k, 3) of a PLY, in its unit; faces are None of a point cloud.
+
+    Raises:
+        InputError: it cannot be read.
+        OSError: the file cannot be opened.
+
+    """
+    require_extra("PLY needs", "trimesh")
+    import trimesh  # noqa: PLC0415  an extra
+
+    with file.open("rb") as stream:
+        head = stream.read(_HEADER_BYTES)
+    said = [line.split() for line in head.split(b"end_header")[0].splitlines()]
+    try:
+        counts = [int(words[2]) for words in said if words[:1] == [b"element"]]
+        size = file.stat().st_size
+        if any(not 0 <= count <= size for count in counts):  # each takes a byte or more
+            raise ValueError("says more elements than it can hold")
+        check_expansion(file, size, min(MOST_BYTES, 100 * sum(counts)))
+        held: Any = trimesh.load(file, process=False)
+        points = np.asarray(held.vertices, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise ValueError("holds no vertices")
+        faces = getattr(held, "faces", None)
+    except InputError:
+        raise
+    except Exception as error:  # trimesh raises whatever its parsers meet
+        raise InputError(f"{file}: cannot be read as a PLY: {error}") from None
+    if faces is None or len(faces) == 0:
+        return points[np.isfinite(points).all(axis=1)], None
+    if not math.isfinite(float(points.sum())):
+        raise InputError(f"{file}: its vertices are not all finite")
+    return points, np.asarray(faces, dtype=np.int64)
