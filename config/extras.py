@@ -19,6 +19,7 @@ EXTRAS: Final = {
     "pygltflib": ("pygltflib", "vision"),
     "distributed": ("Dask", "sweep"),
     "dask": ("Dask", "sweep"),
+    "gymnasium": ("Gymnasium", "gym"),
     "rosbags": ("rosbags", "export"),
     "pyarrow": ("pyarrow", "export"),
 }

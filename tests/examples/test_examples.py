@@ -8,8 +8,16 @@ from pathlib import Path
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples"
-NAMES = ("drive_chain", "bus_in_a_test", "live_gait", "own_motion", "read_log", "sweep")
-ALLOWED = {"snakewalk", "numpy", "pytest"} | set(sys.stdlib_module_names)
+NAMES = (
+    "drive_chain",
+    "bus_in_a_test",
+    "live_gait",
+    "own_motion",
+    "read_log",
+    "sweep",
+    "learn_wave",
+)
+ALLOWED = {"snakewalk", "numpy", "pytest", "gymnasium"} | set(sys.stdlib_module_names)
 
 
 def run(name: str, *arguments: str, folder: Path) -> str:

@@ -18,7 +18,7 @@ from typing import Any
 BLOCKED = frozenset(
     (
         *("mujoco", "matplotlib", "mpl_toolkits", "av", "cv2", "skimage", "imageio", "PIL"),
-        *("h5py", "trimesh", "distributed", "dask", "rosbags", "pyarrow"),
+        *("h5py", "trimesh", "distributed", "dask", "rosbags", "pyarrow", "gymnasium"),
     )
 )
 

@@ -1,0 +1,1 @@
+"""A simulated robot on its bus as an environment for reinforcement learning (Gymnasium)."""
