@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from snakewalk.config.arrays import Image
+from snakewalk.config.arrays import Bools, Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.background import (
@@ -53,6 +53,10 @@ class BodyDetector:
     surroundings_px: int = 0
     """Where there is no background: side of the square whose ground a place is compared with; 0: a
     smooth surface is fitted to the frame."""
+    inside: Bools | None = None
+    """(H, W) where the animal may be; a body that reaches beyond is cut. None: everywhere."""
+    threshold: float | None = None
+    """Contrast at the body's boundary, grey levels; None: half of the body's own."""
 
     def detect(self, image: Image) -> Detection:
         """Find the animal in one frame; a frame that cannot be used is not ``GOOD``.
@@ -68,7 +72,12 @@ class BodyDetector:
             raise InputError(
                 f"a frame is {_size(image)}, the background {_size(background)}: they must be alike"
             )
-        body = silhouette_of(image, background, self.polarity)
+        body = silhouette_of(image, background, self.polarity, self.threshold)
+        if self.inside is not None and body.status is FrameStatus.GOOD:
+            left, top = (int(v) for v in body.origin_px)
+            rows, columns = body.mask.shape
+            if (body.mask & ~self.inside[top : top + rows, left : left + columns]).any():
+                body = replace(body, status=FrameStatus.CUT)
         if body.status is not FrameStatus.GOOD:
             return Detection(body, no_skeleton(body.status), background)
         skeleton = skeleton_of_level(body.level, body.threshold, body.origin_px, body.noise_level)
@@ -86,7 +95,12 @@ class BodyDetector:
 
 
 def make_detector(
-    frames: Sequence[Image], background: Image | None = None, *, cropped: bool = False
+    frames: Sequence[Image],
+    background: Image | None = None,
+    *,
+    cropped: bool = False,
+    inside: Bools | None = None,
+    threshold: float | None = None,
 ) -> BodyDetector:
     """Learn a scene from a few frames spread over the recording.
 
@@ -101,6 +115,8 @@ def make_detector(
         background: the scene without the animal.
         cropped: the camera moves, or the frames were cropped to the animal: the ground is found in
             each frame alone.
+        inside: (H, W) where the animal may be.
+        threshold: contrast at the body's boundary, grey levels, of a user who knows it.
 
     Raises:
         InputError: no frames, or the background is of another size.
@@ -108,12 +124,15 @@ def make_detector(
     """
     if not frames:
         raise InputError("no frames to look at")
+    plain = BodyDetector(None, Polarity.BOTH, "", 0, inside, threshold)
     if background is not None:
-        given = BodyDetector(background, Polarity.BOTH, "given")
+        given = replace(plain, background=background, background_source="given")
         given.detect(frames[0])
         return replace(given, polarity=_usual_polarity(frames, background))
-    surface = BodyDetector(
-        None, _usual_polarity(frames, None), "a smooth surface through each frame"
+    surface = replace(
+        plain,
+        polarity=_usual_polarity(frames, None),
+        background_source="a smooth surface through each frame",
     )
     alone = [_Candidate.of(surface, frames)]
     around = _with_surroundings(surface, alone[0], frames)
@@ -122,10 +141,11 @@ def make_detector(
     if cropped or len({frame.shape for frame in frames}) > 1 or len(frames) < _FEWEST:
         return _best(alone)
     median, *quantiles = [
-        BodyDetector(
-            candidate,
-            _usual_polarity(frames, candidate) if polarity is None else polarity,
-            source,
+        replace(
+            plain,
+            background=candidate,
+            polarity=_usual_polarity(frames, candidate) if polarity is None else polarity,
+            background_source=source,
         )
         for candidate, polarity, source in background_candidates(frames)
     ]
@@ -187,7 +207,7 @@ def _with_surroundings(
     source = "the surroundings of each place in each frame"
     found: list[_Candidate] = []
     for size in tried:
-        detector = BodyDetector(None, surface.polarity, source, size)
+        detector = replace(surface, background_source=source, surroundings_px=size)
         found.append(_Candidate.of(detector, frames[:: max(1, len(frames) // 9)]))
         if found[-1].share >= _CLEAR:
             break
@@ -214,8 +234,11 @@ def _painted_out(detector: BodyDetector, frames: Sequence[Image]) -> BodyDetecto
     if len(out) < max(_CALM, len(frames) // 2):
         return None
     ground = median_background(out)
-    return BodyDetector(
-        ground, detector.polarity, "the median of frames, the animal painted out of each"
+    return replace(
+        detector,
+        background=ground,
+        background_source="the median of frames, the animal painted out of each",
+        surroundings_px=0,
     )
 
 

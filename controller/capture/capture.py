@@ -10,20 +10,16 @@ from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.body_detector import BodyDetector
 from snakewalk.controller.capture.frame_status import FrameStatus
-from snakewalk.controller.capture.identity import align_ends, margins, taper_score, travel_score
+from snakewalk.controller.capture.identity import align_ends, head_end, margins
 from snakewalk.controller.capture.image.medial_axis import Skeleton
 from snakewalk.controller.capture.outlier_frames import mark_outliers
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
 from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Crop, crop_body
 from snakewalk.controller.capture.small_body.film_fit import fit_film
-from snakewalk.controller.capture.track import track_from_points
-from snakewalk.controller.capture.wave import measure_wave
 
 _DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
 _LOST_FRAMES = 5  # for so many frames a lost small body is searched where it was last
 _STILL = 0.02  # of the length: less change than that is no motion
-_TRAVEL = 0.2  # travel score from which the travel decides which end is the head
-_TRAVEL_S = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +104,7 @@ def capture(
             f"{name}: no motion: the body changes by less than {_STILL:.0%} of its length in "
             f"{len(points)} frames"
         )
-    score, by = _head_first(points, radius, rate_hz, head_px, fixed=fixed)
+    score, by = head_end(points, radius, rate_hz, head_px, fixed=fixed)
     skeletons = [one.reversed() if score < 0.0 else one for one in aligned.skeletons]
     expected = np.array(found.expected_px)
     fitted = fit_film(skeletons, found.crops, aligned.margin, expected, fixed=fixed)
@@ -229,28 +225,3 @@ def _change(points: Floats) -> float:
     good = points[np.isfinite(points[:, 0, 0])]
     length = float(np.hypot(*np.diff(good[0], axis=0).T).sum())
     return float(np.hypot(*(good - good[0]).transpose(2, 0, 1)).mean(axis=1).max()) / length
-
-
-def _head_first(
-    points: Floats,
-    radius: Floats,
-    rate_hz: float,
-    head_px: tuple[float, float] | None,
-    *,
-    fixed: bool,
-) -> tuple[float, str]:
-    """Score from -1 to 1, above 0 where the first end is the head, and what it rests on."""
-    good = np.isfinite(points[:, 0, 0])
-    if head_px is not None:
-        first = points[np.argmax(good)]
-        one, other = (float(np.hypot(*(first[k] - head_px))) for k in (0, -1))
-        return (1.0 if one <= other else -1.0), "given"
-    if fixed:
-        travel = travel_score(points, max(1, round(_TRAVEL_S * rate_hz)))
-        if abs(travel) > _TRAVEL:
-            return travel, "travel"
-    if int(good.sum()) >= 8:
-        wave = measure_wave(track_from_points("", points, rate_hz))
-        if abs(wave.headward - 0.5) > 0.05:
-            return 1.0 - 2.0 * wave.headward, "wave"
-    return taper_score(radius[good]), "taper"

@@ -13,8 +13,15 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.medial_axis import Skeleton
+from snakewalk.controller.capture.track import track_from_points
+from snakewalk.controller.capture.wave import measure_wave
 
 _SURE = 0.2  # margin from which one frame is enough to tell the ends apart
+_WAVE_FRAMES = 8  # from which a wave's direction is looked at
+_TRAVEL = 0.2  # travel score from which the travel decides which end is the head
+_TRAVEL_S = 0.25
+_TRAVEL_PX = 1.0  # over that time; less is what a camera that goes with the animal by pixels leaves
+_TRAVEL_OF_WAVE = 0.075  # of the wave's speed: less travel is that of the camera, not of the animal
 _GAP = 3  # frames without a skeleton after which the place alone is not enough
 
 
@@ -110,9 +117,20 @@ def travel_score(points_px: Floats, step: int) -> float:
     moved = middle[step:] - middle[:-step]
     along = (moved * unit[:-step]).sum(axis=1)
     whole = np.hypot(*moved.T)
-    long = np.nanmedian(np.hypot(*np.diff(points_px, axis=1).transpose(2, 0, 1)).sum(axis=1))
-    use = np.isfinite(along) & (whole > 0.01 * long)
+    use = np.isfinite(along) & (whole > 0.01 * median_length(points_px))
     return float(along[use].sum() / whole[use].sum()) if use.any() else 0.0
+
+
+def usual_travel(points_px: Floats, step: int) -> float:
+    """How far the middle of the body (T, P, 2) goes in so many frames, median; 0: not known."""
+    middle = points_px.mean(axis=1)
+    moved = np.hypot(*(middle[step:] - middle[:-step]).T)
+    return float(np.nanmedian(moved)) if np.isfinite(moved).any() else 0.0
+
+
+def median_length(points_px: Floats) -> float:
+    """Median length of the bodies (T, P, 2)."""
+    return float(np.nanmedian(np.hypot(*np.diff(points_px, axis=1).transpose(2, 0, 1)).sum(axis=1)))
 
 
 def taper_score(radius_px: Floats) -> float:
@@ -121,3 +139,46 @@ def taper_score(radius_px: Floats) -> float:
     count = len(mean)
     one, other = mean[count // 20 : count // 5], mean[::-1][count // 20 : count // 5]
     return float((one.mean() - other.mean()) / mean.mean())
+
+
+def head_end(
+    points: Floats,
+    radius: Floats,
+    rate_hz: float,
+    head_px: tuple[float, float] | None,
+    *,
+    fixed: bool,
+) -> tuple[float, str]:
+    """Which end is the head: given, or by travel, the wave's direction, or the taper.
+
+    Args:
+        points: (T, P, 2) pixels, the same end first in all; NaN where there is no body.
+        radius: (T, P) half the thickness.
+        rate_hz: frames a second.
+        head_px: a place near the head in the first frame with a body.
+        fixed: whether the camera stands still.
+
+    Returns:
+        A score from -1 to 1, above 0 where the first end is the head, and what it rests on.
+
+    """
+    good = np.isfinite(points[:, 0, 0])
+    if head_px is not None:
+        first = points[np.argmax(good)]
+        one, other = (float(np.hypot(*(first[k] - head_px))) for k in (0, -1))
+        return (1.0 if one <= other else -1.0), "given"
+    wave = None
+    if int(good.sum()) >= _WAVE_FRAMES:
+        wave = measure_wave(track_from_points("", points, rate_hz))
+    if fixed:
+        step = max(1, round(_TRAVEL_S * rate_hz))
+        travel = travel_score(points, step)
+        least_px = _TRAVEL_PX
+        if wave is not None:
+            pulse = abs(wave.pulse_body_lengths_s) * median_length(points) * step / rate_hz
+            least_px = max(least_px, _TRAVEL_OF_WAVE * pulse)
+        if abs(travel) > _TRAVEL and usual_travel(points, step) > least_px:
+            return travel, "travel"
+    if wave is not None and abs(wave.headward - 0.5) > 0.05:
+        return 1.0 - 2.0 * wave.headward, "wave"
+    return taper_score(radius[good]), "taper"

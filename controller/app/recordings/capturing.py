@@ -1,6 +1,6 @@
 """One recording captured: frames read, the animal detected in them, track and pictures written."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from snakewalk.controller.app.report.plots.capture import contact_sheet, overlay
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.capture.body_detector import BodyDetector, make_detector
 from snakewalk.controller.capture.capture import Capture, capture, save_capture
+from snakewalk.controller.capture.image.region import WHOLE, region_of
 from snakewalk.controller.capture.image.video import Footage, open_footage, read_image
 from snakewalk.controller.capture.scale import scale_of_length, scale_of_marker
 
@@ -34,6 +35,9 @@ class CaptureOptions:
     rate_hz: float | None = None
     head: str | None = None
     cropped: bool = False
+    roi: str | None = None
+    mask: Path | None = None
+    threshold: float | None = None
     overlay: Path | None = None
     sheet: Path | None = None
     steps: Path | None = None
@@ -78,26 +82,42 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     head_px = None if options.head is None else _place(options.head)
     console = Console(stderr=True)
     with console.status("learning the background ..."):
-        some = footage.spread(_SAMPLE)
+        whole = footage.spread(_SAMPLE)
+        if (options.roi or options.mask) and len({frame.shape for frame in whole}) > 1:
+            raise InputError(
+                f"{options.recording}: --roi and --mask need images of one size; these differ"
+            )
+        region = region_of(options.roi, options.mask, whole[0].shape)
+        some = [region.cut(frame) for frame in whole]
         background = (
-            None if options.background is None else _like(read_image(options.background), some[0])
+            None
+            if options.background is None
+            else region.cut(_like(read_image(options.background), whole[0]))
         )
-        detector = make_detector(some, background, cropped=options.cropped)
+        detector = make_detector(
+            some,
+            background,
+            cropped=options.cropped,
+            inside=region.inside,
+            threshold=options.threshold,
+        )
         m_per_px = None
         if options.marker is not None:
-            ground = some[0] if detector.background is None else detector.background
+            bare = detector.background if region is WHOLE else None
+            ground = whole[0] if bare is None else bare
             m_per_px = scale_of_marker(options.marker, ground)
-    fixed = not options.cropped and len({frame.shape for frame in some}) == 1
+    fixed = not options.cropped and len({frame.shape for frame in whole}) == 1
     with ProgressBar("frames", footage.count, transient=True) as bar:
         captured = capture(
-            footage.read(),
+            map(region.cut, footage.read()),
             detector,
             footage.rate_hz,
             name=str(options.recording),
-            head_px=head_px,
+            head_px=None if head_px is None else region.place(*head_px),
             fixed=fixed,
             on_progress=bar.advance,
         )
+        captured = replace(captured, points_px=region.moved(captured.points_px))
         if options.length_m is not None:
             m_per_px = scale_of_length(options.length_m, captured.length_px)
         with atomic_write(options.output) as part:
@@ -112,8 +132,9 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             contact_sheet(options.sheet, footage.read(), captured)
         if options.steps is not None:
             number = int(np.argmax(captured.used))
-            image = next(islice(footage.read(), number, None))
-            step_picture(options.steps, image, detector, captured.points_px[number])
+            image = region.cut(next(islice(footage.read(), number, None)))
+            line = captured.points_px[number] - np.array(region.origin_px)
+            step_picture(options.steps, image, detector, line)
         if options.overlay is not None:
             bar.update(0, footage.count, description="overlay film")
             overlay_film(options.overlay, footage.read(), captured, bar.advance)
@@ -127,6 +148,11 @@ def _check(options: CaptureOptions) -> None:
         raise InputError("--length-m and --marker both give the scale: say one of them")
     if options.length_m is not None and not 0.0 < options.length_m < float("inf"):
         raise InputError(f"--length-m: the animal must be longer than 0 m, not {options.length_m}")
+    if options.threshold is not None and not 0.0 < options.threshold < float("inf"):
+        raise InputError(
+            f"--threshold {options.threshold:g}: expected the grey levels, above 0, by which the "
+            "body stands out from its background at its boundary"
+        )
     if options.output.suffix.lower() != ".npz":
         raise InputError(f"{options.output}: a track is an .npz")
     if options.overlay is not None and options.overlay.suffix.lower() not in _FILMS:

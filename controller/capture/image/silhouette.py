@@ -74,7 +74,10 @@ def _noise_of(apart: Image) -> tuple[float, float]:
 
 
 def silhouette_of(
-    image: Image, background: Image, polarity: Polarity = Polarity.BOTH
+    image: Image,
+    background: Image,
+    polarity: Polarity = Polarity.BOTH,
+    threshold: float | None = None,
 ) -> Silhouette:
     """Find the animal of one frame.
 
@@ -82,6 +85,7 @@ def silhouette_of(
         image: (H, W) or (H, W, 3), 8 bit.
         background: the same without the animal.
         polarity: whether the animal is darker or lighter than its ground.
+        threshold: contrast at the boundary, grey levels; None: half of the body's own.
 
     """
     apart: Image = np.asarray(
@@ -89,6 +93,8 @@ def silhouette_of(
     )
     middle, spread = _noise_of(apart)
     clear = middle + _CLEAR * spread
+    if threshold is not None:
+        return _cut_out(apart, threshold, min(clear, threshold), middle)
     found = _parts((apart > clear).astype(np.uint8))
     if found is None:
         return _no_silhouette()

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from snakewalk.controller.capture.body_detector import BodyDetector, make_detector
 from snakewalk.controller.capture.capture import Capture, capture
 from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.capture.identity import head_end, travel_score
 from snakewalk.controller.capture.image.background import median_background, surrounding_ground
 from snakewalk.controller.capture.image.silhouette import Polarity, silhouette_of
 from snakewalk.controller.capture.small_body.crop import crop_body
@@ -118,3 +119,19 @@ def test_a_body_is_not_searched_outside_its_crop() -> None:
     crop = crop_body(image, image, line)
     assert crop.shows(line)
     assert not crop.shows(line + 200.0)
+
+
+def test_jitter_of_a_camera_that_goes_with_the_animal_is_no_travel() -> None:
+    scene = replace(
+        SCENE, rows=240, columns=320, length_px=42.0, frames=12, taper=0.2, waves=1.1, bend_rad=0.8,
+        wave_hz=0.9, follow=1.0,
+    )  # fmt: skip
+    points = true_midlines(scene)
+    alike = np.ones(points.shape[:2])
+    assert travel_score(points, 8) < -0.5, "the jitter looks like travel, tail first"
+    for way in (1, -1):
+        score, by = head_end(points[:, ::way], alike, scene.rate_hz, None, fixed=True)
+        assert by == "wave"
+        assert score * way > 0.9
+    going = true_midlines(replace(scene, follow=0.0))
+    assert head_end(going, alike, scene.rate_hz, None, fixed=True)[1] == "travel"

@@ -40,6 +40,19 @@ def capture(
             "--cropped", help="the images were cropped to the animal, or the camera moves"
         ),
     ] = False,
+    roi: Annotated[
+        str | None, typer.Option(help="look only here: X,Y,W,H in pixels", metavar="X,Y,W,H")
+    ] = None,
+    mask: Annotated[
+        Path | None, typer.Option(help="look only where this picture is white", metavar="PNG")
+    ] = None,
+    threshold: Annotated[
+        float | None,
+        typer.Option(
+            help="grey levels by which the body's boundary stands out from the background; "
+            "default: half of the body's own contrast"
+        ),
+    ] = None,
     overlay: Annotated[
         Path | None, typer.Option(help="write the film with the skeleton on it (.mp4, .avi)")
     ] = None,
@@ -65,6 +78,9 @@ def capture(
         rate_hz=rate,
         head=head,
         cropped=cropped,
+        roi=roi,
+        mask=mask,
+        threshold=threshold,
         overlay=overlay,
         sheet=sheet,
         steps=steps,
