@@ -11,7 +11,7 @@ CLIENTS := lerobot==0.4.4 deepdiff orderly-set cachebox tqdm deprecation
 # This one brings an old dynamixel_sdk along, so it gets a folder of its own, without that.
 ASIDE := dynamixel-controller==0.9.2
 
-.PHONY: setup run test lint types unit bench campaign failures clean
+.PHONY: setup loops run test lint types unit bench campaign failures clean
 
 setup: $(STAMP)
 
@@ -26,10 +26,16 @@ $(STAMP): pyproject.toml
 	.ci/offscreen
 	touch $(STAMP)
 
-run: setup
+# The loops are compiled once, by two processes, before many would compile them each for itself.
+loops: setup
+	$(BIN)/python .ci/loops
+
+run: loops
 	$(BIN)/snakewalk run
 
-test: setup lint types unit
+# The types are checked while the loops are compiled and the tests collected: neither fills two cores.
+test: setup lint
+	$(MAKE) -j 2 types unit
 
 lint: setup
 	$(BIN)/ruff check .
@@ -38,8 +44,9 @@ lint: setup
 types: setup
 	$(BIN)/mypy
 
-unit: setup
-	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2
+# Each process takes whole files in their order, so that a file's fixtures are made once.
+unit: loops
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
 
 # make bench     ratios to peers and limits; make campaign  100,000 cycles under faults
 bench: setup

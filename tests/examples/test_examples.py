@@ -1,6 +1,7 @@
 """Each example runs with its defaults, explains itself, is short, and needs only the library."""
 
 import ast
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -20,9 +21,9 @@ NAMES = (
 ALLOWED = {"snakewalk", "numpy", "pytest", "gymnasium"} | set(sys.stdlib_module_names)
 
 
-def run(name: str, *arguments: str, folder: Path) -> str:
+def run(name: str, *, folder: Path) -> str:
     done = subprocess.run(
-        [sys.executable, str(FOLDER / f"{name}.py"), *arguments],
+        [sys.executable, str(FOLDER / f"{name}.py")],
         cwd=folder,
         capture_output=True,
         text=True,
@@ -31,6 +32,15 @@ def run(name: str, *arguments: str, folder: Path) -> str:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+def shown_help(path: Path, monkeypatch: pytest.MonkeyPatch, out: pytest.CaptureFixture[str]) -> str:
+    """What a script prints for ``--help``, on one line; it runs in this process."""
+    monkeypatch.setattr(sys, "argv", [str(path), "--help"])
+    with pytest.raises(SystemExit) as end:
+        runpy.run_path(str(path), run_name="__main__")
+    assert not end.value.code
+    return " ".join(out.readouterr().out.split())
 
 
 def test_these_are_the_examples() -> None:
@@ -44,11 +54,12 @@ def test_it_runs_and_leaves_nothing(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_explains_itself(name: str, tmp_path: Path) -> None:
+def test_it_explains_itself(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     source = (FOLDER / f"{name}.py").read_text(encoding="utf-8")
     first_line = str(ast.get_docstring(ast.parse(source))).splitlines()[0]
-    shown = " ".join(run(name, "--help", folder=tmp_path).split())
-    assert first_line in shown
+    assert first_line in shown_help(FOLDER / f"{name}.py", monkeypatch, capsys)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -66,8 +77,10 @@ def test_it_is_short_and_imports_only_the_library(name: str) -> None:
 
 
 @pytest.mark.parametrize("tool", ["film_strip", "gallery", "overhead_picture"])
-def test_the_tools_that_draw_the_pages_explain_themselves(tool: str, tmp_path: Path) -> None:
-    path = FOLDER.parent / "docs" / "pictures" / "tools" / tool
-    shown = run(str(path), "--help", folder=tmp_path)
+def test_the_tools_that_draw_the_pages_explain_themselves(
+    tool: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = FOLDER.parent / "docs" / "pictures" / "tools" / f"{tool}.py"
+    shown = shown_help(path, monkeypatch, capsys)
     assert "usage" in shown
     assert "docs/" in shown or "film" in shown

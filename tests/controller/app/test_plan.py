@@ -1,8 +1,6 @@
 """The command line on paper: plans, lists, and refuses bad input with exit code 2."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +8,7 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.runs.factory import prepare_walk
-
-
-def snakewalk(*words: str) -> subprocess.CompletedProcess[str]:
-    code = "from snakewalk.controller.app.cli.main import main; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False
-    )
+from tests.helpers.command import snakewalk
 
 
 @pytest.mark.parametrize("run", ["flat-square", "flat-slalom"])

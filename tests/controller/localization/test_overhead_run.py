@@ -1,8 +1,5 @@
 """Runs that close their loop over the camera; refusals; a device that is a film."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import cv2
@@ -22,6 +19,7 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.drivers.clock import WallClock
 from snakewalk.sim.rendering.offscreen import OffscreenError
 from snakewalk.sim.rendering.top_view import TopView
+from tests.helpers.command import snakewalk
 from tests.oracles.overhead_scene import DrawnView
 
 
@@ -137,21 +135,10 @@ def test_what_cannot_work_is_refused_before_anything_is_written(
     ],
 )
 def test_the_command_line_says_what_is_wrong_in_one_line(
-    arguments: tuple[str, ...], line: str, tmp_path: Path
+    arguments: tuple[str, ...], line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "from snakewalk.controller.app.cli.main import main; main()",
-            *arguments,
-        ],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    monkeypatch.chdir(tmp_path)
+    done = snakewalk(*arguments)
     assert done.returncode == 2, done.stderr
     said = [text for text in done.stderr.splitlines() if text.startswith("snakewalk: ")]
     assert len(said) == 1

@@ -1,33 +1,22 @@
 """``snakewalk repertoire`` and ``snakewalk plan --with repertoire`` from outside."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from snakewalk.controller.repertoire.repertoire import Repertoire
-
-ROOT = Path(__file__).resolve().parents[3]
-
-
-def snakewalk(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    code = "from snakewalk.controller.app.cli.main import main; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *words],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
+from tests.helpers.command import snakewalk
 
 
-def test_help_has_an_example(tmp_path: Path) -> None:
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_help_has_an_example() -> None:
     for command in ("record", "show", "run"):
-        done = snakewalk(tmp_path, "repertoire", command, "--help")
+        done = snakewalk("repertoire", command, "--help")
         assert done.returncode == 0, done.stderr
         assert f"snakewalk repertoire {command}" in done.stdout
 
@@ -35,16 +24,16 @@ def test_help_has_an_example(tmp_path: Path) -> None:
 def test_plan_save_and_refuse_to_overwrite(repertoire: Repertoire, tmp_path: Path) -> None:
     repertoire.save(tmp_path / "repertoire-yaw16-flat.npz")
     words = ("plan", "flat-slalom", "--with", "repertoire", "-o", "plan.json", "--json")
-    done = snakewalk(tmp_path, *words)
+    done = snakewalk(*words)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["waypoints_reached"] == 5
     plan = json.loads((tmp_path / "plan.json").read_text())
     assert plan["actions"] == found["actions"]
-    again = snakewalk(tmp_path, *words)
+    again = snakewalk(*words)
     assert again.returncode == 2
     assert again.stderr == "snakewalk: plan.json: exists; --force overwrites it\n"
-    shown = snakewalk(tmp_path, "repertoire", "show", "repertoire-yaw16-flat.npz", "--json")
+    shown = snakewalk("repertoire", "show", "repertoire-yaw16-flat.npz", "--json")
     rows = json.loads(shown.stdout)["actions"]
     assert [row["name"] for row in rows] == [segment.name for segment in repertoire.segments]
 
@@ -66,7 +55,7 @@ def test_plan_save_and_refuse_to_overwrite(repertoire: Repertoire, tmp_path: Pat
 def test_bad_input_is_one_line_and_exit_code_2(
     tmp_path: Path, words: tuple[str, ...], said: str
 ) -> None:
-    done = snakewalk(tmp_path, *words)
+    done = snakewalk(*words)
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr.count("\n") == 1

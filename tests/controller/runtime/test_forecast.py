@@ -1,8 +1,6 @@
 """The run on paper, on ramps: up is slower than down, level is as without a ground."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +8,7 @@ import numpy as np
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.runtime.forecast import Forecast, forecast
+from tests.helpers.command import snakewalk
 
 
 def ahead(rise: float | None, limit_s: float = 30.0) -> Forecast:
@@ -58,10 +57,6 @@ def test_the_plan_says_that_its_ground_is_too_steep(tmp_path: Path) -> None:
         'name = "r"\nrobot = "alternating16"\nworld = "cliff.toml"\nmotion = "serpenoid"\n'
         "time_limit_s = 3.0\nstart_m = [0, 0]\nwaypoints_m = [[1, 0]]\n"
     )
-    code = "from snakewalk.controller.app.cli.main import main; main()"
-    done = subprocess.run(
-        [sys.executable, "-c", code, "plan", str(run), "--json"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = snakewalk("plan", str(run), "--json")
     assert done.returncode == 0, done.stderr
     assert " deg of " in json.loads(done.stdout)["steeper_than_held"]

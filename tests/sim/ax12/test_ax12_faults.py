@@ -1,7 +1,5 @@
 """Fault files on a bus of AX-12A: every kind, on Protocol 1.0 packets and the model's registers."""
 
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from snakewalk.sim.ax12.protocol1 import Error1, frame
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import parse_chain
+from tests.helpers.command import snakewalk
 from tests.sim.faults.test_faults import fault
 
 OK = (sdk.COMM_SUCCESS, 0)
@@ -263,11 +262,8 @@ def test_what_the_model_cannot_detect_is_refused(kind: str) -> None:
 def test_serve_refuses_in_one_line(tmp_path: Path) -> None:
     path = tmp_path / "faults.toml"
     path.write_text(fault("encoder", ids=[5]))
-    code = "from snakewalk.controller.app.cli.main import main; main()"
     words = ("bus", "serve", "--servos", "5:AX-12A", "--faults", str(path))
-    done = subprocess.run(
-        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False
-    )
+    done = snakewalk(*words)
     assert done.returncode == 2
     assert done.stderr.strip().endswith(
         f"{path}: fault.0.encoder: servo 5 detects overload, overheating, voltage only"

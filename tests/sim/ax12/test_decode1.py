@@ -1,8 +1,6 @@
 """Protocol 1.0 in words."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 from snakewalk.sim.ax12.ax12 import Ax12Servos
@@ -12,6 +10,7 @@ from snakewalk.sim.ax12.protocol1 import BROADCAST_ID, Error1, Instruction1, fra
 from snakewalk.sim.servo.bench import BenchPlant
 from snakewalk.sim.sniff.decode import DecodedPacket
 from snakewalk.sim.sniff.trace import TraceWriter
+from tests.helpers.command import snakewalk
 
 
 def decoded(*questions: bytes, alarm: int = 0, to: object = None) -> list[DecodedPacket]:
@@ -72,11 +71,9 @@ def test_sniff_reads_a_recording(tmp_path: Path) -> None:
     path = tmp_path / "exchange.jsonl"
     with path.open("w", encoding="utf-8") as out:
         decoded(frame(2, Instruction1.READ, bytes((43, 1))), to=out)
-    code = "from snakewalk.controller.app.cli.main import main; main()"
     words = ("bus", "sniff", str(path), "--model", "ax-12a", "--json")
-    done = subprocess.run(
-        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=True
-    )
+    done = snakewalk(*words)
+    assert done.returncode == 0, done.stderr
     lines = [json.loads(line) for line in done.stdout.splitlines()]
     assert [line["values"] for line in lines] == [
         {"Present Temperature": "?"},

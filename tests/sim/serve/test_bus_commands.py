@@ -15,6 +15,7 @@ from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.serve.pty import LATE_S, PtyServer
 from snakewalk.sim.serve.servo_bus import ServoBus
 from tests.helpers.bus import a_line, serve_for
+from tests.helpers.command import snakewalk
 from tests.sim.faults.test_faults import fault, scripted
 
 pytestmark = pytest.mark.usefixtures("patient_sdk")
@@ -22,7 +23,7 @@ pytestmark = pytest.mark.usefixtures("patient_sdk")
 PING = bytes.fromhex("FF FF FD 00 01 03 00 01 19 4E")
 
 
-def snakewalk(*words: str) -> subprocess.Popen[str]:
+def started(*words: str) -> subprocess.Popen[str]:
     # a runner in the background has SIGINT ignored, which its children inherit
     code = (
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
@@ -40,7 +41,7 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
     record = tmp_path / "exchange.jsonl"
     link = tmp_path / "tty"
     words = ("--servos", "1-2:XL330-M288", "--json")
-    with snakewalk("bus", "serve", *words, "--record", str(record), "--link", str(link)) as process:
+    with started("bus", "serve", *words, "--record", str(record), "--link", str(link)) as process:
         assert process.stdout is not None
         first = json.loads(process.stdout.readline())
         assert first["ids"] == [1, 2]
@@ -56,15 +57,8 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
     done = json.loads(out)
     assert done["answers"] == 1
     assert not link.exists()
-    sniffed = subprocess.run(
-        [
-            *(sys.executable, "-c", "from snakewalk.controller.app.cli.main import main; main()"),
-            *("bus", "sniff", str(record), "--json"),
-        ],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    sniffed = snakewalk("bus", "sniff", str(record), "--json")
+    assert sniffed.returncode == 0, sniffed.stderr
     lines = [json.loads(line) for line in sniffed.stdout.splitlines()]
     assert [line["name"] for line in lines][:2] == ["ping", "ok"]
     assert lines[1]["values"]["model"] == "XL330-M288"
@@ -82,11 +76,10 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
     ],
 )
 def test_wrong_input_is_one_line_and_exit_code_2(words: tuple[str, ...], said: str) -> None:
-    with snakewalk("bus", *words) as process:
-        _, error = process.communicate()
-    assert process.returncode == 2
-    assert said in error
-    assert len(error.splitlines()) == 1
+    ended = snakewalk("bus", *words)
+    assert ended.returncode == 2
+    assert said in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
 
 
 def test_the_pty_vanishes_and_comes_back_behind_its_link(tmp_path: Path) -> None:
@@ -149,7 +142,7 @@ def test_the_fixture_takes_faults(servo_bus: Callable[..., ServoBus], tmp_path: 
 
 
 def test_serve_speaks_protocol_1_for_an_ax12() -> None:
-    with snakewalk("bus", "serve", "--servos", "5:AX-12A", "--json") as process:
+    with started("bus", "serve", "--servos", "5:AX-12A", "--json") as process:
         assert process.stdout is not None
         port = sdk.PortHandler(json.loads(process.stdout.readline())["port"])
         port.setBaudRate(1_000_000)

@@ -1,8 +1,6 @@
 """``snakewalk capture``: films in, a track out; bad input in one line; nothing overwritten."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -16,16 +14,10 @@ from snakewalk.controller.app.recordings.capturing import CaptureOptions, captur
 from snakewalk.controller.capture.image.video import open_footage
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.capture.scale import scale_of_marker
+from tests.helpers.command import snakewalk
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 
 SCENE = SnakeScene(rows=160, columns=200, length_px=70.0, frames=24, wave_hz=1.0)
-
-
-def snakewalk(*words: str) -> subprocess.CompletedProcess[str]:
-    code = "from snakewalk.controller.app.cli.main import main; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, "capture", *words], capture_output=True, text=True, check=False
-    )
 
 
 def write_film(path: Path, frames: Iterable[np.ndarray]) -> Path:
@@ -44,7 +36,7 @@ def swim(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Path) -> None:
     track, sheet, overlay = (tmp_path / name for name in ("t.npz", "s.png", "o.avi"))
     done = snakewalk(
-        str(swim), "-o", str(track), "--length-m", "0.35", "--sheet", str(sheet),
+        "capture", str(swim), "-o", str(track), "--length-m", "0.35", "--sheet", str(sheet),
         "--overlay", str(overlay), "--json",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -124,7 +116,7 @@ def test_markers_give_the_scale(tmp_path: Path) -> None:
 
 
 def test_help_has_an_example() -> None:
-    done = snakewalk("--help")
+    done = snakewalk("capture", "--help")
     assert done.returncode == 0
     assert "snakewalk capture film.mp4" in " ".join(done.stdout.split())
 
@@ -132,7 +124,7 @@ def test_help_has_an_example() -> None:
 def test_bad_files_end_with_exit_code_2_and_one_line(tmp_path: Path) -> None:
     junk = tmp_path / "junk.mp4"
     junk.write_bytes(b"no film" * 50)
-    done = snakewalk(str(junk), "-o", str(tmp_path / "t.npz"))
+    done = snakewalk("capture", str(junk), "-o", str(tmp_path / "t.npz"))
     assert done.returncode == 2
     told = [line for line in done.stderr.splitlines() if line.strip()]
     assert len(told) == 1

@@ -1,8 +1,6 @@
 """``snakewalk track``: table, JSON, picture and refusals; what a robot refuses."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +9,8 @@ import pytest
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.run import StatesConfig
 from snakewalk.controller.walk.shape_filters import shape_filters
+from tests.helpers.command import snakewalk
 from tests.helpers.travelling import S, ends, wave_angles
-
-
-def snakewalk(*words: str) -> subprocess.CompletedProcess[str]:
-    code = "from snakewalk.controller.app.cli.main import main; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False
-    )
 
 
 def test_a_file_and_a_shipped_name_as_json_with_a_picture(tmp_path: Path) -> None:

@@ -1,8 +1,6 @@
 """The study of Fig. 9: what is counted, repeatability, the paper's claims in small, the command."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +9,7 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.studies.graph_study import StudyResult, return_gaps, run_study
 from snakewalk.controller.shape.walks import Walk
+from tests.helpers.command import snakewalk
 
 
 def walked(path: list[int], states: int) -> Walk:
@@ -73,13 +72,6 @@ def test_claims_of_the_paper_on_sparse_graphs() -> None:
     assert cover["stack"] < cover["snake"] < cover["random"]
     assert found["snake"].cover.max() < np.log(400)  # N log N
     assert found["snake"].short_returns.mean() < 0.4 * found["stack"].short_returns.mean()
-
-
-def snakewalk(*words: str) -> subprocess.CompletedProcess[str]:
-    code = "from snakewalk.controller.app.cli.main import main; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False
-    )
 
 
 def test_the_command_compares_rules_as_json_and_draws_them(tmp_path: Path) -> None:
