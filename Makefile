@@ -80,4 +80,5 @@ failures: setup
 	  -o $(FAILURES)/friction.csv --picture $(FAILURES)/friction.png
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

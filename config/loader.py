@@ -58,7 +58,11 @@ def load(path: Path, model: type[M]) -> M:
         data = tomllib.loads(text)
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
+        place = _PLACE.search(str(error))
+        where = f"{path}:{place[1]}" if place else str(path)
+        raise ConfigError(f"{where}: not TOML: {_PLACE.sub('', str(error))}") from None
+    except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: not TOML: {error}") from None
     return checked(model, data, str(path), text)
 
@@ -153,6 +157,7 @@ def _folder(kind: Kind) -> Path:
     return Path(__file__).parent / kind
 
 
+_PLACE: Final = re.compile(r" ?\(at line (\d+), column \d+\)")
 _TABLE: Final = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]")
 _KEY: Final = re.compile(r"""^\s*([\w."' -]+?)\s*=""")
 
@@ -194,6 +199,20 @@ def _keys(kind: Any) -> Iterator[str]:
             yield from _keys(part)
 
 
+def _meant(model: type[BaseModel], key: str) -> str:
+    """The key of the schema that an unknown one is like, or the file that has such a key."""
+    near = get_close_matches(key, set(_keys(model)) - {key}, 1, 0.78)
+    if near:
+        return f"; did you mean {near[0]}?"
+    files: dict[str, type[BaseModel]] = {
+        "run": RunConfig,
+        "robot": RobotConfig,
+        "world": WorldConfig,
+    }
+    owner = next((n for n, m in files.items() if m is not model and key in m.model_fields), None)
+    return "" if owner is None else f"; it is a key of a {owner}'s file"
+
+
 def _line(model: type[BaseModel], path: str, text: str, fault: dict[str, Any]) -> str:
     loc = fault["loc"]
     where = ".".join(str(p) for p in loc)
@@ -203,15 +222,32 @@ def _line(model: type[BaseModel], path: str, text: str, fault: dict[str, Any]) -
     given = fault.get("input")
     shown = f" (got {given!r})" if isinstance(given, int | float | str | bool) else ""
     context = fault.get("ctx", {})
+    bounds = {key: context[key] for key in ("gt", "ge", "lt", "le") if key in context}
     tag, known = context.get("tag"), context.get("expected_tags")
-    near = get_close_matches(str(loc[-1]), set(_keys(model)), 1, 0.7) if loc else []
     said = {
-        "extra_forbidden": f"unknown key; did you mean {near[0]}?" if near else "unknown key",
         "missing": "is required",
         "tuple_type": "must be a list: [ ... ]",
         "model_type": "must be a table",
+        "model_attributes_type": "must be a table",
+        "dict_type": "must be a table",
+        "string_type": "must be text",
+        "int_type": "must be a whole number",
+        "int_from_float": "must be a whole number",
+        "float_type": "must be a number",
+        "bool_type": "must be true or false",
+        "finite_number": "must be a finite number",
         "union_tag_invalid": f"kind {tag!r} is none of {known}",
+        "union_tag_not_found": "needs a key kind, which says what it is",
+        "literal_error": f"must be {context.get('expected')}",
+        "greater_than": f"must be over {bounds.get('gt', 0):g}",
+        "greater_than_equal": f"must be at least {bounds.get('ge', 0):g}",
+        "less_than": f"must be under {bounds.get('lt', 0):g}",
+        "less_than_equal": f"must be at most {bounds.get('le', 0):g}",
+        "too_long": f"must have at most {context.get('max_length')} values",
+        "too_short": f"must have at least {context.get('min_length')} values",
     }
+    if fault["type"] == "extra_forbidden":
+        said["extra_forbidden"] = f"unknown key{_meant(model, str(loc[-1]))}"
     if context.get("pattern") == NAME_PATTERN:
         said["string_pattern_mismatch"] = "holds '/', a control character or a leading dot"
     what = said.get(str(fault["type"]), str(fault["msg"]).removeprefix("Value error, "))

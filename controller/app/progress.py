@@ -78,6 +78,17 @@ class RunBar(ProgressBar):
         super().__init__(description, total)
         self._cycles = 0
 
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave nothing of a run that failed before its first cycle."""
+        if kind is not None and self._cycles == 0:
+            self.hide()
+        super().__exit__(kind, error, trace)
+
     def _is_due(self, progress: RunProgress) -> bool:
         """Count a cycle; return whether the bar is updated with it."""
         self._cycles += 1

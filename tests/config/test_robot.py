@@ -85,7 +85,7 @@ def test_a_chain_without_joints_of_its_own_is_as_before() -> None:
             {"joint_axes": "yy", "joints": [{}, {"zero_rad": -2.0}]},
             "joint 2 (ID 2): zero_rad -2 with a limit of 1.5 rad leaves the servo's turn",
         ),
-        ({"joint_axes": "y", "joints": [{"sign": 0}]}, "sign: Input should be 1 or -1"),
+        ({"joint_axes": "y", "joints": [{"sign": 0}]}, "sign: must be 1 or -1"),
         (
             {"joint_axes": "y", "joints": [{"zeros_rad": 0.1}]},
             "zeros_rad: unknown key; did you mean zero_rad?",

@@ -114,6 +114,7 @@ def prepare_walk(
         raise InputError(f"run {run.name}: a source of your own is run by prepare_source")
     robot = _with_keys_of("robot", load_robot(run.robot, beside), keys)
     _refuse_legs(robot)
+    _refuse_one_joint(robot)
     _check_servos(run, robot)
     return WalkRun(run, robot, _with_keys_of("world", load_world(run.world, beside), keys))
 
@@ -163,6 +164,20 @@ def _in_rad(key: str, value: object) -> tuple[str, object]:
 def _with_keys_of(file: str, config: C, keys: Mapping[str, object]) -> C:
     own = {k.removeprefix(f"{file}."): v for k, v in keys.items() if k.startswith(f"{file}.")}
     return with_keys(config, own, f"{file} {config.name}") if own else config
+
+
+def _refuse_one_joint(robot: RobotConfig) -> None:
+    """Refuse a body that can only bend to and fro: such a motion leads nowhere.
+
+    Raises:
+        InputError: it has one yaw joint.
+
+    """
+    if len(robot.yaw_joints) == 1:
+        raise InputError(
+            f"robot {robot.name}: has one yaw joint, which only bends to and fro; a walk takes two "
+            "at least, and more to steer"
+        )
 
 
 def _refuse_legs(robot: RobotConfig) -> None:

@@ -215,10 +215,17 @@ class WalkRun:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user would not expect of the shapes, one line each."""
+        """What a user would not expect of the path and the shapes, one line each."""
+        behaviour, lines = self.run.behaviour, []
+        pulse_m_s = behaviour.pulse_body_lengths_s * (1.0 - behaviour.sliding) * self.robot.length_m
+        if self.path.length_m > pulse_m_s * self.run.time_limit_s:
+            lines.append(
+                f"a path of {self.path.length_m:.1f} m at a pulse of {pulse_m_s:.2f} m/s takes "
+                f"{self.path.length_m / pulse_m_s:.0f} s at least, but time_limit_s is "
+                f"{self.run.time_limit_s:g}: it will not be walked to its end"
+            )
         if self.run.motion == "serpenoid":
-            return ()
-        lines = []
+            return tuple(lines)
         if self.run.behaviour.curvature is None and self.library.curvature > 1.0:
             lines.append(
                 f"every bend is {self.library.curvature:g} times as wide as recorded: this "

@@ -64,7 +64,7 @@ def test_help_gives_an_example(command: str) -> None:
         (["run", "sidewinding", "--robot", "yaw16"], "needs pitch joints; robot yaw16 has none"),
         (["run", "hop"], "hop: no such gait"),
         (["run", "sidewinding", "--param", "waves"], "expected NAME=VALUE"),
-        (["show", "sidewinding", "--param", "waves=9"], "waves: Input should be less than"),
+        (["show", "sidewinding", "--param", "waves=9"], "waves: must be at most"),
         (["run", "rolling", "--look-at", "here"], "expected X,Y in metres"),
         (["show", "rolling", "--picture", "body.txt"], "a picture ends in .png"),
         (["run", "rolling", "--live"], "keys from a terminal"),
@@ -183,7 +183,12 @@ def test_live_from_a_terminal(tmp_path: Path) -> None:
     )  # fmt: skip
     assert process.stderr is not None
     shown = process.stderr.readline()  # the keys are shown once the terminal is ready
+    while "Ctrl-C: torque off" not in shown:
+        line = process.stderr.readline()
+        assert line, shown
+        shown += line
     assert "space: halt, go on" in shown
+    assert "m: mirror" in shown, "no key breaks inside its words"
     os.write(ours, b"mq")
     printed, said = process.communicate()
     os.close(ours)

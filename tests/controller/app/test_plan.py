@@ -76,3 +76,10 @@ def test_a_robot_that_cannot_bend_enough_is_refused_before_torque(tmp_path: Path
     run.write_text('name = "r"\nrobot = "stiff.toml"\nwaypoints_m = [[2, 0]]\n')
     with pytest.raises(InputError, match="joint limits"):
         prepare_walk(str(run)).forecast()
+
+
+def test_a_path_that_the_time_cannot_hold_is_told() -> None:
+    far = prepare_walk("flat-square", motion="serpenoid", keys={"run.waypoints_m": [[100.0, 0.0]]})
+    (told,) = far.warnings
+    assert told.startswith("a path of 100.0 m at a pulse of 0.30 m/s takes 336 s at least"), told
+    assert prepare_walk("flat-square", motion="serpenoid").warnings == ()

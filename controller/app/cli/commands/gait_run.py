@@ -1,7 +1,6 @@
 """``snakewalk gait run``: a gait on servos or in the simulator."""
 
 import math
-import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
@@ -158,6 +157,9 @@ def _operator(stack: ExitStack, live: bool, gamepad: Path | None) -> "MakeOperat
     """Open the keyboard or gamepad of an operator; None without one."""
     if not live and gamepad is None:
         return None
+    from rich.columns import Columns  # noqa: PLC0415
+    from rich.console import Console  # noqa: PLC0415
+
     from snakewalk.controller.app.cli.gamepad import Gamepad  # noqa: PLC0415
     from snakewalk.controller.app.cli.keyboard import Keyboard  # noqa: PLC0415
     from snakewalk.controller.motion.operator import KEYS, Operator  # noqa: PLC0415
@@ -167,7 +169,8 @@ def _operator(stack: ExitStack, live: bool, gamepad: Path | None) -> "MakeOperat
         hands.append(stack.enter_context(Keyboard()))
     if gamepad is not None:
         hands.append(stack.enter_context(Gamepad(gamepad)))
-    print("  ".join(f"{key}: {what}" for key, what in KEYS.items()), file=sys.stderr)
+    keys = [f"{key}: {what}" for key, what in KEYS.items()]
+    Console(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
     return lambda motion, robot, on_event: Operator(
         motion, robot, lambda: [key for hand in hands for key in hand.pressed()], on_event
     )

@@ -74,7 +74,7 @@ def record(
 
 
 def show_file(
-    file: Annotated[Path, typer.Argument(help="a repertoire")],
+    file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
     picture: Picture = None,
     force: Force = False,
     as_json: Json = False,

@@ -1,0 +1,32 @@
+"""The bar of a run: nothing is left of one that failed before it began."""
+
+from contextlib import suppress
+
+import pytest
+
+from snakewalk.controller.app.progress import PathBar
+from snakewalk.controller.runtime.drive import Progress
+
+
+@pytest.mark.parametrize(("cycles", "error"), [(12, None), (12, OSError("cut")), (0, None)])
+def test_a_run_that_began_leaves_its_bar(
+    cycles: int, error: OSError | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _run(cycles, error)
+    shown = capsys.readouterr().err
+    assert ("waypoint 0/1" if cycles else "ramp") in shown
+
+
+def test_a_run_that_fails_before_its_first_cycle_leaves_no_bar(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    _run(0, OSError("no port"))
+    assert capsys.readouterr().err.strip() == ""
+
+
+def _run(cycles: int, error: OSError | None) -> None:
+    with suppress(OSError), PathBar(2.0, 1) as bar:
+        for cycle in range(cycles):
+            bar.on_progress(Progress(0.02 * cycle, 0.1, 0, 0.2, done=cycle == cycles - 1))
+        if error is not None:
+            raise error
