@@ -210,7 +210,7 @@ class Ax12Servos:
         units = (speed & 1023).astype(np.float64) * (SPEED_UNIT_RAD_S / VELOCITY_UNIT_RAD_S)
         still = np.where(on & ~wheel, goal, self._trajectory.goal).astype(np.float64)
         self._trajectory.set_goals(still, units, np.zeros(len(self)), np.zeros(len(self), bool))
-        self._trajectory.advance(seconds)
+        self._trajectory.advance(seconds, np.ones(len(self), bool))
         error = self._trajectory.position - shaft
         right = error < 0.0
         margin = np.where(right, self["CW Compliance Margin"], self["CCW Compliance Margin"])

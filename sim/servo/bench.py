@@ -1,13 +1,17 @@
 """A bench of independent shafts: enough mechanics to serve and test the bus without MuJoCo."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
+from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.sim.plant import ServoDrive
-from snakewalk.sim.servo.motor import Gearbox
+from snakewalk.sim.servo.motor import Gearbox, friction_n_m
+
+_READ = readonly_array(layout="C")
 
 
 class BenchPlant:
@@ -34,12 +38,11 @@ class BenchPlant:
         self._step_s = step_s
         self._steps = 0
         bare = Gearbox(0.0, dry_n_m, viscous_n_m_s, 0.0, 1.0, 0.0, 0.0)
-        if isinstance(gear, Sequence):
-            gear = Gearbox.columns([each or bare for each in gear]) if any(gear) else None
-        self._gear = gear or bare
-        self._inertia = inertia_kg_m2 + self._gear.armature_kg_m2
-        self._viscous = self._gear.viscous_n_m_s
-        self._is_bare = gear is None
+        gears = [gear] * joints if isinstance(gear, Gearbox) or gear is None else list(gear)
+        terms = Gearbox.columns([each or bare for each in gears])
+        self._gear = np.array([getattr(terms, each.name) for each in fields(Gearbox)])
+        self._gear[0] += inertia_kg_m2
+        self._no_load = np.zeros(joints)
         self._load = load_n_m
         self._position = np.full(joints, start_rad, dtype=np.float64)
         self._velocity = np.zeros(joints)
@@ -63,44 +66,78 @@ class BenchPlant:
         """Step to the last whole step at or before ``until_s``."""
         last = int(np.floor(until_s / self._step_s + 1e-9))
         while self._steps < last:
-            self._one_step(drive)
-            self._steps += 1
-
-    def _one_step(self, drive: ServoDrive) -> None:
-        h, q, w = self._step_s, self._position, self._velocity
-        on = drive.torque_on
-        pwm = drive.p_gain_per_rad * (drive.goal_rad - q)
-        drive.pwm[:] = _within(pwm, drive.pwm_limit) * on
-        stiff = on * drive.torque_constant_n_m_a / drive.resistance_ohm
-        limit = drive.current_limit_a
-        amps = (drive.pwm * drive.supply_v - drive.back_emf_v_s * w) / drive.resistance_ohm * on
-        limited = np.abs(amps) > limit
-        load = self._load(q) if self._load is not None else 0.0
-        push = np.where(
-            limited,
-            _within(amps, limit) * drive.torque_constant_n_m_a,
-            stiff * drive.pwm * drive.supply_v,
-        )
-        damping = self._viscous + np.where(limited, 0.0, stiff * drive.back_emf_v_s)
-        free = (self._inertia * w + h * (push + load)) / (self._inertia + h * damping)
-        brake = h * self._friction(push - damping * w, load) / (self._inertia + h * damping)
-        w[:] = np.sign(free) * np.maximum(np.abs(free) - brake, 0.0)
-        q += h * w
-        amps = (drive.pwm * drive.supply_v - drive.back_emf_v_s * w) / drive.resistance_ohm * on
-        drive.current_a[:] = _within(amps, limit)
-        drive.torque_n_m[:] = drive.current_a * drive.torque_constant_n_m_a
-        heat_j = h * drive.resistance_ohm * drive.current_a**2
-        input_j = heat_j + h * drive.back_emf_v_s * w * drive.current_a
-        drive.drawn_j[:] += np.maximum(input_j, 0.0)
-        drive.returned_j[:] -= np.minimum(input_j, 0.0)
-        drive.heat_j[:] += heat_j
-        drive.work_j[:] += h * drive.torque_n_m * w
-
-    def _friction(self, motor_n_m: Floats, load_n_m: ArrayLike) -> Floats | float:
-        if self._is_bare:
-            return self._gear.dry_n_m
-        return self._gear.friction_n_m(self._velocity, motor_n_m, np.asarray(load_n_m))
+            steps, load_n_m = last - self._steps, self._no_load
+            if self._load is not None:  # it may change with every step
+                steps, load_n_m = 1, np.asarray(self._load(self._position), dtype=np.float64)
+            shafts = (load_n_m, self._gear, self._position, self._velocity)
+            _step(steps, self._step_s, *shafts, *drive.columns())
+            self._steps += steps
 
 
-def _within(value: Floats, limit: Floats) -> Floats:
-    return np.minimum(np.maximum(value, -limit), limit)
+@compiled("float64(float64, float64)")
+def _within(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
+
+
+@compiled(
+    f"void(int64, float64, {_READ}, {readonly_array(dimensions=2, layout='C')}, float64[::1],"
+    f" float64[::1], {', '.join([_READ] * 9)}, {', '.join(['float64[::1]'] * 7)})"
+)
+def _step(
+    steps: int,
+    h: float,
+    load_n_m: Floats,
+    gear: Floats,
+    position: Floats,
+    velocity: Floats,
+    torque_on: Floats,
+    goal_rad: Floats,
+    p_gain_per_rad: Floats,
+    pwm_limit: Floats,
+    supply_v: Floats,
+    resistance_ohm: Floats,
+    torque_constant_n_m_a: Floats,
+    back_emf_v_s: Floats,
+    current_limit_a: Floats,
+    current_a: Floats,
+    torque_n_m: Floats,
+    pwm: Floats,
+    drawn_j: Floats,
+    returned_j: Floats,
+    heat_j: Floats,
+    work_j: Floats,
+) -> None:
+    """Make ``steps`` steps of ``h`` under a constant load; the columns of a drive in their order.
+
+    ``gear`` (7, J): the fields of ``Gearbox``, the shaft's own inertia added to the rotor's.
+    """
+    for k in range(len(position)):
+        inertia, viscous = gear[0, k], gear[2, k]
+        on, ohm, load = torque_on[k], resistance_ohm[k], load_n_m[k]
+        stiff = on * torque_constant_n_m_a[k] / ohm
+        for _ in range(steps):
+            q, w = position[k], velocity[k]
+            share = _within(p_gain_per_rad[k] * (goal_rad[k] - q), pwm_limit[k]) * on
+            amps = (share * supply_v[k] - back_emf_v_s[k] * w) / ohm * on
+            if abs(amps) > current_limit_a[k]:
+                push = _within(amps, current_limit_a[k]) * torque_constant_n_m_a[k]
+                damping = viscous
+            else:
+                push = stiff * share * supply_v[k]
+                damping = viscous + stiff * back_emf_v_s[k]
+            free = (inertia * w + h * (push + load)) / (inertia + h * damping)
+            friction = friction_n_m(gear[:, k], w, push - damping * w, load)
+            brake = h * friction / (inertia + h * damping)
+            w = np.sign(free) * max(abs(free) - brake, 0.0)
+            velocity[k] = w
+            position[k] = q + h * w
+            amps = (share * supply_v[k] - back_emf_v_s[k] * w) / ohm * on
+            amps = _within(amps, current_limit_a[k])
+            pwm[k], current_a[k] = share, amps
+            torque_n_m[k] = amps * torque_constant_n_m_a[k]
+            lost_j = h * ohm * amps**2
+            input_j = lost_j + h * back_emf_v_s[k] * w * amps
+            drawn_j[k] += max(input_j, 0.0)
+            returned_j[k] -= min(input_j, 0.0)
+            heat_j[k] += lost_j
+            work_j[k] += h * torque_n_m[k] * w

@@ -10,6 +10,7 @@ for the other terms: they are taken a control period, one millisecond (ours).
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
+from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.protocol.registers import (
     ACCELERATION_UNIT_RAD_S2,
     CURRENT_POSITION_MODE,
@@ -29,6 +30,8 @@ TIME_BASED = 0x04
 """Drive Mode(10), bit 2."""
 TINY_GAIN = 1e-9
 """A proportional gain too small to add anything: with it a far goal is a constant output."""
+_READ, _BOOLS = readonly_array(), readonly_array("boolean")
+_GAINS = readonly_array(dimensions=2, layout="C")
 _FORWARD = ("Feedforward 1st Gain", "Feedforward 2nd Gain")
 
 
@@ -63,68 +66,132 @@ class ControlLoops:
             self.trajectory.restart(joined, shaft_rad)
             self._sum[joined] = self._last_error[joined] = 0.0
         self.position, self.velocity = position, velocity
-        self.active = bool(position.any() or velocity.any())
-        self._kp = p_gain_per_rad(bank["Position P Gain"], self._motor)
-        self._drive.p_gain_per_rad[:] = np.where(velocity, TINY_GAIN, self._kp)
+        self._any_position, self._any_velocity = bool(position.any()), bool(velocity.any())
+        self.active = self._any_position or self._any_velocity
+        kp = p_gain_per_rad(bank["Position P Gain"], self._motor)
+        self._drive.p_gain_per_rad[:] = np.where(velocity, TINY_GAIN, kp)
+        if not self.active:
+            return
+        self._timed = (bank["Drive Mode"] & TIME_BASED) != 0
+        integral, differential = bank["Position I Gain"] / 65_536.0, bank["Position D Gain"] / 16.0
+        forward = [bank[name] / 4.0 for name in _FORWARD]
+        self._gains = np.stack([kp, integral, differential, *forward])
+        if self._any_velocity:
+            goal_rad_s = bank["Goal Velocity"] * VELOCITY_UNIT_RAD_S
+            gains = (bank["Velocity P Gain"] / 128.0, bank["Velocity I Gain"] / 65_536.0)
+            self._settings = np.stack([goal_rad_s, bank["Profile Acceleration"], *gains])
 
     def set_goals(self, goal_rad: Floats) -> None:
         """Pass on position goals, in the shafts' frame."""
         if not self.active:
             return
         bank = self._bank
-        timed = (bank["Drive Mode"] & TIME_BASED) != 0
         velocity = bank["Profile Velocity"].astype(float)
         ramp = bank["Profile Acceleration"].astype(float)
         goal = np.where(self.position, goal_rad, self.trajectory.goal)
-        self.trajectory.set_goals(goal, velocity, ramp, timed)
+        self.trajectory.set_goals(goal, velocity, ramp, self._timed)
 
     def tick(self, plant: Plant, goal_rad: Floats, sign: Floats, held: Bools) -> None:
         """Run one control period: set the drive of the servos that need these loops.
 
         ``goal_rad`` is the place of held servos; ``sign`` turns registers into the shafts' frame.
         """
-        if self.velocity.any():
-            self._tick_velocity(plant, sign, held)
-        if self.position.any():
-            self._tick_position(plant, goal_rad, held)
-
-    def _tick_position(self, plant: Plant, goal_rad: Floats, held: Bools) -> None:
-        bank, drive, path, run = self._bank, self._drive, self.trajectory, self.position
-        path.advance(CONTROL_S)
-        target = np.where(held, goal_rad, path.position)
-        error = (target - plant.position_rad) * TICKS_PER_RAD
-        full = drive.pwm_limit * PWM_FULL
-        integral = bank["Position I Gain"] / 65_536.0
-        limit = np.where(integral > 0.0, full / np.maximum(integral, 1e-12), 0.0)
-        self._sum[run] = np.clip(self._sum + error, -limit, limit)[run]
-        pwm = integral * self._sum
-        pwm += bank["Position D Gain"] / 16.0 * (error - self._last_error)
-        self._last_error[run] = error[run]
-        ticks = TICKS_PER_RAD * CONTROL_S
-        moving = np.where(held, 0.0, 1.0)
-        pwm += bank["Feedforward 1st Gain"] / 4.0 * path.velocity * ticks * moving
-        pwm += bank["Feedforward 2nd Gain"] / 4.0 * path.acceleration * (ticks * CONTROL_S) * moving
-        gain = np.maximum(self._kp, TINY_GAIN)
-        drive.p_gain_per_rad[run] = gain[run]
-        drive.goal_rad[run] = (target + pwm / PWM_FULL / gain)[run]
-
-    def _tick_velocity(self, plant: Plant, sign: Floats, held: Bools) -> None:
-        bank, drive, path, run = self._bank, self._drive, self.trajectory, self.velocity
-        goal = np.where(held, 0.0, bank["Goal Velocity"] * sign * VELOCITY_UNIT_RAD_S)
-        ramp = bank["Profile Acceleration"].astype(float)
-        timed = (bank["Drive Mode"] & TIME_BASED) != 0
-        with np.errstate(divide="ignore"):
-            per_tick = np.where(
-                timed,
-                np.abs(goal) / np.maximum(ramp, 1e-12) * (CONTROL_S * 1e3),
-                ramp * (ACCELERATION_UNIT_RAD_S2 * CONTROL_S),
+        drive, path = self._drive, self.trajectory
+        if self._any_velocity:
+            _run_velocity(
+                *(self.velocity, held, sign, plant.position_rad, plant.velocity_rad_s),
+                *(drive.pwm_limit, self._settings, self._timed),
+                *(path.velocity, self._sum, drive.goal_rad),
             )
-        step = np.where((ramp > 0.0) & ~held, per_tick, np.inf)  # a watchdog's stop has no profile
-        path.velocity[run] += np.clip(goal - path.velocity, -step, step)[run]
-        error = (path.velocity - plant.velocity_rad_s) / VELOCITY_UNIT_RAD_S
-        integral = bank["Velocity I Gain"] / 65_536.0
-        full = drive.pwm_limit * PWM_FULL
-        limit = np.where(integral > 0.0, full / np.maximum(integral, 1e-12), 0.0)
-        self._sum[run] = np.clip(self._sum + error, -limit, limit)[run]
-        pwm = (bank["Velocity P Gain"] / 128.0 * error + integral * self._sum) / PWM_FULL
-        drive.goal_rad[run] = (plant.position_rad + pwm / TINY_GAIN)[run]
+        if self._any_position:
+            path.advance(CONTROL_S, self.position)
+            _run_position(
+                *(self.position, held, goal_rad, plant.position_rad, drive.pwm_limit, self._gains),
+                *(path.position, path.velocity, path.acceleration),
+                *(self._sum, self._last_error, drive.p_gain_per_rad, drive.goal_rad),
+            )
+
+
+@compiled("float64(float64, float64, float64)")
+def _limited_sum(errors: float, gain: float, pwm_limit: float) -> float:
+    """Sum of errors that puts out no more than the bridge may (no wind-up)."""
+    limit = pwm_limit * PWM_FULL / max(gain, 1e-12) if gain > 0.0 else 0.0
+    return min(max(errors, -limit), limit)
+
+
+@compiled(
+    f"void({_BOOLS}, {_BOOLS}, {_READ}, {_READ}, {_READ}, {_GAINS},"
+    f" {_READ}, {_READ}, {_READ}, {', '.join(['float64[::1]'] * 4)})"
+)
+def _run_position(
+    run: Bools,
+    held: Bools,
+    hold_rad: Floats,
+    shaft_rad: Floats,
+    pwm_limit: Floats,
+    gains: Floats,
+    path_rad: Floats,
+    path_rad_s: Floats,
+    path_rad_s2: Floats,
+    sums: Floats,
+    last_error: Floats,
+    p_gain_per_rad: Floats,
+    goal_rad: Floats,
+) -> None:
+    """Position PID with feed-forward, of the servos in ``run``.
+
+    ``gains`` (5, S): P in the drive's unit, I, D, feed-forward of speed and of acceleration.
+    """
+    ticks = TICKS_PER_RAD * CONTROL_S
+    for k in range(len(run)):
+        if not run[k]:
+            continue
+        target = hold_rad[k] if held[k] else path_rad[k]
+        error = (target - shaft_rad[k]) * TICKS_PER_RAD
+        sums[k] = _limited_sum(sums[k] + error, gains[1, k], pwm_limit[k])
+        pwm = gains[1, k] * sums[k] + gains[2, k] * (error - last_error[k])
+        last_error[k] = error
+        if not held[k]:
+            pwm += gains[3, k] * path_rad_s[k] * ticks
+            pwm += gains[4, k] * path_rad_s2[k] * (ticks * CONTROL_S)
+        gain = max(gains[0, k], TINY_GAIN)
+        p_gain_per_rad[k] = gain
+        goal_rad[k] = target + pwm / PWM_FULL / gain
+
+
+@compiled(
+    f"void({_BOOLS}, {_BOOLS}, {_READ}, {_READ}, {_READ}, {_READ}, {_GAINS}, {_BOOLS},"
+    " float64[::1], float64[::1], float64[::1])"
+)
+def _run_velocity(
+    run: Bools,
+    held: Bools,
+    sign: Floats,
+    shaft_rad: Floats,
+    shaft_rad_s: Floats,
+    pwm_limit: Floats,
+    settings: Floats,
+    timed: Bools,
+    path_rad_s: Floats,
+    sums: Floats,
+    goal_rad: Floats,
+) -> None:
+    """Velocity PI along a ramp, of the servos in ``run``.
+
+    ``settings`` (4, S): goal in rad/s of the servo, Profile Acceleration, P and I.
+    """
+    for k in range(len(run)):
+        if not run[k]:
+            continue
+        goal = 0.0 if held[k] else settings[0, k] * sign[k]
+        ramp, step = settings[1, k], np.inf
+        if ramp > 0.0 and not held[k]:  # a watchdog's stop has no profile
+            if timed[k]:
+                step = abs(goal) / ramp * (CONTROL_S * 1e3)
+            else:
+                step = ramp * (ACCELERATION_UNIT_RAD_S2 * CONTROL_S)
+        path_rad_s[k] += min(max(goal - path_rad_s[k], -step), step)
+        error = (path_rad_s[k] - shaft_rad_s[k]) / VELOCITY_UNIT_RAD_S
+        sums[k] = _limited_sum(sums[k] + error, settings[3, k], pwm_limit[k])
+        pwm = (settings[2, k] * error + settings[3, k] * sums[k]) / PWM_FULL
+        goal_rad[k] = shaft_rad[k] + pwm / TINY_GAIN

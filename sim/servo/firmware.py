@@ -115,7 +115,9 @@ class Firmware:
             if self.control_loops.active and stop_s >= self._control_s:
                 self._control_s = stop_s + CONTROL_S
                 self.control_loops.tick(plant, self._goal, self._sign, self._held)
-                self.blocked_shaft.hold(self.control_loops.position | self.control_loops.velocity)
+                if self.blocked_shaft.any:
+                    loops = self.control_loops
+                    self.blocked_shaft.hold(loops.position | loops.velocity)
             if stop_s >= self.events.next_s:
                 self.events.run_due(stop_s)
                 self.apply_registers()

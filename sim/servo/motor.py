@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import AnyInts, Floats
 from snakewalk.config.robot import STALL_CURRENT_A
+from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A, PWM_FULL
 from snakewalk.sim.plant import ServoDrive
 from snakewalk.sim.servo.models import MODELS, ModelFacts
@@ -155,11 +156,17 @@ class Gearbox:
         names = [each.name for each in fields(Gearbox)]
         return Gearbox(*(np.array([getattr(gear, name) for gear in gears]) for name in names))
 
-    def friction_n_m(self, speed_rad_s: Floats, motor_n_m: Floats, load_n_m: Floats) -> Floats:
-        """Greatest friction torque (J,) but for the viscous part, which grows with the speed."""
-        slow = np.exp(-((speed_rad_s / self.stribeck_rad_s) ** 2))
-        carried = self.by_motor * np.abs(motor_n_m) + self.by_load * np.abs(load_n_m)
-        return np.asarray(self.dry_n_m + self.stribeck_n_m * slow + carried)
+
+@compiled(f"float64({readonly_array()}, float64, float64, float64)")
+def friction_n_m(gear: Floats, speed_rad_s: float, motor_n_m: float, load_n_m: float) -> float:
+    """Greatest friction torque but for the viscous part, which grows with the speed.
+
+    ``gear`` (7,) holds the fields of a ``Gearbox`` in their order.
+    """
+    slow = 0.0
+    if gear[3] > 0.0:
+        slow = gear[3] * np.exp(-((speed_rad_s / gear[4]) ** 2))
+    return float(gear[1] + slow + (gear[5] * abs(motor_n_m) + gear[6] * abs(load_n_m)))
 
 
 GEARBOXES: Mapping[str, Gearbox] = {

@@ -8,7 +8,10 @@ Profile Velocity 0 is a step, Profile Acceleration 0 a rectangle, else a trapezo
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
+from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.protocol.registers import ACCELERATION_UNIT_RAD_S2, VELOCITY_UNIT_RAD_S
+
+_READ, _WHICH = readonly_array(layout="C"), readonly_array("boolean")
 
 STEP, RECTANGULAR, TRIANGULAR, TRAPEZOIDAL = 0x00, 0x10, 0x20, 0x30
 """Moving Status(123), bits 4 and 5."""
@@ -60,20 +63,37 @@ class Trajectory:
         kind = np.where(np.isfinite(self._ramp), np.where(short, TRIANGULAR, TRAPEZOIDAL), 0x10)
         self.kind[new] = np.where(step, STEP, kind)[new]
 
-    def advance(self, seconds: float) -> None:
-        """Move on by one step of the control loop."""
-        distance = self.goal - self.position
-        step = ~np.isfinite(self._speed)
-        with np.errstate(invalid="ignore"):
-            brake = self._ramp * seconds
-            root = np.sqrt(1.0 + 8.0 * np.abs(distance) / np.maximum(brake * seconds, 1e-300))
-            limit = np.where(np.isfinite(brake), 0.5 * brake * (root - 1.0), np.inf)
-        velocity_goal = np.sign(distance) * np.minimum.reduce(
-            [self._speed, limit, np.abs(distance) / seconds]
-        )
-        change = np.clip(velocity_goal - self.velocity, -brake, brake)
-        velocity = np.where(step, 0.0, self.velocity + np.where(np.isnan(change), 0.0, change))
-        arrived = step | (np.abs(distance - velocity * seconds) < 1e-9)
-        self.acceleration[:] = np.where(step, 0.0, (velocity - self.velocity) / seconds)
-        self.position[:] = np.where(arrived, self.goal, self.position + velocity * seconds)
-        self.velocity[:] = np.where(arrived, 0.0, velocity)
+    def advance(self, seconds: float, which: Bools) -> None:
+        """Move those of ``which`` (S,) on by one step of the control loop."""
+        columns = (self.position, self.velocity, self.acceleration)
+        _advance(seconds, which, self.goal, self._speed, self._ramp, *columns)
+
+
+@compiled(f"void(float64, {_WHICH}, {', '.join([_READ] * 3)}, {', '.join(['float64[::1]'] * 3)})")
+def _advance(
+    seconds: float,
+    which: Bools,
+    goal: Floats,
+    speed: Floats,
+    ramp: Floats,
+    position: Floats,
+    velocity: Floats,
+    acceleration: Floats,
+) -> None:
+    for k in range(len(position)):
+        if not which[k]:
+            continue
+        if not np.isfinite(speed[k]):
+            position[k], velocity[k], acceleration[k] = goal[k], 0.0, 0.0
+            continue
+        distance, brake, limit = goal[k] - position[k], ramp[k] * seconds, np.inf
+        if np.isfinite(brake):  # so fast that the steps to come can still stop in time
+            root = np.sqrt(1.0 + 8.0 * abs(distance) / max(brake * seconds, 1e-300))
+            limit = 0.5 * brake * (root - 1.0)
+        wanted = np.sign(distance) * min(speed[k], limit, abs(distance) / seconds)
+        moved = velocity[k] + min(max(wanted - velocity[k], -brake), brake)
+        acceleration[k] = (moved - velocity[k]) / seconds
+        if abs(distance - moved * seconds) < 1e-9:
+            position[k], velocity[k] = goal[k], 0.0
+        else:
+            position[k], velocity[k] = position[k] + moved * seconds, moved

@@ -76,7 +76,7 @@ def test_a_profile_takes_the_time_of_its_shape(velocity: int, acceleration: int,
     assert path.kind[0] == kind
     steps, fastest = 0, 0.0
     while path.ongoing[0]:
-        path.advance(1e-3)
+        path.advance(1e-3, np.ones(len(path.goal), bool))
         fastest = max(fastest, path.velocity[0])
         steps += 1
     if kind == 0x10:
@@ -94,10 +94,10 @@ def test_a_time_based_profile_arrives_on_time() -> None:
     path = Trajectory(2)
     path.set_goals(np.array([1.0, -0.3]), np.full(2, 800.0), np.full(2, 200.0), np.full(2, True))
     for _ in range(790):
-        path.advance(1e-3)
+        path.advance(1e-3, np.ones(len(path.goal), bool))
     assert path.ongoing.all()
     for _ in range(20):
-        path.advance(1e-3)
+        path.advance(1e-3, np.ones(len(path.goal), bool))
     assert not path.ongoing.any()
 
 

@@ -220,3 +220,15 @@ def test_startup_configuration_says_how_it_wakes_up(configuration: int) -> None:
     before = read(line, 1, POSITION, 4)
     wait(line, 0.5)
     assert read(line, 1, POSITION, 4) == before
+
+
+def test_a_servo_that_rotates_ramps_up_beside_one_that_follows_a_profile() -> None:
+    """The step of the second's trajectory put the first's ramp back to 0 in every period."""
+    line = a_line(2)
+    for each in ((11, 1, 1), *RUN, (108, 5, 4), (104, 50, 4)):
+        assert write(line, 1, *each) == 0, each
+    for each in ((112, 20, 4), (108, 5, 4), *RUN, (116, 3_000, 4)):
+        assert write(line, 2, *each) == 0, each
+    wait(line, 2.0)
+    assert read(line, 1, VELOCITY, 4) == pytest.approx(50, abs=2)
+    assert read(line, 2, VELOCITY, 4) == pytest.approx(20, abs=2)

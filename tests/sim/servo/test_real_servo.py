@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+from dataclasses import astuple
 from pathlib import Path
 from types import ModuleType
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from snakewalk.drivers.protocol.registers import PWM_FULL
-from snakewalk.sim.servo.motor import GEARBOXES, MOTORS, p_gain_per_rad
+from snakewalk.sim.servo.motor import GEARBOXES, MOTORS, friction_n_m, p_gain_per_rad
 
 XL330 = MOTORS["XL330-M288"]
 GEAR = GEARBOXES["XL330-M288"]
@@ -79,7 +80,9 @@ def test_friction_and_data_sheet_agree_on_the_speed_without_load() -> None:
     w = np.linspace(0.1, 2.0 * speed, 4_000)
     volts = 5.0 - XL330.back_emf_v_s * w
     motor = XL330.torque_constant_n_m_a * volts / XL330.resistance_ohm
-    left = motor - GEAR.friction_n_m(w, motor, np.zeros_like(w)) - GEAR.viscous_n_m_s * w
+    gear = np.array(astuple(GEAR))
+    friction = [friction_n_m(gear, *each, 0.0) for each in zip(w, motor, strict=True)]
+    left = motor - np.array(friction) - GEAR.viscous_n_m_s * w
     reached = w[np.flatnonzero(left > 0.0)[-1]]
     assert reached == pytest.approx(speed, rel=0.1)
 

@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 
 from snakewalk.drivers.protocol.packet import encode_fast, fast_head
-from snakewalk.sim.servo import servo_loops
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.servo import bench, control_loops, profile, servo_loops
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+from snakewalk.sim.servo.motor import GEARBOXES
 
 
 def plain(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -116,3 +120,36 @@ def test_heat_and_supply_are_judged_in_the_registers_units(
     supply_v = np.full(2, tenths / 10.0)
     least, most = np.array([95, 95], np.uint16), np.array([160, 160], np.uint16)
     assert how(servo_loops.out_of_range)(sensors, hottest, supply_v, least, most) == wrong
+
+
+def test_control_loops_and_shafts_move_to_the_bit_as_their_python(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Position PID along a profile; velocity along a ramp; plain P, with and without a gearbox."""
+
+    def moved() -> bytes:
+        plant = BenchPlant(4, gear=[None, None, None, GEARBOXES["XL330-M288"]])
+        line = SimLine(ServoBank([1, 2, 3, 4]), plant)
+        bank = line.bank
+        bank["Operating Mode"][:] = [3, 1, 5, 4]
+        bank["Torque Enable"][:] = 1
+        bank["Goal Current"][:] = 20
+        for name, value in (("Position D Gain", 300), ("Position I Gain", 40)):
+            bank[name][0] = value
+        bank["Feedforward 1st Gain"][0] = bank["Feedforward 2nd Gain"][0] = 100
+        bank["Profile Velocity"][0], bank["Profile Acceleration"][:2] = 60, 30
+        line.firmware.apply_registers()
+        bank["Goal Position"][:], bank["Goal Velocity"][1] = 2_600, 80
+        line.firmware.apply_registers()
+        line.clock.advance(0.3)
+        line.settle()
+        drive = line.firmware.drive
+        return b"".join(each.tobytes() for each in (plant.position_rad, *drive.columns()))
+
+    compiled = moved()
+    for module, name in (
+        *((bench, "_step"), (profile, "_advance")),
+        *((control_loops, "_run_position"), (control_loops, "_run_velocity")),
+    ):
+        monkeypatch.setattr(module, name, getattr(module, name).py_func)
+    assert moved() == compiled
