@@ -14,6 +14,7 @@ EXTRAS: Final = {
     "skimage": ("scikit-image", "vision"),
     "PIL": ("Pillow", "vision"),
     "h5py": ("h5py", "vision"),
+    "ezc3d": ("ezc3d", "c3d"),
     "trimesh": ("trimesh", "vision"),
     "rasterio": ("Rasterio", "terrain"),
     "pygltflib": ("pygltflib", "vision"),

@@ -144,6 +144,7 @@ class Analysis:
             "recording": track.name,
             "frames": track.frames,
             "frames_left_out": track.dropped,
+            "frames_bridged": track.bridged,
             "rate_hz": round(track.rate_hz, 3),
             "rate_assumed": track.rate_assumed,
             "length_m": None if track.length_m is None else round(track.length_m, 6),

@@ -128,17 +128,18 @@ def save_capture(
     *,
     name: str,
     m_per_px: float | None = None,
+    rate_assumed: bool = False,
     source: str = "not stated",
     licence: str = "not stated",
 ) -> None:
     """Write an .npz that ``load_track`` reads, with the data of every frame beside the track.
 
     ``points`` (T, 101, 2) head first, m (pixels where there is no scale), y upwards; ``rate_hz``,
-    ``length_m`` (NaN: no scale), ``name``, ``source``, ``licence`` are the track. Of every frame,
-    used or not: ``verdict`` (T,) its status in words, ``points_px`` (T, 101, 2) as in the image,
-    ``radius_px`` (T, 101), ``length_px`` (T,), ``head_margin`` (T,), ``expected_px`` (T,), the
-    error of a point, ``company`` (T,), the size of the next largest object. Once: ``m_per_px``
-    (NaN: no scale), ``head_by``, ``head_sure``.
+    ``rate_assumed``, ``length_m`` (NaN: no scale), ``name``, ``source``, ``licence`` are the track.
+    Of every frame, used or not: ``verdict`` (T,) its status in words, ``points_px`` (T, 101, 2) as
+    in the image, ``radius_px`` (T, 101), ``length_px`` (T,), ``head_margin`` (T,),
+    ``expected_px`` (T,), the error of a point, ``company`` (T,), the size of the next largest
+    object. Once: ``m_per_px`` (NaN: no scale), ``head_by``, ``head_sure``.
     """
     scale = 1.0 if m_per_px is None else m_per_px
     length_m = np.nan if m_per_px is None else float(np.nanmedian(captured.length_px)) * scale
@@ -147,6 +148,7 @@ def save_capture(
             stream,
             points=captured.points_px * [scale, -scale],
             rate_hz=captured.rate_hz,
+            rate_assumed=rate_assumed,
             length_m=length_m,
             name=name,
             source=source,

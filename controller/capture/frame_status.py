@@ -4,10 +4,12 @@ from enum import StrEnum
 
 
 class FrameStatus(StrEnum):
-    """``GOOD`` and ``ROUGH`` frames hold points. Of every other one only the reason is kept."""
+    """``GOOD``, ``ROUGH`` and ``BRIDGED`` frames hold points; others only the reason why not."""
 
     GOOD = "good"
     ROUGH = "rough: the points may be off by more than 1 % of the body"
+    BRIDGED = "rough: a keypoint was not seen; it lies on the curve through the others"
+    MISSING = "keypoints are missing"
     NOTHING = "nothing seen"
     SEVERAL = "several animals"
     CUT = "cut by the edge of the image"
@@ -22,4 +24,4 @@ class FrameStatus(StrEnum):
     @property
     def has_points(self) -> bool:
         """Whether the frame holds points."""
-        return self in {FrameStatus.GOOD, FrameStatus.ROUGH}
+        return self in {FrameStatus.GOOD, FrameStatus.ROUGH, FrameStatus.BRIDGED}

@@ -1,11 +1,13 @@
 """A recording of a moving body: midlines over time, and the tangent angles of 100 segments."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.resample import equal_arc_length, tangent_angles
 
 MOST_FRAMES = 500_000
@@ -31,6 +33,8 @@ class Track:
     """Frames that were left out because points were missing."""
     rate_assumed: bool = False
     """Whether the file states no rate, so that the default of its format was taken."""
+    status: tuple[FrameStatus, ...] = ()
+    """(T,) of the kept frames; empty where the file says nothing of them."""
     source: str = "not stated"
     licence: str = "not stated"
 
@@ -38,6 +42,11 @@ class Track:
     def frames(self) -> int:
         """Kept frames T."""
         return len(self.angles_rad)
+
+    @property
+    def bridged(self) -> int:
+        """Frames in which a missing keypoint was set on the curve through the others."""
+        return self.status.count(FrameStatus.BRIDGED)
 
     @property
     def bend_rad(self) -> Floats:
@@ -62,6 +71,7 @@ def track_from_points(
     scale_m: float | None = None,
     frame: Ints | None = None,
     rate_assumed: bool = False,
+    status: Sequence[FrameStatus] = (),
     source: str = "not stated",
     licence: str = "not stated",
 ) -> Track:
@@ -74,6 +84,7 @@ def track_from_points(
         scale_m: metres per unit; None where it is unknown (points become body lengths).
         frame: (T,) frame numbers, increasing; default 0, 1, 2...
         rate_assumed: whether ``rate_hz`` is a guess.
+        status: of every frame (T,), or nothing.
         source: origin of the recording.
         licence: under which it may be used.
 
@@ -109,6 +120,7 @@ def track_from_points(
         length_m=None if scale_m is None else length * scale_m,
         dropped=int(len(points) - whole.sum()),
         rate_assumed=rate_assumed,
+        status=tuple(status[k] for k in np.flatnonzero(whole).tolist()) if status else (),
         source=source,
         licence=licence,
     )

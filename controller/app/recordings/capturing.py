@@ -126,6 +126,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
                 captured,
                 name=options.recording.stem,
                 m_per_px=m_per_px,
+                rate_assumed=footage.rate_assumed,
                 source=f"captured from {options.recording.name}",
             )
         if options.sheet is not None:

@@ -8,6 +8,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import StatesConfig
+from snakewalk.controller.capture.readers.keypoints import ALL, Choice
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.capture.slowing import joint_demand, slowing
 from snakewalk.controller.capture.track import Track
@@ -44,6 +45,8 @@ class RecordingFacts:
     licence: str
     frames: int
     frames_left_out: int
+    frames_bridged: int
+    """Frames in which a missing keypoint was set on the curve through the others."""
     head_and_tail_swapped: int
     rate_hz: float
     rate_assumed: bool
@@ -82,6 +85,8 @@ def examine(
     robot_name: str = "yaw16",
     world_name: str = "flat",
     rate_hz: float | None = None,
+    least_score: float | None = None,
+    choice: Choice = ALL,
 ) -> ExaminedRecording:
     """Load a recording and measure it for a robot on a ground.
 
@@ -90,7 +95,7 @@ def examine(
 
     """
     robot, friction = load_robot(robot_name), load_world(world_name).friction
-    track, states = load_track(name_or_path, rate_hz), StatesConfig()
+    track, states = load_track(name_or_path, rate_hz, least_score, choice), StatesConfig()
     wave = measure_wave(track)
     shapes = to_angles(to_states(track.angles_rad))
     refused: dict[str, int] = {}
@@ -104,6 +109,7 @@ def examine(
         licence=track.licence,
         frames=track.frames,
         frames_left_out=track.dropped,
+        frames_bridged=track.bridged,
         head_and_tail_swapped=track.flips,
         rate_hz=round(track.rate_hz, 3),
         rate_assumed=track.rate_assumed,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from snakewalk.config.archive import MOST_BYTES, check_expansion, read_arrays
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.readers.formats import KNOWN
 from snakewalk.controller.capture.resample import body_points
 from snakewalk.controller.capture.track import Track, track_from_points
@@ -23,7 +24,10 @@ SKELETON_RATE_HZ = 30.0
 JOINT_RATE_HZ = 32.0
 """Defaults: neither kind of file holds a frame rate."""
 _BODIES = ("points", "angles_rad", "x", "y", "skeletons")
-ARRAYS = {*_BODIES, "t", "rate_hz", "length_m", "score", "name", "source", "licence"}
+ARRAYS = {*_BODIES, "t", "rate_hz", "length_m", "score", "name", "source", "licence"} | {
+    "rate_assumed",
+    "verdict",
+}
 """The arrays that are read of an .npz; others, such as the widths of a body, stay in the file."""
 
 
@@ -32,6 +36,9 @@ def save_track(path: Path, track: Track) -> None:
     number = np.rint(track.time_s * track.rate_hz).astype(int)
     points = np.full((number[-1] + 1, *track.points.shape[1:]), np.nan)
     points[number] = track.points
+    verdict = [FrameStatus.MISSING] * len(points)
+    for k, status in zip(number, track.status or [FrameStatus.GOOD] * len(number), strict=True):
+        verdict[k] = status
     np.savez_compressed(
         path,
         points=points,
@@ -40,6 +47,8 @@ def save_track(path: Path, track: Track) -> None:
         name=track.name,
         source=track.source,
         licence=track.licence,
+        rate_assumed=track.rate_assumed,
+        verdict=np.array([str(one) for one in verdict]),
     )
 
 
@@ -125,6 +134,8 @@ def track_from_arrays(
             _without_unsure(file, points, held, least_score),
             given,
             scale_m=1.0 if np.isfinite(length_m) else None,
+            rate_assumed=rate_hz is None and _assumed(held),
+            status=_status(held, len(points)),
             source=_text(held, "source", "not stated"),
             licence=_text(held, "licence", "not stated"),
         )
@@ -140,6 +151,18 @@ def track_from_arrays(
         f"{file}: expected the arrays points or angles_rad (or x and y), and rate_hz or t (and "
         f"length_m); or skeletons; found {names}"
     )
+
+
+def _assumed(held: dict[str, NDArray[np.generic]]) -> bool:
+    """Whether the file says that its rate was a guess."""
+    return "rate_assumed" in held and bool(held["rate_assumed"].reshape(-1)[:1].astype(bool).all())
+
+
+def _status(held: dict[str, NDArray[np.generic]], frames: int) -> list[FrameStatus]:
+    """The frames' verdicts, if these are ours."""
+    words = [str(one) for one in held.get("verdict", np.array([])).reshape(-1)]
+    known = {str(one) for one in FrameStatus}
+    return list(map(FrameStatus, words)) if len(words) == frames and known >= set(words) else []
 
 
 def _rate(file: Path, held: dict[str, NDArray[np.generic]]) -> float | None:

@@ -15,12 +15,13 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.readers.keypoints import track_from_keypoints
+from snakewalk.controller.capture.readers.keypoints import Choice, track_from_keypoints
 from snakewalk.controller.capture.track import Track, frame_numbers
 
 PCUTOFF = 0.6
 """DeepLabCut's own default: below this likelihood it does not draw a point."""
 _LEVELS = {"scorer", "individuals", "bodyparts", "coords"}
+_OF_NONE = "single"  # body parts that belong to no animal
 Column = tuple[str, str, str]
 """Individual, body part, coordinate."""
 
@@ -31,7 +32,11 @@ def is_deeplabcut(rows: list[list[str]]) -> bool:
 
 
 def load_rows(
-    file: Path, rows: list[list[str]], rate_hz: float | None, least_score: float | None
+    file: Path,
+    rows: list[list[str]],
+    rate_hz: float | None,
+    least_score: float | None,
+    choice: Choice,
 ) -> Track:
     """Load the rows of a CSV; see ``load.load_file``."""
     depth = 4 if rows[3][0] == "coords" else 3
@@ -60,10 +65,12 @@ def load_rows(
     numbers = [row[0] for row in rows[depth:]]
     digits = all(n.isdecimal() for n in numbers)
     frame = frame_numbers(str(file), np.array(numbers, dtype=float)) if digits else None
-    return _track(file, columns, values, frame, rate_hz, least_score)
+    return _track(file, columns, values, frame, rate_hz, least_score, choice)
 
 
-def load_group(file: Path, group: Any, rate_hz: float | None, least_score: float | None) -> Track:
+def load_group(
+    file: Path, group: Any, rate_hz: float | None, least_score: float | None, choice: Choice
+) -> Track:
     """Load the open HDF5 group that holds ``table``; see ``load.load_file``."""
     table = group["table"]
     blocks = [name for name in table.dtype.names or () if name.startswith("values_block_")]
@@ -74,7 +81,7 @@ def load_group(file: Path, group: Any, rate_hz: float | None, least_score: float
     columns = _columns(file, group.attrs.get("non_index_axes"), values.shape[1])
     numbers = rows["index"] if "index" in (table.dtype.names or ()) else None
     frame = None if numbers is None or numbers.dtype.kind not in "iu" else numbers.astype(np.int64)
-    return _track(file, columns, values, frame, rate_hz, least_score)
+    return _track(file, columns, values, frame, rate_hz, least_score, choice)
 
 
 class _OnlyPlain(pickle.Unpickler):
@@ -108,16 +115,13 @@ def _track(
     frame: Ints | None,
     rate_hz: float | None,
     least_score: float | None,
+    choice: Choice,
 ) -> Track:
     at = {column: k for k, column in enumerate(columns)}
-    seen = {column[0] for k, column in enumerate(columns) if np.isfinite(values[:, k]).any()} - {
-        "single"
-    }  # body parts that belong to no animal
-    if len(seen) > 1:
-        raise InputError(
-            f"{file}: {len(seen)} animals ({', '.join(sorted(seen))}); export one of them"
-        )
-    whose = next(iter(seen)) if seen else columns[0][0] if columns else ""
+    names = list(dict.fromkeys(who for who, _, _ in columns))
+    animals = [who for who in names if who != _OF_NONE] or names
+    seen = {column[0] for k, column in enumerate(columns) if np.isfinite(values[:, k]).any()}
+    whose = choice.animal(file, animals, [who for who in animals if who in seen] or animals[:1])
     parts = list(dict.fromkeys(part for who, part, _ in columns if who == whose))
     missing = [p for p in parts if not {(whose, p, "x"), (whose, p, "y")} <= at.keys()]
     if missing or not parts:
@@ -130,8 +134,10 @@ def _track(
     default = 0.0 if scores is None else PCUTOFF
     return track_from_keypoints(
         file,
-        pixels,
+        parts,
+        pixels * [1.0, -1.0],
         scores,
+        choice,
         rate_hz=rate_hz,
         least_score=default if least_score is None else least_score,
         frame=frame,

@@ -1,4 +1,4 @@
-"""HDF5 files of recordings: SLEAP's analysis, DeepLabCut's table, MATLAB 7.3."""
+"""HDF5 files of recordings: SLEAP's analysis and projects, DeepLabCut's table, MATLAB 7.3."""
 
 from pathlib import Path
 
@@ -11,22 +11,27 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.arrays import track_from_arrays
 from snakewalk.controller.capture.readers.deeplabcut import load_group
 from snakewalk.controller.capture.readers.formats import KNOWN
-from snakewalk.controller.capture.readers.sleap import load_analysis
+from snakewalk.controller.capture.readers.keypoints import Choice
+from snakewalk.controller.capture.readers.sleap import load_analysis, load_project
 from snakewalk.controller.capture.track import Track
 
 
-def load_hdf5(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
-    """Load an HDF5 file of any of these three kinds; see ``load.load_file``."""
+def load_hdf5(
+    file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
+) -> Track:
+    """Load an HDF5 file of any of these kinds; see ``load.load_file``."""
     try:
         with h5py.File(file, "r") as held:
             sizes: list[int] = []
             held.visititems(lambda _, data: sizes.append(getattr(data, "nbytes", 0)))
             check_expansion(file, file.stat().st_size, sum(sizes))
             if "tracks" in held and "track_occupancy" in held:
-                return load_analysis(file, held, rate_hz, least_score)
+                return load_analysis(file, held, rate_hz, least_score, choice)
+            if "metadata" in held and "instances" in held:
+                return load_project(file, held, rate_hz, least_score, choice)
             tables = [g for g in held.values() if isinstance(g, h5py.Group) and "table" in g]
             if tables:
-                return load_group(file, tables[0], rate_hz, least_score)
+                return load_group(file, tables[0], rate_hz, least_score, choice)
             arrays = {
                 name: _from_matlab(data)
                 for name, data in held.items()
@@ -37,6 +42,7 @@ def load_hdf5(file: Path, rate_hz: float | None, least_score: float | None) -> T
         raise InputError(f"{file}: is no HDF5 that can be read: {reason}; known: {KNOWN}") from None
     if not arrays:
         raise InputError(f"{file}: holds no arrays, and no table of DeepLabCut; known: {KNOWN}")
+    choice.only(file, "a MATLAB file")
     return track_from_arrays(file, arrays, rate_hz, least_score)
 
 

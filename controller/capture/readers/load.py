@@ -11,6 +11,8 @@ from snakewalk.config.recording import RecordingConfig
 from snakewalk.controller.capture.readers.arrays import load_mat, load_npy, load_npz
 from snakewalk.controller.capture.readers.formats import HEAD_BYTES, KNOWN, format_of
 from snakewalk.controller.capture.readers.generated import EMBEDDED, embedded, generate
+from snakewalk.controller.capture.readers.keypoints import ALL, Choice
+from snakewalk.controller.capture.readers.markers import load_c3d, load_qtm
 from snakewalk.controller.capture.readers.tables import load_csv
 from snakewalk.controller.capture.readers.wcon import load_wcon, zipped_text
 from snakewalk.controller.capture.track import Track
@@ -32,7 +34,10 @@ def check_rate(rate_hz: float | None, names: Sequence[str]) -> None:
 
 
 def load_track(
-    name_or_path: str, rate_hz: float | None = None, least_score: float | None = None
+    name_or_path: str,
+    rate_hz: float | None = None,
+    least_score: float | None = None,
+    choice: Choice = ALL,
 ) -> Track:
     """Load a shipped recording by name, or a file by path.
 
@@ -41,6 +46,7 @@ def load_track(
             file of one of the formats of ``formats.KNOWN``.
         rate_hz: frames a second of a file, taken instead of what it (or its format) says.
         least_score: keypoints of a file whose score is below it count as missing.
+        choice: which animal, keypoints and plane of a file that has several.
 
     Raises:
         InputError: neither name nor file, no known format, or a fault inside it.
@@ -54,6 +60,8 @@ def load_track(
         raise InputError(
             f"{name_or_path}: is made from figures and has no scores; give one for files"
         )
+    if made:
+        choice.only(path, "a shipped recording")
     if name_or_path in EMBEDDED:
         return embedded(name_or_path)
     if not path.exists():
@@ -63,11 +71,14 @@ def load_track(
         )
     if path.suffix == ".toml":
         return generate(load(path, RecordingConfig))
-    return load_file(path, rate_hz, least_score)
+    return load_file(path, rate_hz, least_score, choice)
 
 
 def load_file(
-    path: str | Path, rate_hz: float | None = None, least_score: float | None = None
+    path: str | Path,
+    rate_hz: float | None = None,
+    least_score: float | None = None,
+    choice: Choice = ALL,
 ) -> Track:
     """Load a recording from a file; its content, not its name, says which format it has.
 
@@ -76,6 +87,7 @@ def load_file(
         rate_hz: frames a second, taken instead of what the file (or its format) says.
         least_score: keypoints whose score is below it count as missing; default 0, and for
             DeepLabCut its own 0.6.
+        choice: which animal, keypoints and plane, where there are several.
 
     Raises:
         InputError: no such file, none of the known formats, or a fault inside it.
@@ -95,24 +107,31 @@ def load_file(
         case "zip":
             text = zipped_text(file)
             if text is not None:
-                return load_wcon(file, text, rate_hz)
+                return load_wcon(file, text, rate_hz, choice)
+            choice.only(file, "an .npz")
             return load_npz(file, rate_hz, least_score)
         case "npy":
+            choice.only(file, "an .npy")
             return load_npy(file, rate_hz)
         case "hdf5":
             require_extra(f"{file}: HDF5 needs", "h5py")
             from snakewalk.controller.capture.readers.hdf5 import load_hdf5  # noqa: PLC0415  an extra
 
-            return load_hdf5(file, rate_hz, least_score)
+            return load_hdf5(file, rate_hz, least_score, choice)
         case "mat":
+            choice.only(file, "a MATLAB file")
             return load_mat(file, rate_hz, least_score)
         case "json":
             try:
-                return load_wcon(file, file.read_text(encoding="utf-8-sig"), rate_hz)
+                return load_wcon(file, file.read_text(encoding="utf-8-sig"), rate_hz, choice)
             except UnicodeDecodeError:
                 raise InputError(f"{file}: is no JSON in UTF-8; known: {KNOWN}") from None
         case "csv":
-            return load_csv(file, rate_hz, least_score)
+            return load_csv(file, rate_hz, least_score, choice)
+        case "qtm":
+            return load_qtm(file, rate_hz, choice)
+        case "c3d":
+            return load_c3d(file, rate_hz, choice)
         case _:
             reason = "is empty" if kind == "empty" else "is no recording"
             raise InputError(f"{file}: {reason}; known: {KNOWN}")

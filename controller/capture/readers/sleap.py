@@ -1,39 +1,68 @@
-"""SLEAP's files: its table (CSV) and its analysis HDF5.
+"""SLEAP's files: its table (CSV), its analysis HDF5, and its projects (``.slp``).
 
-The HDF5 is written column-major for MATLAB, so h5py sees ``tracks`` as (tracks, 2, nodes, frames)
-and ``point_scores`` as (tracks, nodes, frames); ``node_names`` and ``track_names`` are bytes. Pixel
-rows count downwards, and no file holds a frame rate.
+The analysis HDF5 is written column-major for MATLAB, so h5py sees ``tracks`` as (tracks, 2, nodes,
+frames) and ``point_scores`` as (tracks, nodes, frames); ``node_names`` and ``track_names`` are
+bytes. A project holds ``frames``, ``instances`` and their ``points`` (set by hand) or
+``pred_points`` as tables that point into each other, and names as JSON. Pixel rows count downwards.
 """
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.readers.keypoints import track_from_keypoints
-from snakewalk.controller.capture.track import Track, frame_numbers
+from snakewalk.controller.capture.readers.keypoints import Choice, track_from_keypoints
+from snakewalk.controller.capture.track import MOST_FRAMES, Track, frame_numbers
+
+_DOWNWARDS = np.array([1.0, -1.0])
+_CENTRED = 1.1  # format from which a pixel's centre, not its corner, is whole
+_PREDICTED = 1
+_NO_TRACK = "no track"
 
 
 def load_table(
     file: Path,
+    nodes: list[str],
+    whose: list[str],
     frame: Floats,
     xy: Floats,
     scores: Floats | None,
     rate_hz: float | None,
     least_score: float | None,
+    choice: Choice,
 ) -> Track:
-    """Load the CSV's columns: frame numbers (T,), x and y (T, K, 2), scores (T, K) or None."""
+    """Load the CSV's columns.
+
+    Args:
+        file: for faults and the name.
+        nodes: names of the K keypoints.
+        whose: name of the track of each of T rows.
+        frame: (T,) frame numbers.
+        xy: (T, K, 2) pixels.
+        scores: (T, K), or None.
+        rate_hz: frames a second.
+        least_score: keypoints below it are missing.
+        choice: animal and order of the midline.
+
+    """
     if not np.isfinite(frame).all():
         raise InputError(f"{file}: frame_idx must be given in every row")
+    names = list(dict.fromkeys(name or _NO_TRACK for name in whose))
+    mine = np.array([name or _NO_TRACK for name in whose]) == choice.animal(file, names, names)
+    frame, xy, scores = frame[mine], xy[mine], None if scores is None else scores[mine]
     if len(np.unique(frame)) < len(frame):
-        raise InputError(f"{file}: more than one animal in a frame; export one track")
+        raise InputError(f"{file}: more than one animal of one name in a frame; export one track")
     order = np.argsort(frame, kind="stable")
     return track_from_keypoints(
         file,
-        xy[order],
+        nodes,
+        xy[order] * _DOWNWARDS,
         None if scores is None else scores[order],
+        choice,
         rate_hz=rate_hz,
         least_score=0.0 if least_score is None else least_score,
         frame=frame_numbers(str(file), frame[order]),
@@ -45,25 +74,21 @@ def load_analysis(
     held: Any,
     rate_hz: float | None,
     least_score: float | None,
+    choice: Choice,
 ) -> Track:
     """Load the open analysis HDF5 ``held``; see ``load.load_file``."""
     tracks = np.asarray(held["tracks"][:], dtype=float)
-    nodes = len(held["node_names"]) if "node_names" in held else None
-    if tracks.ndim != 4 or tracks.shape[1] != 2 or nodes not in (None, tracks.shape[2]):
+    nodes = _names(held, "node_names")
+    if tracks.ndim != 4 or tracks.shape[1] != 2 or len(nodes) not in (0, tracks.shape[2]):
         raise InputError(
             f"{file}: tracks: expected (tracks, 2, nodes, frames) as SLEAP writes it, not an array "
-            f"of shape {tracks.shape}" + ("" if nodes is None else f" of {nodes} nodes")
+            f"of shape {tracks.shape}" + (f" of {len(nodes)} nodes" if nodes else "")
         )
-    seen = np.flatnonzero(np.isfinite(tracks).any(axis=(1, 2, 3)))
-    if len(seen) != 1:
-        names = ", ".join(
-            name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
-            for name in (held["track_names"][:] if "track_names" in held else [])
-        )
-        raise InputError(
-            f"{file}: {len(seen)} animals in it" + (f" ({names})" if names else "") + "; export one"
-        )
-    one = int(seen[0])
+    names = _names(held, "track_names")
+    if len(names) != len(tracks):
+        names = [f"track_{k}" for k in range(len(tracks))]
+    seen = [names[k] for k in np.flatnonzero(np.isfinite(tracks).any(axis=(1, 2, 3)))]
+    one = names.index(choice.animal(file, names, seen))
     scores = None
     if "point_scores" in held:
         stored = np.asarray(held["point_scores"][:], dtype=float)
@@ -74,8 +99,100 @@ def load_analysis(
         scores = stored[one].T
     return track_from_keypoints(
         file,
-        tracks[one].transpose(2, 1, 0),
+        nodes or [f"node_{k}" for k in range(tracks.shape[2])],
+        tracks[one].transpose(2, 1, 0) * _DOWNWARDS,
         scores,
+        choice,
         rate_hz=rate_hz,
         least_score=0.0 if least_score is None else least_score,
     )
+
+
+def load_project(
+    file: Path,
+    held: Any,
+    rate_hz: float | None,
+    least_score: float | None,
+    choice: Choice,
+) -> Track:
+    """Load the open project ``held`` (.slp); see ``load.load_file``."""
+    try:
+        about = json.loads(_text(held["metadata"].attrs["json"]))
+        version = float(held["metadata"].attrs.get("format_id", 1.0))
+        skeletons = [
+            [str(about["nodes"][int(node["id"])]["name"]) for node in one["nodes"]]
+            for one in about["skeletons"]
+        ]
+        tracks = [str(json.loads(_text(one))[1]) for one in held["tracks_json"][:]]
+        frames, instances = held["frames"][:], held["instances"][:]
+        tables = {False: held["points"][:], True: held["pred_points"][:]}
+        stated = _rate(held)
+    except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
+        raise InputError(f"{file}: is no SLEAP project that can be read: {error}") from None
+    if len({int(v) for v in frames["video"]}) > 1:
+        raise InputError(f"{file}: holds several videos; export the labels of one")
+    if len({int(k) for k in instances["skeleton"]}) != 1:
+        raise InputError(f"{file}: expected one skeleton, found {len(skeletons)}")
+    nodes = skeletons[int(instances["skeleton"][0])]
+    names = [*tracks, _NO_TRACK]
+    number = {int(one["frame_id"]): int(one["frame_idx"]) for one in frames}
+    whose = [names[int(k)] if 0 <= k < len(tracks) else _NO_TRACK for k in instances["track"]]
+    seen = list(dict.fromkeys(whose))
+    mine = choice.animal(file, seen, seen)
+    last = max(number.values(), default=-1)
+    if not 0 <= last < MOST_FRAMES:
+        raise InputError(f"{file}: a frame's number is {last}; at most {MOST_FRAMES} are read")
+    places = np.full((last + 1, len(nodes), 2), np.nan)
+    scores = np.full((last + 1, len(nodes)), np.nan)
+    by_hand = np.zeros(last + 1, dtype=bool)
+    taken = np.zeros(last + 1, dtype=bool)
+    shift = 0.0 if version >= _CENTRED else -0.5
+    for one, name in zip(instances, whose, strict=True):
+        if name != mine:
+            continue
+        at = number.get(int(one["frame_id"]), -1)
+        predicted = int(one["instance_type"]) == _PREDICTED
+        rows = tables[predicted][int(one["point_id_start"]) : int(one["point_id_end"])]
+        if at < 0 or len(rows) != len(nodes):
+            raise InputError(f"{file}: an instance has {len(rows)} points of {len(nodes)}")
+        if taken[at] and by_hand[at] == (not predicted):
+            raise InputError(
+                f"{file}: two animals without a track in frame {at}: track them first in SLEAP"
+                if mine == _NO_TRACK
+                else f"{file}: {mine} is twice in frame {at}; correct it in SLEAP"
+            )
+        if taken[at] and predicted:
+            continue  # what was set by hand replaces the prediction
+        taken[at], by_hand[at] = True, not predicted
+        hidden = ~np.asarray(rows["visible"], dtype=bool)
+        places[at] = np.column_stack([rows["x"], rows["y"]]) + shift
+        places[at, hidden] = np.nan
+        scores[at] = rows["score"] if predicted else np.nan
+    return track_from_keypoints(
+        file,
+        nodes,
+        places * _DOWNWARDS,
+        scores,
+        choice,
+        rate_hz=stated if rate_hz is None else rate_hz,
+        least_score=0.0 if least_score is None else least_score,
+    )
+
+
+def _rate(held: Any) -> float | None:
+    """Frames a second that a project states of its video; older ones state none."""
+    for one in held["videos_json"][:] if "videos_json" in held else []:
+        rate = json.loads(_text(one)).get("backend", {}).get("fps")
+        if rate:
+            return float(rate)
+    return None
+
+
+def _names(held: Any, what: str) -> list[str]:
+    return [_text(name) for name in held[what][:]] if what in held else []
+
+
+def _text(value: bytes | str | NDArray[np.generic]) -> str:
+    """Text of an HDF5 value."""
+    plain = value.item() if isinstance(value, np.ndarray | np.generic) else value
+    return plain.decode("utf-8", "replace") if isinstance(plain, bytes) else str(plain)

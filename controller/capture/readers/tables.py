@@ -9,13 +9,14 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.deeplabcut import is_deeplabcut, load_rows
 from snakewalk.controller.capture.readers.formats import KNOWN
+from snakewalk.controller.capture.readers.keypoints import Choice
 from snakewalk.controller.capture.readers.sleap import load_table
 from snakewalk.controller.capture.track import Track, frame_numbers, track_from_points
 
 _MIDLINE = {("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0}
 
 
-def load_csv(file: Path, rate_hz: float | None, least_score: float | None = None) -> Track:
+def load_csv(file: Path, rate_hz: float | None, least_score: float | None, choice: Choice) -> Track:
     """Load a CSV of any of these kinds; see ``load.load_file``."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
@@ -25,15 +26,16 @@ def load_csv(file: Path, rate_hz: float | None, least_score: float | None = None
     if len(rows) < 2:
         raise InputError(f"{file}: expected a line of column names, then rows of numbers")
     if is_deeplabcut(rows):
-        return load_rows(file, rows, rate_hz, least_score)
+        return load_rows(file, rows, rate_hz, least_score, choice)
     column = {name.strip(): index for index, name in enumerate(rows[0])}
     for pair, scale_m in _MIDLINE.items():
         if {"t", "frame", "point", *pair} <= column.keys():
+            choice.only(file, "a CSV of midlines")
             columns = [column[name] for name in ("t", "frame", "point", *pair)]
             return _midline(file, _numbers(file, rows, columns), scale_m, rate_hz)
     keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
     if keypoints and "frame_idx" in column:
-        return _sleap(file, rows, column, keypoints, rate_hz, least_score)
+        return _sleap(file, rows, column, keypoints, rate_hz, least_score, choice)
     raise InputError(
         f"{file}: expected the columns t, frame, point, x_m, y_m (or x_mm, y_mm; mxmm, mymm), "
         "SLEAP's frame_idx and <keypoint>.x, <keypoint>.y, or DeepLabCut's scorer, bodyparts and "
@@ -100,11 +102,16 @@ def _sleap(
     keypoints: list[str],
     rate_hz: float | None,
     least_score: float | None,
+    choice: Choice,
 ) -> Track:
-    """One row a frame, keypoints in the table's order, head first, in pixels."""
+    """One row an animal and frame, keypoints in the table's order, head first, in pixels."""
     columns = [column["frame_idx"], *(column[f"{k}.{axis}"] for k in keypoints for axis in "xy")]
     table = _numbers(file, rows, columns)
     score_columns = [column[f"{k}.score"] for k in keypoints if f"{k}.score" in column]
     scores = _numbers(file, rows, score_columns) if len(score_columns) == len(keypoints) else None
     xy = table[:, 1:].reshape(len(table), len(keypoints), 2)
-    return load_table(file, table[:, 0], xy, scores, rate_hz, least_score)
+    whose = [""] * len(table)
+    if "track" in column:
+        at = column["track"]
+        whose = [row[at].strip() if at < len(row) else "" for row in rows[1:]]
+    return load_table(file, keypoints, whose, table[:, 0], xy, scores, rate_hz, least_score, choice)

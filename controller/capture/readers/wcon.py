@@ -17,11 +17,12 @@ import numpy as np
 from snakewalk.config.archive import DAMAGE, check_members
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.readers.keypoints import Choice
 from snakewalk.controller.capture.resample import equal_arc_length
 from snakewalk.controller.capture.track import Track, frame_numbers, track_from_points
 
 
-def load_wcon(file: Path, text: str, rate_hz: float | None) -> Track:
+def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> Track:
     """Load the text of a WCON file; see ``load.load_file``."""
     try:
         held = json.loads(text)
@@ -33,17 +34,26 @@ def load_wcon(file: Path, text: str, rate_hz: float | None) -> Track:
     second = _unit(file, units, "t", "s")
     if second is None:
         raise InputError(f"{file}: units: t: expected a time, such as s, not {units['t']!r}")
-    scale, other = _unit(file, units, "x", "m"), _unit(file, units, "y", "m")
-    if scale != other:
-        raise InputError(f"{file}: units: x and y differ: {units['x']!r} and {units['y']!r}")
+    choice.only(file, "WCON", "individual")
+    metres = {name: _unit(file, units, name, "m") for name in ("x", "y")}
+    metres |= {
+        name: _unit(file, units, name, "m") if name in units else metres[name[1]]
+        for name in ("ox", "oy", "cx", "cy")
+    }
+    if len({value is None for value in metres.values()}) > 1:
+        raise InputError(
+            f"{file}: units: some are lengths and some are not: "
+            + ", ".join(f"{name} {units[name]!r}" for name in metres if name in units)
+        )
     records = held["data"] if isinstance(held["data"], list) else [held["data"]]
     animals = sorted({str(r.get("id")) for r in records if isinstance(r, dict)})
-    if len(animals) > 1:
-        raise InputError(f"{file}: {len(animals)} animals (id {', '.join(animals[:5])}); give one")
+    if len(animals) > 1 or choice.individual is not None:
+        mine = choice.animal(file, animals, animals)
+        records = [r for r in records if not isinstance(r, dict) or str(r.get("id")) == mine]
     bodies: list[tuple[float, Floats]] = []
     for number, record in enumerate(records):
         try:
-            bodies += _bodies(record)
+            bodies += _bodies(record, metres)
         except (TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
             raise InputError(
                 f"{file}: data[{number}]: expected id, t, x and y, as many lists x and y as times: "
@@ -66,7 +76,7 @@ def load_wcon(file: Path, text: str, rate_hz: float | None) -> Track:
         file.stem,
         _alike([points for _, points in bodies]),
         1.0 / step if rate_hz is None else rate_hz,
-        scale_m=scale,
+        scale_m=None if metres["x"] is None else 1.0,
         frame=frame,
     )
 
@@ -86,8 +96,8 @@ def zipped_text(file: Path) -> str | None:
         return None
 
 
-def _bodies(record: Any) -> list[tuple[float, Floats]]:
-    """Times and head-first points (P, 2) of one record."""
+def _bodies(record: Any, metres: dict[str, float | None]) -> list[tuple[float, Floats]]:
+    """Times and head-first points (P, 2) of one record, in metres where the units are lengths."""
     many = isinstance(record["t"], list)
     times, xs, ys = (record[k] if many else [record[k]] for k in ("t", "x", "y"))
     if not len(times) == len(xs) == len(ys):
@@ -95,8 +105,12 @@ def _bodies(record: Any) -> list[tuple[float, Floats]]:
     from_ = ("ox", "oy") if "ox" in record else ("cx", "cy")
     found = []
     for k, (at, x, y) in enumerate(zip(times, xs, ys, strict=True)):
-        points = np.stack([_floats(x), _floats(y)], axis=-1)
-        points = points + [float(_at(record.get(name, 0.0), k)) for name in from_]
+        points = np.stack(
+            [_floats(x) * (metres["x"] or 1.0), _floats(y) * (metres["y"] or 1.0)], axis=-1
+        )
+        points = points + [
+            float(_at(record.get(name, 0.0), k)) * (metres[name] or 1.0) for name in from_
+        ]
         head = _at(record.get("head", "L"), k)
         found.append((float(at), points[::-1] if head == "R" else points))
     return found

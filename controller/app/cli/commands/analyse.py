@@ -24,6 +24,16 @@ def analyse(
         float | None,
         typer.Option(help="keypoints scoring less are missing; default 0, of DeepLabCut 0.6"),
     ] = None,
+    individual: Annotated[
+        str | None, typer.Option(help="of a file of several animals: the one that is taken")
+    ] = None,
+    keypoints: Annotated[
+        str | None,
+        typer.Option(help="A,B,C: names along the midline, head first; default: all, as listed"),
+    ] = None,
+    plane: Annotated[
+        str | None, typer.Option(help="of markers in space: xy (default), xz or yz")
+    ] = None,
     picture: Annotated[
         Path | None,
         typer.Option(help="draw tracks and maps: a file (.png, .svg, .pdf), or a folder for PNGs"),
@@ -35,15 +45,19 @@ def analyse(
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.capture.analysis import analyse as measure  # noqa: PLC0415  heavy
     from snakewalk.controller.capture.readers.generated import EMBEDDED  # noqa: PLC0415
+    from snakewalk.controller.capture.readers.keypoints import ALL, choice_of  # noqa: PLC0415
     from snakewalk.controller.capture.readers.load import check_rate, load_track  # noqa: PLC0415
 
     check_rate(rate, recordings)
+    choice = choice_of(individual, keypoints, plane)
     files = _pictures(recordings, picture, force)
     found = []
     pairs = list(zip(recordings, files, strict=True))
     for name, file in show_progress(pairs, "recordings", len(pairs)):
         shipped = name in EMBEDDED
-        one = measure(load_track(name, None if shipped else rate, None if shipped else min_score))
+        one = measure(
+            load_track(name, *(None, None, ALL) if shipped else (rate, min_score, choice))
+        )
         if file is not None:
             from snakewalk.controller.app.report.plots.analysis import draw_analysis  # noqa: PLC0415
 
@@ -76,6 +90,7 @@ def _pictures(recordings: list[str], picture: Path | None, force: bool) -> list[
 def _show(facts: dict[str, Any]) -> None:
     """One recording as a table of two columns with the units in words."""
     assumed = " (assumed; say --rate)" if facts["rate_assumed"] else ""
+    bridged = f"{facts['frames_bridged']} with a keypoint set, " if facts["frames_bridged"] else ""
     length = "no scale" if facts["length_m"] is None else f"{1e3 * facts['length_m']:.4g} mm long"
     low, high = facts["pulse_quartiles_body_lengths_s"]
     direction = "towards the tail" if facts["wave_towards_tail"] else "towards the head"
@@ -85,6 +100,7 @@ def _show(facts: dict[str, Any]) -> None:
     )
     rows = {
         "frames": f"{facts['frames']}, {facts['frames_left_out']} left out, "
+        f"{bridged}"
         f"{facts['rate_hz']:g} Hz{assumed}, {length}",
         "frequency": no_wave or f"{facts['frequency_hz']} Hz",
         "wave": no_wave

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.options import Force, Json, console
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.recordings.recording import RecordingFacts
-from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.app.result_files import atomic_write, check_picture, refuse_to_overwrite
 
 
 def track(
@@ -24,6 +25,24 @@ def track(
     rate: Annotated[
         float | None, typer.Option(help="frames a second of the files, instead of what they say")
     ] = None,
+    min_score: Annotated[
+        float | None,
+        typer.Option(help="keypoints scoring less are missing; default 0, of DeepLabCut 0.6"),
+    ] = None,
+    individual: Annotated[
+        str | None, typer.Option(help="of a file of several animals: the one that is taken")
+    ] = None,
+    keypoints: Annotated[
+        str | None,
+        typer.Option(help="A,B,C: names along the midline, head first; default: all, as listed"),
+    ] = None,
+    plane: Annotated[
+        str | None, typer.Option(help="of markers in space: xy (default), xz or yz")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="write what was chosen as a track of its own (.npz)"),
+    ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="draw midlines and angles here (.png, .svg, .pdf)")
     ] = None,
@@ -33,21 +52,34 @@ def track(
     """Examine recordings: wave, bends, states this robot can use, slowing for its servos."""
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.recordings.recording import examine  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.capture.readers.arrays import save_track  # noqa: PLC0415
     from snakewalk.controller.capture.readers.generated import EMBEDDED  # noqa: PLC0415
+    from snakewalk.controller.capture.readers.keypoints import ALL, choice_of  # noqa: PLC0415
     from snakewalk.controller.capture.readers.load import check_rate  # noqa: PLC0415
 
     check_picture(picture)
-    refuse_to_overwrite([picture], force)
     names = recordings or list(EMBEDDED)
+    if output is not None and (len(names) > 1 or output.suffix.lower() != ".npz"):
+        raise InputError(f"{output}: one recording makes one .npz; {len(names)} are named")
+    refuse_to_overwrite([picture, output], force)
     check_rate(rate, names)
+    choice = choice_of(individual, keypoints, plane)
     found = [
-        examine(name, robot, world, None if name in EMBEDDED else rate)
+        examine(
+            name,
+            robot,
+            world,
+            *(None, None, ALL) if name in EMBEDDED else (rate, min_score, choice),
+        )
         for name in show_progress(names, "recordings", len(names))
     ]
     if picture is not None:
         from snakewalk.controller.app.report.plots.recording import draw  # noqa: PLC0415
 
         draw([(one.track, Path(one.facts.recording).name) for one in found], picture)
+    if output is not None:
+        with atomic_write(output) as part:
+            save_track(part, found[0].track)
     if as_json:
         print(json.dumps([one.facts.to_dict() for one in found]))
         return
@@ -59,12 +91,14 @@ def _show(facts: "RecordingFacts") -> None:
     """One recording as a table of two columns with the units in words."""
     pace = facts.pace
     length = "no scale" if facts.length_mm is None else f"{facts.length_mm:g} mm long"
+    bridged = f"{facts.frames_bridged} with a keypoint set, " if facts.frames_bridged else ""
     assumed = " (assumed; say --rate)" if facts.rate_assumed else ""
     refused = ", ".join(f"{n} for {why}" for why, n in facts.states_refused.items() if n)
     stall = pace.times_no_load_speed
     rows = {
         "source": "; ".join(dict.fromkeys((str(facts.source), str(facts.licence)))),
         "frames": f"{facts.frames}, {facts.frames_left_out} left out, "
+        f"{bridged}"
         f"{facts.rate_hz:g} Hz{assumed}, {length}",
         "wave": f"{facts.waves_on_body} on the body, {facts.wave_hz} Hz, "
         f"{facts.wave_share:.0%} of the bending; towards the head "

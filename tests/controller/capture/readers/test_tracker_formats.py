@@ -105,9 +105,9 @@ def test_what_a_tracker_was_not_sure_of_is_missing(tmp_path: Path) -> None:
     dlc_h5(tmp_path / "a.h5", likelihood=sure)
     sleap_h5(tmp_path / "s.h5", scores=sure)
     for name, usual in (("a.csv", 1), ("a.h5", 1), ("s.h5", 0)):
-        assert load_file(tmp_path / name, RATE_HZ).dropped == usual
-        assert load_file(tmp_path / name, RATE_HZ, 0.0).dropped == 0
-        assert load_file(tmp_path / name, RATE_HZ, 0.8).dropped == 3
+        for least, bridged in ((None, usual), (0.0, 0), (0.8, 3)):
+            track = load_file(tmp_path / name, RATE_HZ, least)
+            assert (track.dropped, track.bridged) == (0, bridged)
         with pytest.raises(InputError, match=r"scores less than 0.95.*lower the least score"):
             load_file(tmp_path / name, RATE_HZ, 0.95)
 
@@ -116,7 +116,7 @@ def test_sleap_analysis(tmp_path: Path) -> None:
     sleap_h5(tmp_path / "one.h5")
     assert same(load_file(tmp_path / "one.h5", 20.0)).dropped == 0
     sleap_h5(tmp_path / "two.h5", animals=2)
-    with pytest.raises(InputError, match=r"two.h5: 2 animals in it \(eel, other\); export one"):
+    with pytest.raises(InputError, match=r"2 animals in it \(eel, other\): say --individual"):
         load_file(tmp_path / "two.h5")
     with h5py.File(tmp_path / "one.h5", "a") as file:
         del file["tracks"]
@@ -213,8 +213,8 @@ def test_faults_of_wcon_are_one_line(tmp_path: Path) -> None:
         ('{"units": 1}', "expected a WCON object"),
         (json.dumps(good | {"units": {"t": "s", "x": "mm"}}), "units: y must be given"),
         (json.dumps(good | {"units": {"t": "mm", "x": "mm", "y": "mm"}}), "t: expected a time"),
-        (json.dumps(good | {"units": {"t": "s", "x": "mm", "y": "m"}}), "x and y differ"),
-        (json.dumps(two), r"2 animals \(id 1, 2\)"),
+        (json.dumps(good | {"units": {"t": "s", "x": "mm", "y": "px"}}), "some are lengths"),
+        (json.dumps(two), r"2 animals in it \(1, 2\): say --individual"),
         (json.dumps(uneven), r"data\[3\]: expected id"),
         (json.dumps(good | {"data": []}), "2 or more times, found 0"),
         (json.dumps(good | {"data": [good["data"][0]] * 3}), "a time twice"),
