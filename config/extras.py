@@ -9,6 +9,7 @@ EXTRAS: Final = {
     "mujoco": ("MuJoCo", "sim"),
     "matplotlib": ("matplotlib", "view"),
     "mpl_toolkits": ("matplotlib", "view"),
+    "plotly": ("Plotly", "view"),
     "av": ("PyAV", "view"),
     "cv2": ("OpenCV", "vision"),
     "skimage": ("scikit-image", "vision"),

@@ -17,7 +17,17 @@ from typing import Any
 
 BLOCKED = frozenset(
     (
-        *("mujoco", "matplotlib", "mpl_toolkits", "av", "cv2", "skimage", "imageio", "PIL"),
+        *(
+            "mujoco",
+            "matplotlib",
+            "mpl_toolkits",
+            "plotly",
+            "av",
+            "cv2",
+            "skimage",
+            "imageio",
+            "PIL",
+        ),
         *("h5py", "trimesh", "distributed", "dask", "rosbags", "pyarrow", "gymnasium"),
     )
 )

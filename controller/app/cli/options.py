@@ -1,8 +1,11 @@
 """What the commands share: options, and how a result is shown."""
 
 import json
+import platform
+import shlex
 import sys
 from collections.abc import Mapping
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -126,6 +129,13 @@ def _text(value: object) -> str:
     return "-" if value is None else str(value)
 
 
+def _what_made_it() -> str:
+    """The command, the machine and the time, for the foot of a page."""
+    words = shlex.join(["snakewalk", *sys.argv[1:]])
+    when = datetime.now().astimezone().isoformat(" ", "seconds")
+    return f"Made by {words} on {platform.node()} ({platform.machine()}), {when}."
+
+
 def write_artifacts(
     record: "RunRecord",
     folder: Path,
@@ -139,7 +149,9 @@ def write_artifacts(
     from snakewalk.controller.app.report.artifacts import make_artifacts  # noqa: PLC0415  heavy; --help stays quick
 
     try:
-        made = make_artifacts(record, folder, numbers, film=film, fine=fine, look=look)
+        made = make_artifacts(
+            record, folder, numbers, film=film, fine=fine, look=look, made=_what_made_it()
+        )
     except KeyboardInterrupt as stop:
         log = folder / LOG
         if log.exists():

@@ -8,9 +8,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.progress import ProgressBar
 from snakewalk.controller.app.recordings.body_look import SERVOS, skin_look
-from snakewalk.controller.app.report.film import film_run
+from snakewalk.controller.app.report.film import film_run, film_times
 from snakewalk.controller.app.report.page import Section, film_html, page
-from snakewalk.controller.app.result_files import FILM, REPORT, SUMMARY, atomic_write
+from snakewalk.controller.app.result_files import FILM, LOG, REPORT, SUMMARY, atomic_write
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.runlog.record import RunRecord
 
@@ -40,6 +40,7 @@ def make_artifacts(
     film: bool = True,
     fine: bool = False,
     look: str = SERVOS,
+    made: str = "",
 ) -> Artifacts:
     """Make ``folder/summary.json``, ``folder/report.html`` and ``folder/film.mp4`` from a record.
 
@@ -48,14 +49,14 @@ def make_artifacts(
     that is there already is the same run's, and stays until then. What this machine cannot make (no
     simulator, no matplotlib, no OpenGL) is noted and left out: a run is not lost for want of its
     pictures. Shows progress on standard error. ``look`` is the body in the film, as ``skin_look``
-    takes it.
+    takes it; ``made`` says at the page's foot what made it.
     """
     notes: list[str] = []
     numbers = write_summary(summary(record) if numbers is None else numbers, folder)
     path = folder / FILM
-    drawn: list[Section] | None = None
+    drawn: _Drawn | None = None
     try:
-        drawn = _sections(record)
+        drawn = _draw(record, made)
         _write_page(record, folder, path if path.exists() else None, numbers, drawn)
     except InputError as error:
         notes += [f"no report: {line}" for line in error.faults]
@@ -80,14 +81,25 @@ def build_report(
 
     """
     numbers = write_summary(summary(record) if numbers is None else numbers, out_dir)
-    return _write_page(record, out_dir, film, numbers, _sections(record))
+    return _write_page(record, out_dir, film, numbers, _draw(record))
 
 
-def _sections(record: RunRecord) -> list[Section]:
-    require_extra("the report needs", "matplotlib")
-    from snakewalk.controller.app.report.figures.sections import sections  # noqa: PLC0415  an extra
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    """What a page shows beside its film."""
 
-    return sections(record)
+    sections: list[Section]
+    curves: str
+    """HTML."""
+    made: str
+
+
+def _draw(record: RunRecord, made: str = "") -> _Drawn:
+    require_extra("the report needs", "matplotlib", "plotly")
+    from snakewalk.controller.app.report.curves import curves_html  # noqa: PLC0415  an extra
+    from snakewalk.controller.app.report.figures.sections import sections  # noqa: PLC0415
+
+    return _Drawn(sections(record), curves_html(record), made)
 
 
 def _write_page(
@@ -95,16 +107,27 @@ def _write_page(
     out_dir: Path,
     film: Path | None,
     numbers: RunSummary,
-    drawn: list[Section],
+    drawn: _Drawn,
 ) -> Path:
-    film_on_page = "" if film is None else film_html(film, out_dir)
     header = record.header
+    film_on_page = ""
+    if film is not None:
+        film_on_page = film_html(film, out_dir, *film_times(record))
     config = {
         "run": header.run.model_dump(mode="json"),
         "robot": header.robot.model_dump(mode="json"),
         "world": header.world.model_dump(mode="json"),
     }
-    html = page(numbers, drawn, film=film_on_page, events=record.events, config=config)
+    html = page(
+        numbers,
+        drawn.sections,
+        film=film_on_page,
+        events=record.events,
+        config=config,
+        curves=drawn.curves,
+        links=[name for name in (LOG, SUMMARY, FILM) if (out_dir / name).exists()],
+        made=drawn.made,
+    )
     path = out_dir / REPORT
     with atomic_write(path) as part:
         part.write_text(html, encoding="utf-8")

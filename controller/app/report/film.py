@@ -159,6 +159,14 @@ def body_qpos(record: RunRecord) -> tuple[Floats, Floats]:
     return pose.time_s[:rows][known], np.hstack([head[known], quaternion, joints[known]])
 
 
+def film_times(record: RunRecord) -> tuple[float, float]:
+    """Time of the run at which its film begins, and how many times faster it is."""
+    time_s, _ = body_qpos(record)
+    if len(time_s) < 2:
+        return 0.0, 1.0
+    return float(time_s[0]), speed_up(float(time_s[-1] - time_s[0]))
+
+
 def speed_up(duration_s: float) -> float:
     """How many times faster than its run a film is: whole, and 1 for a short run."""
     return float(max(1, np.ceil(duration_s / _LONGEST_S)))

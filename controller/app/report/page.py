@@ -1,4 +1,4 @@
-"""The page: headline numbers first, then film, figures, events and what ran; one file, no scripts.
+"""The page: headline numbers first, then film, curves, figures, events and what ran; one file.
 
 Everything that comes from the log is escaped.
 """
@@ -30,6 +30,8 @@ class Section:
     caption: str
     image: str
     """Data URI."""
+    is_folded: bool = False
+    """Whether it is shown at a click only: the curves have it as well."""
 
 
 def page(
@@ -39,8 +41,23 @@ def page(
     film: str,
     events: Sequence[Event],
     config: Mapping[str, Any],
+    curves: str = "",
+    links: Sequence[str] = (),
+    made: str = "",
 ) -> str:
-    """Whole page; ``film`` is HTML made by ``film_html``, or empty."""
+    """Whole page.
+
+    Args:
+        numbers: of the run.
+        sections: its figures.
+        film: HTML made by ``film_html``, or empty.
+        events: of the log.
+        config: run, robot and world.
+        curves: HTML made by ``curves_html``, or empty.
+        links: names of files beside the page.
+        made: by which command, where and when the page was made; empty: not said.
+
+    """
     title = f"{numbers.run} on {numbers.backend}"
     note = f'<p class="note">{escape(numbers.log_note)}</p>' if numbers.log_note else ""
     body = [
@@ -50,17 +67,19 @@ def page(
         f"<p class='facts'>{_facts(numbers)}</p></header>",
         f"<section class='tiles'>{''.join(_tiles(numbers))}</section>",
         film,
+        curves,
         *(_figure(s) for s in sections),
         _events(events),
         _details("All numbers", numbers.to_dict()),
         _details("Configuration", config),
+        _footer(links, made),
     ]
     return (
         "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'>"
         "<meta name='viewport' content='width=device-width, initial-scale=1'>"
         f"<title>{escape(title)}</title><style>{CSS}</style></head>\n<body><main>"
         + "\n".join(part for part in body if part)
-        + "</main></body></html>\n"
+        + f"</main><script>{SCRIPT}</script></body></html>\n"
     )
 
 
@@ -141,28 +160,42 @@ def _tile(name: str, value: str, below: str) -> str:
 
 
 def _figure(section: Section) -> str:
-    return (
-        f"<section><h2>{escape(section.title)}</h2><figure>"
-        f"<img src='{section.image}' alt='{escape(section.title)}'>"
-        f"<figcaption>{escape(section.caption)}</figcaption></figure></section>"
+    shown = (
+        f"<figure><div class='wide'><img src='{section.image}' alt='{escape(section.title)}'></div>"
+        f"<figcaption>{escape(section.caption)}</figcaption></figure>"
     )
+    if section.is_folded:
+        name = f"{escape(section.title)}, as a picture"
+        return f"<details><summary>{name}</summary>{shown}</details>"
+    return f"<section><h2>{escape(section.title)}</h2>{shown}</section>"
+
+
+def _footer(links: Sequence[str], made: str) -> str:
+    """Files beside the page, and what made it."""
+    named = ", ".join(f"<a href='{quote(name)}'>{escape(name)}</a>" for name in links)
+    lines = [f"Beside this page: {named}." if named else "", escape(made)]
+    return "".join(f"<p class='facts made'>{line}</p>" for line in lines if line)
 
 
 def _events(events: Sequence[Event]) -> str:
     if not events:
         return ""
     rows = "".join(
-        f"<tr class='{escape(e.level)}'><td>{e.time_s:.2f} s</td><td>{escape(e.kind)}</td>"
+        f"<tr class='{escape(e.level)}'><td><button data-time='{e.time_s:.3f}'>{e.time_s:.2f} s"
+        f"</button></td><td>{escape(e.kind)}</td>"
         f"<td>{escape(e.text)}</td></tr>"
         for e in events[:_EVENTS_SHOWN]
     )
     rest = len(events) - _EVENTS_SHOWN
     more = f"<p class='facts'>and {rest} more in the log</p>" if rest > 0 else ""
-    return f"<section><h2>What happened</h2><table>{rows}</table>{more}</section>"
+    hint = "<p class='facts'>A time leads to its place in the film and in the curves.</p>"
+    return f"<section><h2>What happened</h2>{hint}<table>{rows}</table>{more}</section>"
 
 
-def film_html(film: Path, out_dir: Path) -> str:
+def film_html(film: Path, out_dir: Path, start_s: float = 0.0, speed_up: float = 1.0) -> str:
     """HTML for a film; one above ``INLINE_BYTES`` is linked relative to ``out_dir``.
+
+    It begins at ``start_s`` of the run, and is ``speed_up`` times as fast.
 
     Raises:
         InputError: there is no such file, or browsers do not play its type.
@@ -180,7 +213,9 @@ def film_html(film: Path, out_dir: Path) -> str:
     if kind.startswith("image"):
         shown = f"<img src='{escape(source)}' alt='Film of the run'>"
     else:
-        shown = f"<video controls autoplay muted loop playsinline src='{escape(source)}'></video>"
+        time = f"data-start='{start_s:.3f}' data-speed='{speed_up:g}'"
+        how = f"controls autoplay muted loop playsinline {time}"
+        shown = f"<video {how} src='{escape(source)}'></video>"
     return f"<section><h2>Film</h2><figure>{shown}</figure></section>"
 
 
@@ -231,6 +266,11 @@ h2 { font-size: 18px; margin: 0 0 10px; }
 section { margin: 0 0 16px; padding: 16px 20px; }
 figure { margin: 0; }
 figure img, figure video { display: block; width: 100%; height: auto; }
+td button { font: inherit; color: var(--blue); background: none; border: 0; padding: 0;
+  cursor: pointer; font-variant-numeric: tabular-nums; }
+select { font: inherit; }
+.made { margin-top: 10px; overflow-wrap: anywhere; }
+details figure { margin-top: 12px; }
 figcaption { margin-top: 8px; color: var(--grey); font-size: 13px; }
 table { border-collapse: collapse; width: 100%; font-size: 14px; }
 td { padding: 4px 14px 4px 0; border-top: 1px solid var(--line); vertical-align: top; }
@@ -242,5 +282,58 @@ tr.error td:nth-child(2) { color: #b34700; font-weight: 600; }
 details { margin: 0 0 10px; padding: 10px 20px; }
 summary { cursor: pointer; font-weight: 600; }
 pre { overflow-x: auto; font-size: 12.5px; }
+@media (max-width: 640px) {
+  main { padding: 14px 8px 40px; }
+  h1 { font-size: 24px; }
+  section, details { padding: 12px 10px; }
+  .tiles { grid-template-columns: 1fr 1fr; gap: 8px; }
+  .tiles strong { font-size: 19px; }
+  .facts span { white-space: normal; }
+  .wide { overflow-x: auto; }
+  .wide img { width: 860px; max-width: none; }
+  td { padding-right: 8px; }
+  td:last-child { overflow-wrap: anywhere; }
+}
 @media print { body { background: #fff; } section { break-inside: avoid; } }
+"""
+
+SCRIPT: Final = """
+const film = document.querySelector("video");
+const plot = document.getElementById("plot");
+let mark = null;
+const toFilm = t => (t - film.dataset.start) / film.dataset.speed;
+const toRun = t => +film.dataset.start + t * film.dataset.speed;
+document.querySelectorAll("button[data-time]").forEach(b => b.addEventListener("click", () => {
+  const t = +b.dataset.time;
+  if (film) { film.pause(); film.currentTime = Math.max(toFilm(t), 0); }
+  if (mark) mark(t);
+  (film || plot || b).scrollIntoView({ behavior: "smooth", block: "center" });
+}));
+(async () => {
+  if (!plot) return;
+  const unpacked = id => {
+    const packed = atob(document.getElementById(id).textContent);
+    const bytes = Uint8Array.from(packed, c => c.charCodeAt(0));
+    const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return new Response(plain).text();
+  };
+  const library = document.createElement("script");
+  library.textContent = await unpacked("plotly");
+  document.head.append(library);
+  const spec = JSON.parse(await unpacked("curves-data"));
+  const shapes = spec.layout.shapes;
+  const now = { type: "line", x0: 0, x1: 0, yref: "paper", y0: 0, y1: 1,
+    line: { color: "#22303c", width: 1.2 } };
+  spec.layout.height = spec.height;
+  spec.layout.shapes = [...shapes, now];
+  await Plotly.newPlot(plot, spec.traces, spec.layout, { responsive: true,
+    displaylogo: false, displayModeBar: innerWidth > 640 && "hover" });
+  mark = t => Plotly.relayout(plot, { [`shapes[${shapes.length}].x0`]: t,
+    [`shapes[${shapes.length}].x1`]: t });
+  if (film) film.addEventListener("timeupdate", () => mark(toRun(film.currentTime)));
+  document.getElementById("joint").addEventListener("change", change => {
+    const rows = spec.joints[+change.target.value];
+    Plotly.restyle(plot, { y: rows }, rows.map((_, k) => spec.first + k));
+  });
+})();
 """

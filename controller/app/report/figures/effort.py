@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from snakewalk.controller.app.report.figures.style import (
     AMBER,
     BLUE,
+    FLAT_V,
     GREY,
     RED,
     SKY,
@@ -79,9 +80,14 @@ def _slow(axes: Axes, record: RunRecord) -> None:
     axes.set_title(f"Temperature (limit {limit:g} °C) and supply")
     coolest, warmest = np.nanmin(slow.temperature_c), np.nanmax(slow.temperature_c)
     axes.set_ylim(coolest - 2.0, max(warmest + 0.4 * (warmest - coolest), coolest + 10.0))
-    volts = axes.twinx()
     lowest = np.where(np.isnan(slow.voltage_v), np.inf, slow.voltage_v).min(axis=1)
     lowest[np.isinf(lowest)] = np.nan
+    if not np.isfinite(lowest).any() or np.nanmax(lowest) - np.nanmin(lowest) <= FLAT_V:
+        held = f", supply {np.nanmedian(lowest):.1f} V throughout" if len(lowest) else ""
+        axes.set_title(f"Temperature (limit {limit:g} °C){held}")
+        legend_above(axes)
+        return
+    volts = axes.twinx()
     volts.step(time, np.append(lowest, lowest[-1]), where="post", color=AMBER, linewidth=1.2)
     volts.set_ylabel("lowest supply (V)", color=AMBER)
     volts.tick_params(axis="y", colors=AMBER)

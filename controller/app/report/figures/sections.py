@@ -16,6 +16,8 @@ from snakewalk.controller.app.report.figures.walk import walk_figure
 from snakewalk.controller.app.report.page import Section
 from snakewalk.controller.runlog.record import RunRecord
 
+_IN_CURVES: Final = frozenset({"Speed and path", "Effort", "Time on the bus"})
+"""What the curves of the page show as well, to be zoomed."""
 _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] = (
     (
         "The way",
@@ -61,11 +63,11 @@ _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] =
 
 
 def sections(record: RunRecord) -> list[Section]:
-    """Draw what the log has something for."""
+    """Draw what the log has something for; what the curves have as well is folded."""
     with style():
         drawn = [(title, caption, draw(record)) for title, caption, draw in _ALL]
         return [
-            Section(title, caption, data_uri(figure))
+            Section(title, caption, data_uri(figure), is_folded=title in _IN_CURVES)
             for title, caption, figure in drawn
             if figure is not None
         ]

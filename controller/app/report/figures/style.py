@@ -30,6 +30,8 @@ GROUND: Final = LinearSegmentedColormap.from_list(
 )
 ANGLES: Final = "RdBu_r"
 WIDTH_IN: Final = 11.0
+FLAT_V: Final = 0.15
+"""Span up to which a supply holds no information (ours)."""
 _POINTS: Final = 900  # across a figure: more cannot be seen
 _RC: Final[dict[Any, Any]] = {
     "font.family": "DejaVu Sans",

@@ -1,6 +1,8 @@
 """The page: whole, self-contained, the same each time, and safe against what a log may say."""
 
 import base64
+import gzip
+import json
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,8 +16,10 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.report import page as page_module
 from snakewalk.controller.app.report.artifacts import build_report
+from snakewalk.controller.app.report.curves import curves_html
 from snakewalk.controller.app.report.figures.path import body_outline_m
 from snakewalk.controller.app.report.figures.style import thin
+from snakewalk.controller.app.report.film import film_times
 from snakewalk.controller.app.report.page import page
 from snakewalk.controller.metrics.summary import summary
 from snakewalk.controller.runlog.reader import read_log
@@ -53,13 +57,14 @@ def test_the_page_stands_alone(make: Make, tmp_path: Path) -> None:
     first = build_report(read_log(log), tmp_path / "a")
     log.rename(tmp_path / "b.mcap")
     html = first.read_text(encoding="utf-8")
-    sources = parsed(html).sources
+    *sources, link = parsed(html).sources
+    assert link == "summary.json", "no log stands beside this page"
     assert len(sources) == 7
     for source in sources:
         assert source.startswith("data:image/svg+xml;base64,")
         svg = ElementTree.fromstring(base64.b64decode(source.split(",", 1)[1]))
         assert svg.tag.endswith("svg")
-    assert "<script" not in html
+    assert not re.search(r"<script[^>]*src", html), "nothing is loaded"
     assert "waypoint 1 reached" in html
     assert (tmp_path / "a" / "summary.json").is_file()
     again = build_report(read_log(tmp_path / "b.mcap"), tmp_path / "c")
@@ -83,7 +88,8 @@ def test_what_the_log_says_is_text_not_markup(record: RunRecord) -> None:
     evil = [Event(1.0, "info' onload='x", "<b>", "<script>alert(1)</script>")]
     html = page(summary(record), [], film="", events=evil, config={"run": "</pre><script>"})
     parsed(html)
-    assert "<script" not in html
+    assert "<script>alert" not in html
+    assert "</pre><script>" not in html
     assert "onload='x" not in html
 
 
@@ -100,6 +106,68 @@ def test_film_inside_or_beside(make: Make, tmp_path: Path, monkeypatch: pytest.M
         page_module.film_html(tmp_path / "gone.mp4", tmp_path)
     with pytest.raises(InputError, match=r"\.mp4, \.webm"):
         page_module.film_html(tmp_path / "film.avi", tmp_path)
+
+
+def unpacked(html: str, name: str) -> str:
+    packed = re.search(f"<script id='{name}' type='text/plain'>([^<]*)</script>", html)
+    assert packed is not None
+    return gzip.decompress(base64.b64decode(packed[1])).decode()
+
+
+def numbers_of(array: dict[str, str]) -> np.ndarray:
+    assert array["dtype"] == "f4"
+    return np.frombuffer(base64.b64decode(array["bdata"]), "<f4")
+
+
+def test_the_curves_are_the_logs_and_their_library_is_on_the_page(record: RunRecord) -> None:
+    html = curves_html(record)
+    assert "Plotly" in unpacked(html, "plotly")
+    spec = json.loads(unpacked(html, "curves-data"))
+    cycle = record.cycle
+    names = [trace["name"] for trace in spec["traces"]]
+    assert names[spec["first"] :] == ["asked", "sent", "measured", "current"]
+    assert len(spec["joints"]) == cycle.asked_rad.shape[1]
+    for joint in (0, 7):
+        asked, sent, measured, current = map(numbers_of, spec["joints"][joint])
+        assert np.array_equal(asked, cycle.asked_rad[:, joint].astype("f4"))
+        assert np.array_equal(sent, cycle.sent_rad[:, joint].astype("f4"))
+        assert np.array_equal(np.isfinite(measured), cycle.valid[:, joint])
+        assert np.array_equal(current, cycle.current_a[:, joint].astype("f4"), equal_nan=True)
+    (off,) = (trace for trace in spec["traces"] if trace["name"] == "from the path")
+    assert np.nanmean(numbers_of(off["y"])) == pytest.approx(
+        summary(record).path_error_mean_m, rel=1e-4
+    )
+
+
+def test_a_supply_that_never_changes_is_told_and_not_drawn(record: RunRecord) -> None:
+    level = replace(record.slow, voltage_v=np.full_like(record.slow.voltage_v, 12.0))
+    html = curves_html(replace(record, slow=level))
+    assert "lowest supply 12.0 V" in html
+    spec = json.loads(unpacked(html, "curves-data"))
+    assert "lowest supply" not in [trace["name"] for trace in spec["traces"]]
+    falls = np.linspace(12.0, 11.0, level.voltage_v.size).reshape(level.voltage_v.shape)
+    spec = json.loads(
+        unpacked(curves_html(replace(record, slow=replace(level, voltage_v=falls))), "curves-data")
+    )
+    assert "lowest supply" in [trace["name"] for trace in spec["traces"]]
+
+
+def test_an_event_leads_into_the_film(record: RunRecord, tmp_path: Path) -> None:
+    start_s, faster = film_times(record)
+    assert start_s == record.pose.time_s[0]
+    assert faster >= 1.0
+    (tmp_path / "film.mp4").write_bytes(bytes(10))
+    (tmp_path / "log.mcap").write_bytes(b"")
+    html = build_report(record, tmp_path, tmp_path / "film.mp4").read_text(encoding="utf-8")
+    assert f"data-start='{start_s:.3f}' data-speed='{faster:g}'" in html
+    assert f"<button data-time='{record.events[0].time_s:.3f}'>" in html
+    links = [source for source in parsed(html).sources if not source.startswith("data:")]
+    assert links == ["log.mcap", "summary.json", "film.mp4"]
+
+
+def test_the_foot_says_what_made_the_page(record: RunRecord) -> None:
+    html = page(summary(record), [], film="", events=[], config={}, made="Made by <me>")
+    assert "Made by &lt;me&gt;" in html
 
 
 def test_thinning_keeps_the_peaks_and_the_mean() -> None:
