@@ -34,6 +34,8 @@ WRITERS = {
     "write_mesh",
     "write_skin",
 }
+EXPORTS = {"write_csv", "write_parquet", "write_ros_bag", "write_foxglove_scene"}
+"""Writers themselves, as `save` is: their callers are examined."""
 STREAMS = {"bus.py": "a recording of the line grows", "table.py": "a table grows by rows"}
 """Files that grow, each row whole, in place of being written at once."""
 
@@ -195,7 +197,7 @@ def unsafe(source: str) -> list[int]:
             names = {getattr(c.func, "id", "") for c in calls if isinstance(c, ast.Call)}
             if "atomic_write" in names:
                 safe |= set(ast.walk(block))
-        elif isinstance(block, ast.FunctionDef) and block.name == "save":
+        elif isinstance(block, ast.FunctionDef) and block.name in EXPORTS | {"save"}:
             safe |= set(ast.walk(block))  # a writer itself: its callers are examined
     return [
         node.lineno
@@ -211,7 +213,7 @@ def writes(call: ast.Call) -> bool:
         return False  # in memory
     modes = [arg.value for arg in call.args if isinstance(arg, ast.Constant)]
     opened = name == "open" and any(str(mode)[:1] in "wax" for mode in modes)
-    return opened or name in WRITERS or name.startswith("savez")
+    return opened or name in WRITERS | EXPORTS or name.startswith("savez")
 
 
 def test_every_result_is_written_atomically() -> None:
