@@ -11,3 +11,9 @@ class PlaybackConfig(Strict):
     speed: float | None = Field(
         None, gt=0.0, le=10.0, description="times the animal's own; default: as fast as joints can"
     )
+    scale: float = Field(
+        1.0, gt=0.0, le=10.0, description="times the joint angles of the recording: its amplitude"
+    )
+    clip: bool = Field(
+        False, description="joints are held within their limits, where the recording bends further"
+    )

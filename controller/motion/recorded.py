@@ -42,10 +42,15 @@ class Recorded:
         self._spline = CubicSpline(time_s, joint_rad, bc_type="natural")
         fine = np.linspace(time_s[0], time_s[-1], 8 * len(time_s))
         reach, limit = np.abs(self._spline(fine)).max(axis=0), np.array(robot.limit_rad)
-        for joint in np.flatnonzero(reach > limit)[:1]:
+        if (reach > limit).any():
+            joint = int(np.argmax(reach / limit))
+            moment = fine[np.argmax(np.abs(self._spline(fine)[:, joint]))]
+            frame = int(np.argmin(np.abs(time_s - moment)))
+            least = np.floor(100.0 * limit[joint] / reach[joint]) / 100.0
             raise InputError(
-                f"recording: {robot.joint_name(joint)} bends to {reach[joint]:.2f} rad; "
-                f"its limit is {limit[joint]:.2f}"
+                f"recording: {robot.joint_name(joint)} bends to {reach[joint]:.2f} rad in frame "
+                f"{frame}; its limit is {limit[joint]:.2f}: make the whole motion smaller (--scale "
+                f"{least:.2f}), or clip joints to their limits (--clip)"
             )
         speed = np.abs(self._spline(fine, 1)).max(axis=0)
         bend = np.abs(self._spline(np.concatenate([fine, time_s]), 2)).max(axis=0)

@@ -47,7 +47,7 @@ GAIT_PITCH_SHARE = 0.75
 
 _OWN_MOTION = {"run.robot": "--robot", "run.motion": "the command"}
 _OF_A_GAIT = _OWN_MOTION | {"run.gait": "--param, --seconds, --then, --by, --look-heading-rad"}
-_OF_A_RECORDING = _OWN_MOTION | {"run.track": "TRACK", "run.playback": "--speed"}
+_OF_A_RECORDING = _OWN_MOTION | {"run.track": "TRACK", "run.playback": "--speed, --scale, --clip"}
 """Keys that a gait's or a recording's run takes from its command, by the options that give them."""
 
 
@@ -278,6 +278,8 @@ def prepare_playback(
     robot: str | None = None,
     world: str | None = None,
     speed: float | None = None,
+    scale: float = 1.0,
+    clip: bool = False,
     keys: Mapping[str, object] | None = None,
 ) -> PlaybackRun:
     """Prepare to play a recording; ``keys`` as of ``prepare_walk``.
@@ -294,7 +296,7 @@ def prepare_playback(
         "world": world or "flat",
         "track": track,
         "motion": "playback",
-        "playback": {"speed": speed},
+        "playback": {"speed": speed, "scale": scale, "clip": clip},
     }
     run = _with_keys_of("run", checked(RunConfig, fields, "command line"), keys)
     _refuse_legs(body)

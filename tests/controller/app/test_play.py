@@ -39,6 +39,40 @@ def test_a_worm_is_played_at_its_own_speed() -> None:
         prepare_playback("lamprey-like", speed=1.0)
 
 
+def test_a_recording_that_bends_too_far_is_refused_scaled_or_clipped(tmp_path: Path) -> None:
+    """Frame, joint and remedy are told; what was done is in the log."""
+    robot = load_robot("yaw16")
+    time_s = np.arange(91) / 30.0
+    wave = 0.4 * np.sin(2.0 * time_s[:, None] + np.arange(16) / 3.0)
+    wave[:, 4] += 2.2 * np.exp(-(((time_s - 1.5) / 0.4) ** 2))
+    limit, reach = robot.limit_rad[4], float(np.abs(wave[:, 4]).max())
+    assert reach > limit
+    worst = int(np.argmax(np.abs(wave[:, 4])))
+    path = tmp_path / "far.npz"
+    np.savez(path, joints_rad=wave, rate_hz=30.0, robot="yaw16")
+    least = np.floor(100.0 * limit / (1.003 * reach)) / 100.0  # the spline goes a little beyond
+    with pytest.raises(InputError, match=rf"in frame {worst}; its limit is .*--scale {least:.2f}"):
+        prepare_playback(str(path))
+    small = prepare_playback(str(path), scale=least)
+    np.testing.assert_allclose(small.joint_track[1], least * wave)
+    assert small.clipped is None
+    clipped = prepare_playback(str(path), clip=True)
+    _, joints = clipped.joint_track
+    assert np.abs(joints).max() <= limit
+    calm = np.abs(wave) < 0.85 * limit
+    np.testing.assert_array_equal(joints[calm], wave[calm])
+    clipped.check_plan()
+    told: list[str] = []
+    clipped.make_source(lambda kind, text: told.append(text))
+    past = np.abs(wave) > robot.limit_rad
+    assert told[0] == clipped.clipped
+    assert f"in {int(past.any(axis=1).sum())} of 91 frames" in told[0]
+    assert f"in frame {worst}" in told[0]
+    told.clear()
+    small.make_source(lambda kind, text: told.append(text))
+    assert told[0] == f"joint angles scaled by {least:g}"
+
+
 def test_joints_of_a_synthesis_are_played_as_they_are(tmp_path: Path) -> None:
     """No detour over midlines where the file holds the robot's own joints; run and log agree."""
     robot = load_robot("yaw16")

@@ -28,6 +28,12 @@ def play(
     speed: Annotated[
         str, typer.Option(help="times the animal's own; auto: as fast as the joints can, at most 1")
     ] = "auto",
+    scale: Annotated[
+        float, typer.Option(help="times the joint angles: below 1 the whole motion is smaller")
+    ] = 1.0,
+    clip: Annotated[
+        bool, typer.Option("--clip", help="hold joints within their limits where it bends further")
+    ] = False,
     set_: Set = None,
     port: RunPort = None,
     film: Film = True,
@@ -41,7 +47,13 @@ def play(
     from snakewalk.controller.app.runs.factory import prepare_playback  # noqa: PLC0415
 
     prepared = prepare_playback(
-        track, robot=robot, world=world, speed=_speed(speed), keys=key_values("--set", set_)
+        track,
+        robot=robot,
+        world=world,
+        speed=_speed(speed),
+        scale=scale,
+        clip=clip,
+        keys=key_values("--set", set_),
     )
     with (
         run_folder(f"play-{prepared.run.name}", out) as folder,
@@ -61,6 +73,8 @@ def play(
         "robot": prepared.robot.name,
         "world": prepared.world.name,
         "speed": round(prepared.speed, 4),
+        "scale": scale,
+        "clipped": prepared.clipped,
         "duration_s": round(finished.outcome.duration_s, 2),
         "tripped": finished.outcome.tripped,
         "peak_current_a": finished.summary.peak_current_a,
