@@ -80,3 +80,10 @@ def test_a_typo_is_told_before_anything_heavy_is_imported(tmp_path: Path) -> Non
     told_first = done.stdout.splitlines()[0]
     assert told_first.startswith("robot.toml:2: joint_axis: unknown key; did you mean joint_axes?")
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_what_is_shipped_is_listed_by_kind() -> None:
+    listed = json.loads(CliRunner().invoke(app, ["list", "--json"]).stdout)
+    assert set(listed) == {"runs", "robots", "worlds", "recordings", "gaits"}
+    assert "worm-like" in listed["recordings"]
+    assert "sidewinding-fast" in listed["gaits"]

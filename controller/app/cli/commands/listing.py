@@ -15,8 +15,8 @@ RobotName = Annotated[str, typer.Argument(help="shipped robot, or a TOML file")]
 
 
 def list_(as_json: Json = False) -> None:
-    """List the shipped runs, robots and worlds."""
-    from snakewalk.config.loader import load_robot, load_run, load_world, shipped  # noqa: PLC0415  --help stays quick
+    """List what is shipped: runs, robots, worlds, recordings, sets of gait parameters."""
+    from snakewalk.config.loader import load_gait, load_robot, load_run, load_world, shipped  # noqa: PLC0415  --help stays quick
 
     rows = {
         "runs": [[n, f"{(r := load_run(n)).robot} on {r.world}"] for n in shipped("runs")],
@@ -26,6 +26,8 @@ def list_(as_json: Json = False) -> None:
             for b in [load_robot(n)]
         ],
         "worlds": [[n, load_world(n).ground.kind] for n in shipped("worlds")],
+        "recordings": [[n, "snakewalk track, play, run --track"] for n in shipped("recordings")],
+        "gaits": [[n, f"{(g := load_gait(n)).gait} on {g.robot}"] for n in shipped("gaits")],
     }
     if as_json:
         print(json.dumps({kind: [name for name, _ in rs] for kind, rs in rows.items()}))
@@ -35,6 +37,7 @@ def list_(as_json: Json = False) -> None:
         for line in lines:
             table.add_row(f"  {line[0]}", line[1])
         console.print(table)
+    console.print("all gaits: snakewalk gait list")
 
 
 def show_robot(name: RobotName, as_json: Json = False) -> None:
