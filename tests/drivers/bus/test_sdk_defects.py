@@ -85,6 +85,30 @@ def test_group_reads_drop_the_error_byte() -> None:
         assert ControlCycle(line, [1, 2], fast=fast).read().error.tolist() == [0, 0x80]
 
 
+def test_a_fast_bulk_read_takes_a_length_for_an_id() -> None:
+    """It looks IDs up among all bytes of the request: ID 4 is found where the first length is."""
+    ids, velocity = (1, 4, 7), (128, 4)
+    line = SimLine(ServoBank(ids), BenchPlant(3))
+    reads = sdk.GroupBulkRead(line, PH)
+    for servo_id in ids:
+        reads.addParam(servo_id, *velocity)
+    assert [reads.fastBulkRead() for _ in range(3)] == [sdk.COMM_SUCCESS] * 3
+    assert [len(reads.data_dict[k][0]) for k in ids] == [4, 4, 0]  # for ever, and a success
+    with pytest.raises(IndexError):
+        reads.getData(7, *velocity)
+    assert reads.txRxPacket() == sdk.COMM_SUCCESS
+    line.firmware.plant.velocity_rad_s[:] = 1.0
+    assert reads.fastBulkRead() == sdk.COMM_SUCCESS
+    assert [bool(reads.getData(k, *velocity)) for k in ids] == [True, True, False]  # the old value
+
+    mixed = sdk.GroupBulkRead(line, PH)
+    for request in ((7, 132, 4), (4, 2, 10), (1, 144, 2)):
+        mixed.addParam(*request)
+    assert [mixed.fastBulkRead() for _ in range(3)] == [sdk.COMM_RX_CORRUPT] * 3
+
+    assert ControlCycle(line, ids, fast=True).read().valid.all()
+
+
 def test_an_error_in_a_group_read_counts_as_its_value() -> None:
     def script(_: bytes) -> list[tuple[float, bytes]]:
         refused = StatusPacket(2, 7, b"\x11" * 10)
