@@ -1,4 +1,4 @@
-"""Slowing down before a servo trips: heat, current and supply against the safety limits.
+"""Slowing down before a servo trips: heat, current, supply and lag against the safety limits.
 
 The rate is 1 while everything is well and falls to ``LEAST`` where a limit would be reached, so a
 motion goes on slower, cooler and with less current instead of stopping. It falls quickly and comes
@@ -27,8 +27,11 @@ VOLTAGE_BAND, VOLTAGE_EDGE = 1 / 15, 1 / 60
 """Shares of the supply, above the least one: 0.8 and 0.2 V of 12 V."""
 FALL_S, RISE_S = 0.4, 6.0
 """Time constants of the rate."""
-CURRENT_S = 0.2
-"""Over which current is averaged: a peak is no load."""
+LAG_START, LAG_END = 0.6, 0.95
+"""Shares of the limit of the following error; an honest lag takes half of it at most. A joint whose
+current is limited is left out: the ground may hold it off its goal, at any rate."""
+AVERAGE_S = 0.2
+"""Over which current and lag are averaged: a peak is no load."""
 REPORT_BELOW, REPORT_ABOVE = 0.95, 0.99
 
 
@@ -46,13 +49,18 @@ UNLIMITED = Allowed(1.0, "")
 
 
 def allowed(
-    state: JointState, current_a: Floats, safety: SafetyConfig, robot: RobotConfig
+    state: JointState,
+    current_a: Floats,
+    lag_rad: Floats,
+    safety: SafetyConfig,
+    robot: RobotConfig,
 ) -> Allowed:
     """Return what a state allows; what was not read yet (NaN) limits nothing.
 
     Args:
         state: of the servos.
         current_a: (J,) averaged magnitudes.
+        lag_rad: (J,) averaged distances from the goals.
         safety: the limits at which servos are stopped.
         robot: names the joints.
 
@@ -63,6 +71,7 @@ def allowed(
         safety.current_limit_of_a(robot),
         safety.voltage_limits_v(robot.servo)[0],
     )
+    limit_rad = _lag_limits_rad(safety, robot)
     band_v, edge_v = VOLTAGE_BAND * robot.servo.supply_v, VOLTAGE_EDGE * robot.servo.supply_v
     ratings = (
         (_falling(heat, limit_c - HEAT_BAND_C, limit_c - HEAT_EDGE_C), heat, "{:.0f} C", limit_c),
@@ -78,50 +87,70 @@ def allowed(
             "{:.1f} V",
             voltage_min_v,
         ),
+        (
+            _falling(lag_rad, LAG_START * limit_rad, LAG_END * limit_rad),
+            lag_rad,
+            "{:.2f} rad from its goal",
+            limit_rad,
+        ),
     )
     rates, values, unit, limit = min(ratings, key=lambda each: float(each[0].min()))
     joint = int(np.argmin(rates))
     rate = LEAST + (1.0 - LEAST) * float(rates[joint])
     if rate >= 1.0:
         return UNLIMITED
-    text = f"{robot.joint_name(joint)} at {unit.format(values[joint])}, limit {unit.format(limit)}"
-    return Allowed(rate, text)
+    reached = unit.format(values[joint])
+    most = unit.format(np.full(len(rates), limit)[joint]).removesuffix(" from its goal")
+    return Allowed(rate, f"{robot.joint_name(joint)} at {reached}, limit {most}")
+
+
+def _lag_limits_rad(safety: SafetyConfig, robot: RobotConfig) -> Floats:
+    """(J,) limits of the following error; inf where the current is limited."""
+    limited = np.isfinite(robot.current_limits_a)
+    return np.where(limited, np.inf, safety.following_limits_rad(robot))
 
 
 @compiled(
-    f"boolean(float64[::1], {readonly_array()}, float64, {readonly_array()}, {readonly_array()},"
-    " float64, float64, float64)"
+    f"boolean(float64[::1], float64[::1], {', '.join([readonly_array()] * 3)}, float64,"
+    f" {', '.join([readonly_array()] * 3)}, float64, float64, float64)"
 )
 def _is_unlimited(
     mean_a: Floats,
+    lag_rad: Floats,
     current_a: Floats,
+    goal_rad: Floats,
+    position_rad: Floats,
     share: float,
     heat_c: Floats,
     voltage_v: Floats,
+    lag_max_rad: Floats,
     current_max_a: float,
     temperature_max_c: float,
     voltage_min_v: float,
 ) -> bool:
-    """Average magnitudes of currents into ``mean_a``; whether ``allowed`` finds nothing to limit.
+    """Average ``mean_a`` and ``lag_rad`` on; return whether ``allowed`` finds nothing to limit.
 
     What was not read yet (NaN) limits nothing; a mean current that is NaN is not well.
     """
     well = True
     for joint in range(len(mean_a)):
         mean_a[joint] += share * (abs(current_a[joint]) - mean_a[joint])
+        lag_rad[joint] += share * (abs(goal_rad[joint] - position_rad[joint]) - lag_rad[joint])
         if (
             not mean_a[joint] <= current_max_a
             or heat_c[joint] > temperature_max_c
             or voltage_v[joint] < voltage_min_v
+            or lag_rad[joint] > lag_max_rad[joint]
         ):
             well = False
     return well
 
 
-def _falling(values: Floats, start: float, end: float) -> Floats:
-    """1 up to ``start``, 0 from ``end`` on, a line between; 1 for NaN."""
-    share = np.clip((end - values) / (end - start), 0.0, 1.0)
-    return np.asarray(np.where(np.isfinite(values), share, 1.0))
+def _falling(values: Floats, start: Floats | float, end: Floats | float) -> Floats:
+    """1 up to ``start``, 0 from ``end`` on, a line between; 1 for NaN and where ``end`` is inf."""
+    with np.errstate(invalid="ignore"):
+        share = np.clip((end - values) / np.subtract(end, start), 0.0, 1.0)
+    return np.where(np.isnan(share), 1.0, share)
 
 
 class Derating:
@@ -141,25 +170,35 @@ class Derating:
         self._current_start_a = CURRENT_START * safety.current_limit_of_a(robot)
         self._voltage_low_v = safety.voltage_limits_v(servo)[0] + VOLTAGE_BAND * servo.supply_v
         self._on_event = on_event
-        self._current_a = np.zeros(0)
+        self._lag_start_rad = LAG_START * _lag_limits_rad(safety, robot)
+        self._current_a = self._lag_rad = np.zeros(0)
         self._is_reported = False
 
-    def update(self, state: JointState, dt_s: float) -> float:
-        """Take in a state and return the rate, LEAST to 1; ``on_event`` takes large changes."""
+    def update(self, state: JointState, goal_rad: Floats, dt_s: float) -> float:
+        """Take in a state and the goals before it; return the rate, LEAST to 1.
+
+        ``on_event`` takes large changes.
+        """
         safety = self._safety
         if len(self._current_a) != len(state.current_a):
             self._current_a = np.zeros(len(state.current_a))
+            self._lag_rad = np.zeros(len(state.current_a))
         unlimited = _is_unlimited(
             self._current_a,
+            self._lag_rad,
             state.current_a,
-            min(1.0, dt_s / CURRENT_S),
+            goal_rad,
+            state.position_rad,
+            min(1.0, dt_s / AVERAGE_S),
             state.temperature_c,
             state.voltage_v,
+            self._lag_start_rad,
             self._current_start_a,
             safety.temperature_limit_c - HEAT_BAND_C,
             self._voltage_low_v,
         )
-        now = UNLIMITED if unlimited else allowed(state, self._current_a, safety, self._robot)
+        means = self._current_a, self._lag_rad
+        now = UNLIMITED if unlimited else allowed(state, *means, safety, self._robot)
         if now.rate == self.rate:
             return self.rate
         time_s = FALL_S if now.rate < self.rate else RISE_S

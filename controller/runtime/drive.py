@@ -152,7 +152,10 @@ class Drive:
                 if clock.now_s() < walk_s:
                     goal = ramp.at(clock.now_s() - start_s)
                 else:
-                    goal = self._steer(period_s * self._derating.update(state, period_s), view)
+                    sent = self._link.last_verdict
+                    before_rad = state.position_rad if sent is None else sent.goal_rad
+                    rate = self._derating.update(state, before_rad, period_s)
+                    goal = self._steer(period_s * rate, view)
                     if self._compliance is not None:
                         goal = self._compliance.step(goal, state, period_s)
                 self._send(tick, state, pose, view, goal)

@@ -15,6 +15,9 @@ J = 4
 ROBOT = RobotConfig(name="four", joint_axes="yyyy")
 
 
+STILL = np.zeros(J)
+
+
 def state(celsius: float = 30.0, volts: float = 12.0, amps: float = 0.3) -> JointState:
     cool = np.array([30.0, celsius, 30.0, 30.0])
     return JointState(
@@ -33,11 +36,11 @@ def state(celsius: float = 30.0, volts: float = 12.0, amps: float = 0.3) -> Join
 
 
 def rate(found: JointState) -> float:
-    return allowed(found, np.abs(found.current_a), SAFETY, ROBOT).rate
+    return allowed(found, np.abs(found.current_a), STILL, SAFETY, ROBOT).rate
 
 
 def test_a_cool_robot_on_a_good_supply_runs_at_full_rate() -> None:
-    assert allowed(state(), np.full(J, 0.3), SAFETY, ROBOT).reason == ""
+    assert allowed(state(), np.full(J, 0.3), STILL, SAFETY, ROBOT).reason == ""
     assert rate(state()) == 1.0
 
 
@@ -57,7 +60,7 @@ def test_what_was_not_read_yet_limits_nothing() -> None:
 def test_near_a_limit_it_slows_down_and_names_joint_value_and_limit(
     found: JointState, reason: str
 ) -> None:
-    now = allowed(found, np.abs(found.current_a), SAFETY, ROBOT)
+    now = allowed(found, np.abs(found.current_a), STILL, SAFETY, ROBOT)
     assert LEAST < now.rate < 1.0
     assert now.reason == reason
 
@@ -87,7 +90,7 @@ def test_it_says_once_that_it_slows_and_once_that_it_is_back() -> None:
     for found, seconds in ((hot, 3.0), (cool, 60.0)):
         before = derating.rate
         for _ in range(int(seconds / 0.02)):
-            now = derating.update(found, 0.02)
+            now = derating.update(found, STILL, 0.02)
             assert abs(now - before) < 0.05, "the rate itself has no step"
             before = now
     assert said == ["slowing down: joint 2 (ID 2) at 67 C, limit 70 C", "at full rate again"]
@@ -98,7 +101,7 @@ def test_it_says_once_that_it_slows_and_once_that_it_is_back() -> None:
 def test_a_peak_of_current_shorter_than_the_average_is_no_load() -> None:
     derating = Derating(SAFETY, ROBOT)
     for k in range(200):
-        derating.update(state(amps=2.2 if k % 50 == 0 else 0.5), 0.02)
+        derating.update(state(amps=2.2 if k % 50 == 0 else 0.5), STILL, 0.02)
     assert derating.least == 1.0
 
 
@@ -106,5 +109,26 @@ def test_the_band_above_the_least_supply_is_that_of_the_robots_own_supply() -> N
     """At 5 V a band of 0.8 V would slow a robot down on a supply that is as it should be."""
     small = RobotConfig(name="small", joint_axes="yyyy", servo=ServoConfig(supply_v=5.0))
     fine, low = state(volts=4.7), state(volts=4.3)
-    assert allowed(fine, np.full(J, 0.1), SAFETY, small).rate == 1.0
-    assert allowed(low, np.full(J, 0.1), SAFETY, small).rate < 1.0
+    assert allowed(fine, np.full(J, 0.1), STILL, SAFETY, small).rate == 1.0
+    assert allowed(low, np.full(J, 0.1), STILL, SAFETY, small).rate < 1.0
+
+
+def test_a_joint_that_lags_slows_the_motion_down_before_it_trips() -> None:
+    """Past any honest lag, half of the limit at most; not if the ground may hold it off."""
+    said: list[str] = []
+    derating = Derating(SAFETY, ROBOT, lambda kind, text: said.append(text))
+    limit_rad = SAFETY.following_limits_rad(ROBOT)[2]
+    goal_rad = np.zeros(J)
+    for share, most in ((0.5, 1.0), (0.8, 0.9), (0.99, 0.4)):
+        goal_rad[2] = share * limit_rad
+        for _ in range(100):
+            rate = derating.update(state(), goal_rad, 0.02)
+        assert rate <= most
+        assert (rate == 1.0) == (share == 0.5)
+    assert rate == pytest.approx(LEAST, abs=0.01)
+    (line,) = said
+    assert line.startswith("slowing down: joint 3 (ID 3) at ")
+    assert line.endswith(f" rad from its goal, limit {limit_rad:.2f} rad")
+    lifting = Derating(SAFETY, RobotConfig(name="pitch", joint_axes="yypy"))
+    for _ in range(100):
+        assert lifting.update(state(), goal_rad, 0.02) == 1.0
