@@ -1,9 +1,10 @@
-"""Frames of a recording: a video that OpenCV reads, or a folder of images in the order of names."""
+"""Frames of a recording: a video that OpenCV or PyAV reads, or a folder of images by name."""
 
 import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 import cv2
@@ -34,6 +35,8 @@ class Footage:
     rate_hz: float
     rate_assumed: bool
     """Whether ``rate_hz`` is a guess: neither the caller nor the file states it."""
+    decoded_by_av: bool = False
+    """Whether PyAV reads the video, as this OpenCV lacks its codec."""
 
     def read(self) -> Iterator[Image]:
         """(H, W) or (H, W, 3) 8-bit frames in order.
@@ -56,23 +59,57 @@ class Footage:
             yield read_image(file)
 
     def _video(self, every: int) -> Iterator[Image]:
-        film = cv2.VideoCapture(str(self.path))
         done = 0
-        try:
-            while film.grab():
-                if done % every == 0:
-                    whole, frame = film.retrieve()
-                    if not whole:
-                        break
-                    yield _one_channel(frame)
-                done += 1
-        finally:
-            film.release()
+        for frame in _av_frames(self.path, every) if self.decoded_by_av else self._grabbed(every):
+            if frame is not None:
+                yield _one_channel(frame)
+            done += 1
         if done < (1.0 - _MISSING) * self.count - 1.0:
             raise InputError(
                 f"{self.path}: ends after {done} of {self.count} frames: the file is cut or its "
                 "codec is damaged; copy it again, or cut it there and give the part"
             )
+
+    def _grabbed(self, every: int) -> Iterator[NDArray[np.generic] | None]:
+        """All frames by OpenCV; None for those between each ``every``-th, which stay undecoded."""
+        film = cv2.VideoCapture(str(self.path))
+        number = 0
+        try:
+            while film.grab():
+                if number % every:
+                    yield None
+                else:
+                    whole, frame = film.retrieve()
+                    if not whole:
+                        break
+                    yield frame
+                number += 1
+        finally:
+            film.release()
+
+
+def _av_frames(path: Path, every: int) -> Iterator[NDArray[np.generic] | None]:
+    """All frames by PyAV, blue first as OpenCV has them; None for those that are not asked for."""
+    import av  # noqa: PLC0415  an extra
+
+    try:
+        with av.open(str(path)) as film:
+            for number, frame in enumerate(film.decode(video=0)):
+                yield None if number % every else frame.to_ndarray(format="bgr24")
+    except (av.error.FFmpegError, IndexError):
+        return  # what is missing is counted by the caller
+
+
+def _av_facts(path: Path) -> tuple[int, float] | None:
+    """Frames and rate (0: not stated) of a video that PyAV reads; None where it does not."""
+    if find_spec("av") is None or next(_av_frames(path, 1), None) is None:
+        return None
+    import av  # noqa: PLC0415  an extra
+
+    with av.open(str(path)) as film:
+        stream = film.streams.video[0]
+        count = stream.frames or sum(1 for _ in film.decode(stream))
+        return count, float(stream.average_rate or 0.0)
 
 
 def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
@@ -105,15 +142,19 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
         count, stated = film.get(cv2.CAP_PROP_FRAME_COUNT), film.get(cv2.CAP_PROP_FPS)
     finally:
         film.release()
-    if not first:
+    by_av = None if first else _av_facts(path)
+    if by_av is not None:
+        count, stated = by_av
+    elif not first:
         raise InputError(
             f"{path}: no frame can be read: it is no video, is cut, or has a codec that this "
-            "OpenCV lacks; convert it, or give a folder of images"
+            "OpenCV lacks (PyAV, of the extra view, reads more); convert it, or give images"
         )
     if not 0.0 < stated < 1e5:
         stated = 0.0
     rate = rate_hz or stated or ASSUMED_HZ
-    return Footage(path, (), max(1, int(count)), rate, rate_hz is None and stated == 0.0)
+    assumed = rate_hz is None and stated == 0.0
+    return Footage(path, (), max(1, int(count)), rate, assumed, by_av is not None)
 
 
 def read_image(file: Path) -> Image:

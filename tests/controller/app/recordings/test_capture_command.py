@@ -82,6 +82,34 @@ def test_a_fault_leaves_nothing_behind(swim: Path, tmp_path: Path) -> None:
     assert list(folder.iterdir()) == []
 
 
+def test_a_codec_that_opencv_lacks_is_read_by_pyav(tmp_path: Path) -> None:
+    av = pytest.importorskip("av", reason="the extra view is not installed")
+    path = tmp_path / "swim.mp4"
+    wanted = list(film(replace(SCENE, frames=4)))
+    try:
+        with av.open(str(path), "w") as made:
+            stream = made.add_stream(
+                "libsvtav1", rate=25, options={"svtav1-params": "enable-tpl-la=0"}
+            )
+            stream.width, stream.height, stream.pix_fmt = 200, 160, "yuv420p"
+            for frame in wanted:
+                made.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="gray")))
+            made.mux(stream.encode())
+    except (av.error.FFmpegError, ValueError):
+        pytest.skip("this PyAV encodes no AV1")
+    footage = open_footage(path)
+    assert (footage.count, footage.rate_hz, footage.rate_assumed) == (4, 25.0, False)
+    by_av = replace(footage, decoded_by_av=True)
+    for seen, frame in zip(by_av.read(), wanted, strict=True):
+        grey = seen if seen.ndim == 2 else seen.mean(axis=2)
+        assert np.abs(grey.astype(float) - frame).mean() < 12.0
+    assert len(by_av.spread(2)) == 2
+    with pytest.raises(InputError, match="ends after 4 of 40 frames"):
+        list(replace(by_av, count=40).read())
+    if not cv2.VideoCapture(str(path)).read()[0]:
+        assert footage.decoded_by_av
+
+
 def test_a_folder_of_images_is_taken_in_the_order_of_its_numbers(tmp_path: Path) -> None:
     for number, frame in enumerate(film(SCENE)):
         cv2.imwrite(str(tmp_path / f"frame{number}.png"), frame)
