@@ -27,6 +27,7 @@ from snakewalk.controller.app.cli.commands.capture import capture
 from snakewalk.controller.app.cli.commands.files.elevation import elevation
 from snakewalk.controller.app.cli.commands.files.init import init
 from snakewalk.controller.app.cli.commands.files.schema import schema
+from snakewalk.controller.app.cli.commands.files.stereo import stereo
 from snakewalk.controller.app.cli.commands.fish import film, match, synthesise
 from snakewalk.controller.app.cli.commands.gait import list_gaits, show_gait
 from snakewalk.controller.app.cli.commands.gait_fit import fit_gait
@@ -307,7 +308,9 @@ robot_app.command(
     "export", epilog=_examples("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml")
 )(export_robot)
 
-terrain_app = _App(no_args_is_help=True, help="Worlds from real ground: maps of files.")
+terrain_app = _App(
+    no_args_is_help=True, help="Worlds from real ground: maps of files, and of stereo."
+)
 
 app.add_typer(terrain_app, name="terrain", rich_help_panel=_JOB)
 
@@ -319,6 +322,14 @@ terrain_app.command(
         "terrain from heights.png --cell 0.05 --height-step 0.001 -o garden.toml",
     ),
 )(elevation)
+
+terrain_app.command(
+    "from-stereo",
+    epilog=_examples(
+        "terrain from-stereo left.png right.png --calibration stereo.yml -o yard.toml",
+        "terrain from-stereo l.png r.png --calibration c.yml --height 0.5 --tilt 30 -o yard.toml",
+    ),
+)(stereo)
 
 fish_app = _App(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
 

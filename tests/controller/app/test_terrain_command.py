@@ -3,14 +3,17 @@
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter, map_coordinates
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.loader import load_world
 from snakewalk.controller.app.cli.command_line import app
+from snakewalk.controller.mapping.stereo_ground import CameraStand
 from snakewalk.controller.terrain.planner import TerrainPlanner
 
 
@@ -87,3 +90,46 @@ def test_what_is_wrong_is_said_and_nothing_is_written(tmp_path: Path) -> None:
     own = ("terrain", "from", tmp_path / "w-map.npz", "-o", world, "--cell", 0.1)
     assert "w-map.npz: exists" in refused(*own)
     assert "is read, and would be overwritten" in refused(*own, "--force")
+
+
+def test_a_stereo_pair_becomes_a_world_in_the_frame_of_its_camera(tmp_path: Path) -> None:
+    """Level ground with a grain, by its homography, from two ideal cameras 0.6 m above it."""
+    rng = np.random.default_rng(8)
+    texels = rng.normal(size=(900, 900))
+    grain = sum(gaussian_filter(texels, s) * s for s in (0.8, 2.0, 5.0))
+    grain = 120 + 45 * grain / grain.std()
+    f, tilt, height_m, baseline_m = 260.0, 0.6, 0.6, 0.1
+    turn = CameraStand(height_m, tilt, 0.0).world_from_camera()
+    v, u = np.mgrid[:240, :320] - np.array([119.5, 159.5])[:, None, None]
+    ray = np.stack([u / f, v / f, np.ones_like(u)], axis=-1) @ turn.T
+    for name, shift in (("l.png", 0.0), ("r.png", -baseline_m)):
+        place = ray[..., :2] * (-height_m / ray[..., 2:]) + [0.0, shift]
+        at = np.moveaxis(place / 0.004 + [0.0, 450.0], -1, 0)  # a texel is 4 mm
+        cv2.imwrite(str(tmp_path / name), np.clip(map_coordinates(grain, at, order=3), 0, 255))
+    k = [[f, 0.0, 159.5], [0.0, f, 119.5], [0.0, 0.0, 1.0]]
+    np.savez(tmp_path / "c.npz", K1=k, K2=k, R=np.eye(3), T=[-1000 * baseline_m, 0.0, 0.0])
+    pair = ("terrain", "from-stereo", tmp_path / "l.png", tmp_path / "r.png")
+    words = (*pair, "--calibration", tmp_path / "c.npz", "--unit", "mm", "-o", tmp_path / "y.toml")
+    made = call(*words, "--disparities", 64, "--far", 1.5, "--spacing", 0.04)
+    assert made["camera"] == "fitted to the points"
+    assert made["camera_height_m"] == pytest.approx(height_m, abs=0.005)
+    assert made["camera_tilt_deg"] == pytest.approx(np.degrees(tilt), abs=0.3)
+    assert made["camera_roll_deg"] == pytest.approx(0.0, abs=0.3)
+    ground = build_ground(load_world(str(tmp_path / "y.toml")))
+    assert 0.2 < ground.known.mean() < 0.95  # a fan in its box
+    assert np.ptp(ground.z_m[ground.known]) < 0.03
+    assert np.std(ground.z_m[ground.known]) < 0.005
+    assert ground.x0_m > 0.2  # the ground below the camera is not in the picture
+    text = (tmp_path / "y.toml").read_text()
+    assert "0.60" in text
+    assert "fitted to the points" in text
+    for more, expected in (
+        (("--height", 1), "--height and --tilt belong together"),
+        (("--roll", 3), "--roll belongs to --height and --tilt"),
+        (("--unit", "px"), "is none of m, cm, mm"),
+        (("--error", 0), "--error 0: must be above 0"),
+        (("--error", 1e-6), "nothing in the pictures is matched, or all is too far"),
+    ):
+        assert expected in refused(*words, "--force", *more)
+    (tmp_path / "l.png").write_bytes(b"no picture")
+    assert "l.png: cannot be read as a picture" in refused(*words, "--force")

@@ -1,0 +1,192 @@
+"""Disparity of a rectified pair: semi-global matching both ways, then planes fitted around pixels.
+
+The matching is OpenCV's (H. Hirschmueller, Stereo processing by semiglobal matching and mutual
+information, 2008), in eight directions, of images widened so that the strip on the left, which has
+its match outside OpenCV's range, is matched as well.
+"""
+
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.errors import InputError
+from snakewalk.drivers.compiling import compiled, readonly_array
+
+_BLOCK_PX: Final = 3
+_SMALL: Final = {1: (12, 48), 3: (24, 96)}
+"""By channels: penalties of a step of one pixel and of more, per pixel of a block (ours)."""
+_SPECKLE_PX: Final = 60
+"""Islands of fewer pixels are dropped (ours)."""
+_AGREE_PX: Final = 1.0
+"""Between the disparity of a pixel and that of its match (ours)."""
+_UNIQUE_PERCENT: Final = 15
+"""By how much the best match must be better than any other (ours): under the sky, where nothing is
+to be seen, the matches of a hill's edge go on."""
+_STEPS: Final = 2
+_WINDOW_PX: Final = 7
+_LEAST_STEEP: Final = 4.0
+"""Mean square of the grey levels' slope per pixel below which noise would shift a window (ours)."""
+_MOST_SHIFT_PX: Final = 0.5
+_RADIUS_PX: Final = 4
+_LEAST_SHARE: Final = 0.4
+"""Of a window's pixels that must lie on the plane of its middle (ours)."""
+_TOUCH_PX: Final = 1.0
+"""How far from the plane a pixel may be that belongs to it (ours)."""
+
+
+def match(left: Image, right: Image, count: int, least: int = 0) -> Floats:
+    """Disparities (H, W) of the left picture's pixels, NaN where they are not known.
+
+    Known is what matches both ways, lies with its neighbours on a plane, and is no speck.
+
+    Args:
+        left: (H, W) or (H, W, 3), rectified.
+        right: the same scene from farther right: a point lies further left in it.
+        count: how many disparities are tried, from ``least`` on; rounded up to 16.
+        least: least disparity.
+
+    Raises:
+        InputError: pictures of different sizes, or narrower than the range.
+
+    """
+    if left.shape != right.shape:
+        raise InputError(f"stereo: the pictures are {left.shape} and {right.shape}")
+    count = -(-count // 16) * 16
+    if not 0 <= least < left.shape[1] - 16 or count > left.shape[1]:
+        raise InputError(
+            f"stereo: {count} disparities from {least} on leave pictures {left.shape[1]} px wide"
+        )
+    there = _one_way(left, right, count, least)
+    back = _one_way(_mirrored(right), _mirrored(left), count, least)[:, ::-1]
+    column = np.arange(left.shape[1])[None]
+    at = np.rint(column - np.nan_to_num(there)).astype(np.intp)
+    other = np.take_along_axis(back, np.clip(at, 0, None), axis=1)
+    with np.errstate(invalid="ignore"):
+        agree = (np.abs(there - other) <= _AGREE_PX) & (at >= 0)
+    checked = np.where(agree, there, np.nan)
+    for _ in range(_STEPS):
+        checked = _aligned(left, right, checked)
+    smooth = np.empty_like(checked)
+    _on_planes(checked, smooth, _RADIUS_PX, _TOUCH_PX, _LEAST_SHARE)
+    return _without_specks(smooth, least)
+
+
+def _one_way(left: Image, right: Image, count: int, least: int) -> Floats:
+    channels = 1 if left.ndim == 2 else left.shape[2]
+    small, large = (value * _BLOCK_PX**2 for value in _SMALL[channels])
+    matcher = cv2.StereoSGBM.create(
+        minDisparity=least,
+        numDisparities=count,
+        blockSize=_BLOCK_PX,
+        P1=small,
+        P2=large,
+        disp12MaxDiff=-1,
+        preFilterCap=31,
+        uniquenessRatio=_UNIQUE_PERCENT,
+        mode=cv2.STEREO_SGBM_MODE_HH,
+    )
+    wide = [
+        cv2.copyMakeBorder(picture, 0, 0, count + least, 0, cv2.BORDER_REPLICATE)
+        for picture in (left, right)
+    ]
+    found = matcher.compute(*wide)[:, count + least :].astype(float) / 16.0
+    found[found < max(least, 0.5)] = np.nan
+    return np.asarray(found)
+
+
+def _aligned(left: Image, right: Image, disparity: Floats) -> Floats:
+    """Shift each pixel's window by what least squares of the grey levels ask for.
+
+    Semi-global matching tells fractions of a pixel by three costs, which draws them to whole
+    pixels; this is the step of B. D. Lucas and T. Kanade (1981) along the row, after which they are
+    not.
+    """
+    grey = [picture if picture.ndim == 2 else picture.mean(axis=2) for picture in (left, right)]
+    one, two = (np.asarray(picture, dtype=np.float32) for picture in grey)
+    rows, columns = disparity.shape
+    u, v = np.meshgrid(np.arange(columns, dtype=np.float32), np.arange(rows, dtype=np.float32))
+    at = u - np.nan_to_num(disparity).astype(np.float32)
+    slope = cv2.Sobel(two, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
+    seen, slope = (
+        np.asarray(cv2.remap(picture, at, v, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE))
+        for picture in (two, slope)
+    )
+    told = np.isfinite(disparity).astype(np.float32)
+    count = np.maximum(_box(told), 1e-6)
+    off = (one - seen) - _box(told * (one - seen)) / count  # one camera may be the brighter
+    steep = _box(told * slope * slope) / count
+    shift = -_box(told * slope * off) / count / np.maximum(steep, _LEAST_STEEP)
+    return np.asarray(disparity + np.clip(shift, -_MOST_SHIFT_PX, _MOST_SHIFT_PX), dtype=float)
+
+
+def _box(values: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Mean over a window around each pixel."""
+    return np.asarray(cv2.blur(values, (_WINDOW_PX, _WINDOW_PX)), dtype=np.float32)
+
+
+def _mirrored(picture: Image) -> Image:
+    return np.ascontiguousarray(picture[:, ::-1])
+
+
+def _without_specks(disparity: Floats, least: int) -> Floats:
+    steps = np.nan_to_num(disparity * 16.0, nan=16.0 * (least - 1)).astype(np.int16)
+    cv2.filterSpeckles(steps, 16 * (least - 1), _SPECKLE_PX, 16)
+    return np.where(steps == 16 * (least - 1), np.nan, disparity)
+
+
+@compiled(
+    f"void({readonly_array(dimensions=2, layout='C')}, float64[:, ::1], int64, float64, float64)"
+)
+def _on_planes(
+    disparity: Floats, smooth: Floats, radius: int, touch: float, least_share: float
+) -> None:
+    """Write the value of the plane fitted to the pixels around each that lie near its own.
+
+    A slanted ground is a plane in disparity, so that a fit does not flatten it as a mean does. Two
+    rounds: the pixels near the middle's value, then those near the first plane. NaN where fewer
+    than the share of the window lie on it.
+    """
+    rows, columns = disparity.shape
+    whole = (2 * radius + 1) ** 2
+    for i in range(rows):
+        for j in range(columns):
+            smooth[i, j] = np.nan
+            middle = disparity[i, j]
+            if np.isnan(middle):
+                continue
+            a, b, c = 0.0, 0.0, middle
+            count = 0.0
+            for turn in range(3):
+                reach = touch + 1.0 if turn == 0 else touch
+                n = sx = sy = sz = sxx = sxy = syy = sxz = syz = 0.0
+                for p in range(max(i - radius, 0), min(i + radius + 1, rows)):
+                    for q in range(max(j - radius, 0), min(j + radius + 1, columns)):
+                        z = disparity[p, q]
+                        y, x = float(p - i), float(q - j)
+                        if abs(z - (a * x + b * y + c)) <= reach:  # never of NaN
+                            n += 1.0
+                            sx += x
+                            sy += y
+                            sz += z
+                            sxx += x * x
+                            sxy += x * y
+                            syy += y * y
+                            sxz += x * z
+                            syz += y * z
+                count = n
+                if n < least_share * whole:
+                    break
+                mx, my, mz = sx / n, sy / n, sz / n
+                vxx, vxy, vyy = sxx / n - mx * mx, sxy / n - mx * my, syy / n - my * my
+                vxz, vyz = sxz / n - mx * mz, syz / n - my * mz
+                det = vxx * vyy - vxy * vxy
+                if det < 1e-6:
+                    break
+                a = (vxz * vyy - vyz * vxy) / det
+                b = (vyz * vxx - vxz * vxy) / det
+                c = mz - a * mx - b * my
+            if count >= least_share * whole and abs(c - middle) <= touch:
+                smooth[i, j] = c

@@ -1,0 +1,241 @@
+"""A calibrated pair of cameras: its file, its rectified pictures, and points from disparities.
+
+Coordinates of a camera: x to the right, y down, z forward. A point ``p`` of the left camera is
+``rotation @ p + translation`` in the right one, as OpenCV's ``stereoCalibrate`` has it.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+
+from snakewalk.config.archive import read_arrays
+from snakewalk.config.arrays import Bools, Floats, Image
+from snakewalk.config.errors import InputError
+
+_NAMES: Final = {
+    "k_left": ("K1", "M1", "cameraMatrix1", "camera_matrix_left", "K_left"),
+    "distortion_left": ("D1", "distCoeffs1", "dist_coeffs_left", "D_left"),
+    "k_right": ("K2", "M2", "cameraMatrix2", "camera_matrix_right", "K_right"),
+    "distortion_right": ("D2", "distCoeffs2", "dist_coeffs_right", "D_right"),
+    "rotation": ("R",),
+    "translation": ("T",),
+}
+"""What people call what ``stereoCalibrate`` returns."""
+_OPTIONAL: Final = ("distortion_left", "distortion_right")
+_MOST_BYTES: Final = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class StereoCalibration:
+    """What a calibration found."""
+
+    k_left: Floats
+    """(3, 3) camera matrix, pixels."""
+    distortion_left: Floats
+    """(4, 5, 8, 12 or 14) coefficients in OpenCV's order."""
+    k_right: Floats
+    distortion_right: Floats
+    rotation: Floats
+    """(3, 3) of the right camera."""
+    translation_m: Floats
+    """(3,) of the right camera; its x is below 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class RectifiedPair:
+    """Two pictures whose rows correspond, and the camera that takes both."""
+
+    left: Image
+    right: Image
+    seen: Bools
+    """(H, W) where the left picture shows something."""
+    focal_px: float
+    centre_px: tuple[float, float]
+    """Of the left picture."""
+    offset_px: float
+    """Column of the right picture's centre less that of the left's: a point at infinity has the
+    disparity ``-offset_px``."""
+    baseline_m: float
+    turned: Floats
+    """(3, 3) from the left camera's axes to the rectified ones."""
+
+    def points_m(self, disparity: Floats) -> Floats:
+        """(H, W, 3) points in the left camera's own axes; NaN where there is no disparity."""
+        rows, columns = disparity.shape
+        u, v = np.meshgrid(np.arange(columns, dtype=float), np.arange(rows, dtype=float))
+        beyond = disparity + self.offset_px
+        with np.errstate(invalid="ignore", divide="ignore"):
+            per_px = np.where(beyond > 0.0, self.baseline_m / beyond, np.nan)
+        x, y = (u - self.centre_px[0]) * per_px, (v - self.centre_px[1]) * per_px
+        return np.asarray(np.stack([x, y, self.focal_px * per_px], axis=-1) @ self.turned)
+
+
+def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
+    """Read a calibration.
+
+    Known are files of OpenCV (.yml, .yaml, .xml, .json), .npz with the same names, and calib.txt of
+    the Middlebury pairs, whose baseline is in millimetres by itself.
+
+    Args:
+        file: by its ending.
+        unit_m: metres per unit of the translation.
+
+    Raises:
+        InputError: it is none of these, lacks something, or describes no pair side by side.
+        OSError: it cannot be opened.
+
+    """
+    if file.stat().st_size > _MOST_BYTES:
+        raise InputError(f"{file}: is too large for a calibration")
+    ending = file.suffix.lower()
+    if ending == ".txt":
+        return _checked(file, _middlebury(file))
+    if ending in (".yml", ".yaml", ".xml", ".json"):
+        held = _storage(file)
+    elif ending == ".npz":
+        try:
+            held, _ = read_arrays(file)
+        except ValueError as error:
+            raise InputError(f"{file}: is no .npz of numbers: {error}") from None
+    else:
+        raise InputError(f"{file}: a calibration ends in .yml, .yaml, .xml, .json, .npz or .txt")
+    found: dict[str, Any] = {}
+    for key, names in _NAMES.items():
+        name = next((name for name in names if held.get(name) is not None), None)
+        if name is None and key not in _OPTIONAL:
+            raise InputError(f"{file}: holds no {' or '.join(names)}; it has {', '.join(held)}")
+        found[key] = np.zeros(5) if name is None else held[name]
+    found["translation"] = np.asarray(found["translation"], dtype=float) * unit_m
+    return _checked(file, found)
+
+
+def _storage(file: Path) -> dict[str, Any]:
+    """Matrices of a file of OpenCV by name."""
+    try:
+        store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
+        nodes = {name: store.getNode(name) for name in store.root().keys()}  # noqa: SIM118  no dict
+        held = {name: node.mat() for name, node in nodes.items() if node.isMap()}
+        store.release()
+    except (cv2.error, SystemError) as error:
+        raise InputError(f"{file}: is no file of OpenCV's FileStorage: {error}") from None
+    return held
+
+
+def _middlebury(file: Path) -> dict[str, Any]:
+    """``cam0=[f 0 cx; 0 f cy; 0 0 1]``, ``cam1``, ``baseline`` in mm, of rectified pictures."""
+    text = file.read_text(encoding="utf-8", errors="replace")
+    lines: Mapping[str, str] = dict(re.findall(r"^(\w+)\s*=\s*(.+)$", text, re.MULTILINE))
+    try:
+        k_left, k_right = (
+            np.array([float(n) for n in re.split(r"[\s;,]+", lines[key].strip(" []\r"))])
+            for key in ("cam0", "cam1")
+        )
+        baseline_m = 0.001 * float(lines["baseline"])
+        k_left, k_right = k_left.reshape(3, 3), k_right.reshape(3, 3)
+    except (KeyError, ValueError) as error:
+        raise InputError(f"{file}: is no calib.txt with cam0, cam1, baseline: {error}") from None
+    return {
+        "k_left": k_left,
+        "k_right": k_right,
+        "distortion_left": np.zeros(5),
+        "distortion_right": np.zeros(5),
+        "rotation": np.eye(3),
+        "translation": np.array([-baseline_m, 0.0, 0.0]),
+    }
+
+
+def _checked(file: Path, found: Mapping[str, Any]) -> StereoCalibration:
+    values: dict[str, Floats] = {}
+    for key, value in found.items():
+        try:
+            values[key] = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"{file}: {_NAMES[key][0]} holds no numbers") from None
+    for key, size in (("k_left", 9), ("k_right", 9), ("rotation", 9), ("translation", 3)):
+        if values[key].size != size:
+            raise InputError(f"{file}: {_NAMES[key][0]} has {values[key].size} numbers, not {size}")
+        values[key] = values[key].reshape((3, 3) if size == 9 else (3,))
+    for key in _OPTIONAL:
+        values[key] = values[key].ravel()
+        if values[key].size not in (4, 5, 8, 12, 14):
+            raise InputError(f"{file}: {_NAMES[key][0]} has {values[key].size} coefficients")
+    faults = [
+        f"{file}: {_NAMES[k][0]} is not finite"
+        for k, v in values.items()
+        if not np.isfinite(v).all()
+    ]
+    if faults:
+        raise InputError(faults)
+    rotation, translation = values["rotation"], values["translation"]
+    for key in ("k_left", "k_right"):
+        if min(values[key][0, 0], values[key][1, 1]) <= 0.0:
+            raise InputError(f"{file}: {_NAMES[key][0]} has no focal length above 0")
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3):
+        raise InputError(f"{file}: R is no rotation")
+    if -translation[0] < 2.0 * float(np.hypot(*translation[1:])) or translation[0] >= 0.0:
+        shown = ", ".join(f"{value:.3g}" for value in translation)
+        raise InputError(
+            f"{file}: T is ({shown}): the second camera must stand to the right of the first "
+            "(x below 0, in OpenCV's order); if it stands to the left, exchange the cameras"
+        )
+    return StereoCalibration(
+        values["k_left"], values["distortion_left"], values["k_right"],
+        values["distortion_right"], rotation, translation,
+    )  # fmt: skip
+
+
+def rectify(calibration: StereoCalibration, left: Image, right: Image) -> RectifiedPair:
+    """Warp two pictures so that a point has the same row in both; ideal pairs stay as they are.
+
+    Raises:
+        InputError: pictures of different sizes, or whose size does not fit the calibration.
+
+    """
+    c, (rows, columns) = calibration, left.shape[:2]
+    if left.shape != right.shape:
+        raise InputError(f"stereo: the pictures are {left.shape} and {right.shape}")
+    for k in (c.k_left, c.k_right):
+        if not (0.0 < k[0, 2] < columns and 0.0 < k[1, 2] < rows):
+            raise InputError(
+                f"stereo: pictures of {columns} by {rows} px do not fit the calibration, whose "
+                f"centre is ({k[0, 2]:.0f}, {k[1, 2]:.0f}): it is of pictures of another size"
+            )
+    ideal = not (c.distortion_left.any() or c.distortion_right.any() or c.translation_m[1:].any())
+    same = np.allclose(np.delete(c.k_left, 2), np.delete(c.k_right, 2)) and np.isclose(
+        c.k_left[0, 0], c.k_left[1, 1]
+    )
+    if ideal and same and np.allclose(c.rotation, np.eye(3)):
+        offset_px = float(c.k_right[0, 2] - c.k_left[0, 2])
+        centre = float(c.k_left[0, 2]), float(c.k_left[1, 2])
+        seen = np.ones((rows, columns), bool)
+        baseline_m = -float(c.translation_m[0])
+        focal_px = float(c.k_left[0, 0])
+        return RectifiedPair(left, right, seen, focal_px, centre, offset_px, baseline_m, np.eye(3))
+    size = (columns, rows)
+    turn_left, turn_right, p_left, p_right, *_ = cv2.stereoRectify(
+        c.k_left, c.distortion_left, c.k_right, c.distortion_right, size,
+        c.rotation, c.translation_m[:, None], flags=cv2.CALIB_ZERO_DISPARITY, alpha=0,
+    )  # fmt: skip
+    warped = []
+    for picture, k, distortion, turn, p in (
+        (left, c.k_left, c.distortion_left, turn_left, p_left),
+        (right, c.k_right, c.distortion_right, turn_right, p_right),
+        (np.full((rows, columns), 255, np.uint8), c.k_left, c.distortion_left, turn_left, p_left),
+    ):
+        maps = cv2.initUndistortRectifyMap(k, distortion, turn, p, size, cv2.CV_32FC1)
+        warped.append(np.asarray(cv2.remap(picture, *maps, cv2.INTER_LINEAR), dtype=np.uint8))
+    return RectifiedPair(
+        warped[0],
+        warped[1],
+        warped[2] == 255,
+        float(p_left[0, 0]),
+        (float(p_left[0, 2]), float(p_left[1, 2])),
+        float(p_right[0, 2] - p_left[0, 2]),
+        -float(p_right[0, 3] / p_right[0, 0]),
+        np.asarray(turn_left, dtype=float),
+    )
