@@ -1,6 +1,6 @@
 """Progress for a person: one bar on standard error, and events in lines above it."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Self, TypeVar
 
@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from snakewalk.controller.runtime.drive import Progress as RunProgress
+from snakewalk.drivers.clock import WallClock
 
 T = TypeVar("T")
 EVERY = 10
@@ -126,6 +127,21 @@ class TimeBar(RunBar):
         if self._is_due(progress):
             gone_s = progress.time_s - self._start_s
             self.update(gone_s, note=f"{gone_s:5.1f} s")
+
+
+def in_real_time(on_progress: Callable[[RunProgress], None]) -> Callable[[RunProgress], None]:
+    """Hold a simulated run to the pace of a person's clock."""
+    clock = WallClock()
+    ahead_s: float | None = None
+
+    def wait(progress: RunProgress) -> None:
+        nonlocal ahead_s
+        on_progress(progress)
+        if ahead_s is None:
+            ahead_s = clock.now_s() - progress.time_s
+        clock.sleep_until_s(progress.time_s + ahead_s)
+
+    return wait
 
 
 def show_progress(

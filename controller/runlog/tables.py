@@ -27,15 +27,18 @@ from snakewalk.controller.runlog.record import (
 Row = Mapping[str, Any]
 
 
-def record_of(rows: Mapping[str, Sequence[Row]], *, complete: bool, note: str) -> RunRecord:
-    """Build the record from rows by topic; the first ``/config`` counts.
+def record_of(
+    rows: Mapping[str, Sequence[Row]], *, complete: bool, note: str, header: Header | None = None
+) -> RunRecord:
+    """Build the record from rows by topic; the first ``/config`` counts, unless there is a header.
 
     Raises:
         KeyError: a row lacks a field.
         pydantic.ValidationError: the configuration is not of this version.
 
     """
-    header = _header(rows["/config"][0])
+    if header is None:
+        header = _header(rows["/config"][0])
     joints = header.robot.joint_count
     replanned = tuple(
         (float(r["time_s"]), _floats([r], "points_m")[0]) for r in rows.get("/path", ())

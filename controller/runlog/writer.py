@@ -1,6 +1,6 @@
 """Writes the log row by row: a kill costs half a second at most, a disk fault stops the run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -49,10 +49,12 @@ class RunLog:
     """One run's log; a context manager. Writes ``<path>.part``, renamed to ``path`` on leaving.
 
     Times must not be negative. Any method raises OSError when the disk does not take the bytes.
+    ``on_row`` gets the topic and the JSON of every row as well.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, on_row: Callable[[str, bytes], None] | None = None) -> None:
         self.path = path
+        self._on_row = on_row
         path.parent.mkdir(parents=True, exist_ok=True)
         self._part = part_path(path)
         self._file = self._part.open("wb")
@@ -252,10 +254,10 @@ class RunLog:
         self._add_text(topic, time_s, encode(row))
 
     def _add_text(self, topic: str, time_s: float, row: str) -> None:
-        stamp_ns = round(time_s * 1e9)
-        self._writer.add_message(
-            self._channels[topic], stamp_ns, row.encode(), publish_time=stamp_ns
-        )
+        stamp_ns, data = round(time_s * 1e9), row.encode()
+        self._writer.add_message(self._channels[topic], stamp_ns, data, publish_time=stamp_ns)
+        if self._on_row is not None:
+            self._on_row(topic, data)
         if time_s - self._flushed_s >= _FLUSH_S:
             self._flushed_s = time_s
             self._writer.flush()

@@ -37,6 +37,7 @@ from snakewalk.controller.app.cli.commands.logs.compare import compare
 from snakewalk.controller.app.cli.commands.logs.export import export
 from snakewalk.controller.app.cli.commands.logs.replay import replay
 from snakewalk.controller.app.cli.commands.logs.report import report
+from snakewalk.controller.app.cli.commands.logs.view import view
 from snakewalk.controller.app.cli.commands.plan import plan
 from snakewalk.controller.app.cli.commands.play import play
 from snakewalk.controller.app.cli.commands.repertoire import record, run_plan, show_file
@@ -142,6 +143,11 @@ app.command(
     epilog=_examples("stop", "stop --port /dev/ttyUSB0 --json", "stop runs/flat-square-walk-seed0"),
     rich_help_panel=_JOB,
 )(stop)
+
+app.command(
+    epilog=_examples("view runs/flat-square-walk-seed0/log.mcap", "gait run sidewinding --view"),
+    rich_help_panel=_JOB,
+)(view)
 
 app.command(epilog=_examples("report runs/flat-square-walk-seed0/log.mcap"), rich_help_panel=_JOB)(
     report

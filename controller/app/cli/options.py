@@ -49,6 +49,14 @@ Compliant = Annotated[
         show_default=False,
     ),
 ]
+View = Annotated[bool, typer.Option("--view", help="show the run in a browser while it lasts")]
+ViewAt = Annotated[
+    str,
+    typer.Option(
+        "--view-at", metavar="HOST:PORT", help="of the page; beyond this machine it needs a token"
+    ),
+]
+VIEW_AT = "127.0.0.1:8080"
 Force = Annotated[bool, typer.Option("--force", help="overwrite files")]
 Robot = Annotated[str | None, typer.Option(help="shipped robot, or a TOML file")]
 World = Annotated[str | None, typer.Option(help="shipped world, or a TOML file")]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
@@ -24,6 +25,9 @@ from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
+
+if TYPE_CHECKING:
+    from snakewalk.controller.app.view.live_view import LiveView
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +52,7 @@ def execute(
     *,
     force: bool = False,
     stoppable: bool = True,
+    view: "LiveView | None" = None,
     confirm: Callable[[str], bool] | None = None,
     on_progress: OnProgress = lambda progress: None,
     on_event: OnEvent = lambda kind, text: None,
@@ -56,9 +61,10 @@ def execute(
 
     The folder is made; one that holds a run's files is refused without ``force``, which deletes
     them when the new log begins. A ``stoppable`` run has a button that ``snakewalk stop`` presses;
-    the simulated runs of a study have none. ``confirm`` asks an operator whether an interrupted
-    chain may go on (``safety.recovery``); ``on_progress`` is called after each cycle, ``on_event``
-    with what the motion decides by itself: a slower rate, an operator's change.
+    the simulated runs of a study have none. ``view`` is a page that shows the run. ``confirm`` asks
+    an operator whether an interrupted chain may go on (``safety.recovery``); ``on_progress`` is
+    called after each cycle, ``on_event`` with what the motion decides by itself: a slower rate, an
+    operator's change.
 
     Raises:
         InputError: the plan breaks a limit, the port is not there, the servos are not the robot's,
@@ -81,7 +87,9 @@ def execute(
     clear_run(folder)
     torque_constant_n_m_a, winding = _motor(prepared.robot)
     made = StopButton(prepared.run.name, port, folder) if stoppable else nullcontext()
-    with made as button, RunLog(log_path) as log:
+    with made as button, RunLog(log_path, None if view is None else view.on_row) as log:
+        if view is not None and button is not None:
+            view.on_button(button.path)
         log.config(
             prepared.run,
             prepared.robot,

@@ -1,7 +1,6 @@
 """``snakewalk gait run``: a gait on servos or in the simulator."""
 
 import math
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.commands.gait import Name, Param, parameters
 from snakewalk.controller.app.cli.options import (
+    VIEW_AT,
     Compliant,
     Film,
     Force,
@@ -20,6 +20,8 @@ from snakewalk.controller.app.cli.options import (
     RunFolder,
     RunPort,
     Set,
+    View,
+    ViewAt,
     World,
     key_values,
     show,
@@ -29,7 +31,6 @@ from snakewalk.controller.app.result_files import run_folder
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.runs.gait_run import MakeOperator
-    from snakewalk.controller.runtime.drive import Progress
 
 
 def run_gait(
@@ -56,6 +57,8 @@ def run_gait(
     ] = None,
     port: RunPort = None,
     compliance: Compliant = None,
+    view: View = False,
+    view_at: ViewAt = VIEW_AT,
     film: Film = True,
     out: RunFolder = None,
     force: Force = False,
@@ -63,14 +66,16 @@ def run_gait(
     as_json: Json = False,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.app.progress import TimeBar  # noqa: PLC0415
+    from snakewalk.controller.app.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_gait, with_compliance  # noqa: PLC0415
+    from snakewalk.controller.app.view.live_view import open_view  # noqa: PLC0415
     from snakewalk.controller.metrics.displacement import gait_displacement  # noqa: PLC0415
 
     if by not in {"blend", "cpg"}:
         raise InputError(f"--by {by}: expected blend or cpg")
     with ExitStack() as stack:
+        page = stack.enter_context(open_view(view, view_at))
         prepared = prepare_gait(
             name,
             robot=robot,
@@ -89,13 +94,14 @@ def run_gait(
         run = prepared.run
         folder = stack.enter_context(run_folder(f"gait-{run.name}-{prepared.robot.name}", out))
         bar = stack.enter_context(TimeBar(run.name, seconds))
-        paced = prepared.make_operator is not None and port is None
-        on_progress = _in_real_time(bar.on_progress) if paced else bar.on_progress
+        paced = (view or prepared.make_operator is not None) and port is None
+        on_progress = in_real_time(bar.on_progress) if paced else bar.on_progress
         finished = execute(
             prepared,
             folder,
             port,
             force=force,
+            view=page,
             on_progress=on_progress,
             on_event=bar.on_event,
         )
@@ -134,23 +140,6 @@ def run_gait(
     show(result, as_json)
     if finished.outcome.tripped is not None:
         raise SystemExit(1)
-
-
-def _in_real_time(on_progress: "Callable[[Progress], None]") -> "Callable[[Progress], None]":
-    """Hold a simulated run to the pace of an operator's clock."""
-    from snakewalk.drivers.clock import WallClock  # noqa: PLC0415
-
-    clock = WallClock()
-    ahead_s: float | None = None
-
-    def wait(progress: "Progress") -> None:
-        nonlocal ahead_s
-        on_progress(progress)
-        if ahead_s is None:
-            ahead_s = clock.now_s() - progress.time_s
-        clock.sleep_until_s(progress.time_s + ahead_s)
-
-    return wait
 
 
 def _operator(stack: ExitStack, live: bool, gamepad: Path | None) -> "MakeOperator | None":

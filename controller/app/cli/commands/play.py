@@ -6,6 +6,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.options import (
+    VIEW_AT,
     Film,
     Force,
     Json,
@@ -13,6 +14,8 @@ from snakewalk.controller.app.cli.options import (
     RunFolder,
     RunPort,
     Set,
+    View,
+    ViewAt,
     World,
     key_values,
     show,
@@ -36,15 +39,18 @@ def play(
     ] = False,
     set_: Set = None,
     port: RunPort = None,
+    view: View = False,
+    view_at: ViewAt = VIEW_AT,
     film: Film = True,
     out: RunFolder = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.app.progress import TimeBar  # noqa: PLC0415
+    from snakewalk.controller.app.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_playback  # noqa: PLC0415
+    from snakewalk.controller.app.view.live_view import open_view  # noqa: PLC0415
 
     prepared = prepare_playback(
         track,
@@ -57,6 +63,7 @@ def play(
     )
     with (
         run_folder(f"play-{prepared.run.name}", out) as folder,
+        open_view(view, view_at) as page,
         TimeBar(prepared.run.name, prepared.duration_s) as bar,
     ):
         finished = execute(
@@ -64,7 +71,8 @@ def play(
             folder,
             port,
             force=force,
-            on_progress=bar.on_progress,
+            view=page,
+            on_progress=in_real_time(bar.on_progress) if view and not port else bar.on_progress,
             on_event=bar.on_event,
         )
     artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)

@@ -9,6 +9,7 @@ import typer
 
 from snakewalk.controller.app.cli.options import (
     DEFAULT_RUN,
+    VIEW_AT,
     Compliant,
     Film,
     Force,
@@ -22,6 +23,8 @@ from snakewalk.controller.app.cli.options import (
     Seed,
     Set,
     TrackFile,
+    View,
+    ViewAt,
     World,
     key_values,
     show,
@@ -44,16 +47,19 @@ def run(
     set_: Set = None,
     out: RunFolder = None,
     compliance: Compliant = None,
+    view: View = False,
+    view_at: ViewAt = VIEW_AT,
     film: Film = True,
     look: Look = "servos",
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.app.progress import PathBar  # noqa: PLC0415
+    from snakewalk.controller.app.progress import PathBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.recordings.body_look import check_look  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_walk, with_compliance  # noqa: PLC0415
+    from snakewalk.controller.app.view.live_view import open_view  # noqa: PLC0415
 
     check_look(look)
     prepared = prepare_walk(
@@ -68,6 +74,7 @@ def run(
     name = "-".join(parts)
     with (
         run_folder(name, out) as folder,
+        open_view(view, view_at) as page,
         PathBar(prepared.path.length_m, len(prepared.run.waypoints_m)) as bar,
     ):
         finished = execute(
@@ -75,8 +82,9 @@ def run(
             folder,
             port,
             force=force,
+            view=page,
             confirm=_confirm if sys.stdin.isatty() else None,
-            on_progress=bar.on_progress,
+            on_progress=in_real_time(bar.on_progress) if view and not port else bar.on_progress,
             on_event=bar.on_event,
         )
     outcome = finished.outcome

@@ -1,0 +1,202 @@
+"""The panels beside the scene: state, a row of bars for each servo, curves over time, events."""
+
+from html import escape
+from typing import Final
+
+import numpy as np
+import viser
+from viser import uplot
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.runlog.record import Event, Header, RunRecord
+
+SPAN_S: Final = 30.0
+"""How much of the past the curves show (ours)."""
+_POINTS: Final = 150
+"""Points of a curve: more would only be sent."""
+_EVENTS: Final = 7
+_AMBIENT_C: Final = 20.0
+_LATE_CYCLES: Final = 3.0
+"""Readings that are so many cycles old are told in another colour (ours)."""
+_GOOD, _WARN, _BAD, _INK = "#3a7dbd", "#e39a1b", "#d62026", "#666"
+_LEVELS: Final = {"info": _INK, "warning": _WARN, "error": _BAD}
+_COLORS: Final = (
+    *("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#7f7f7f"),
+    *("#bcbd22", "#17becf", "#3949ab", "#00897b", "#6d4c41", "#c0ca33", "#5e35b1", "#f4511e"),
+)
+
+
+class Dashboard:
+    """Panels of one run."""
+
+    def __init__(self, server: viser.ViserServer, header: Header) -> None:
+        self._robot, self._run = header.robot, header.run
+        safety = header.run.safety
+        self._limit_a = safety.current_limit_of_a(header.robot)
+        self._limit_c = safety.temperature_limit_c
+        self._volts = safety.voltage_limits_v(header.robot.servo)
+        self._stale_s = safety.stale_limit_s
+        self._names = [header.robot.joint_name(k) for k in range(header.robot.joint_count)]
+        gui = server.gui
+        self._state = gui.add_html("")
+        self.follow = gui.add_checkbox("follow the body", not header.run.waypoints_m)
+        self.goals = gui.add_checkbox("show goals", True, hint="yellow, where joints should be")
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("servos"):
+            self._bars = gui.add_html("")
+        with tabs.add_tab("curves"):
+            self.joint = gui.add_dropdown("joint", tuple(self._names))
+            self._angle = _plot(gui, "angle, rad", ("goal", "measured"))
+            self._current = _plot(gui, "current of all joints, A", tuple(self._names), legend=False)
+            self._speed = _plot(gui, "speed, m/s", ("measured", "predicted"))
+            self._supply = _plot(gui, "lowest supply, V", ("V",))
+            self._heat = _plot(gui, "hottest servo, °C", ("°C",))
+            self._late = _plot(gui, "cycle began late by, ms", ("ms",))
+        with tabs.add_tab("events"):
+            self._events = gui.add_html("")
+
+    def show_state(self, record: RunRecord, cycle: int, pose: int, text: str) -> None:
+        """Show how the run is doing, in words."""
+        waypoints, where = len(self._run.waypoints_m), record.pose
+        facts = [f"{record.cycle.time_s[cycle]:.1f} s"]
+        if waypoints:
+            facts.append(f"waypoint {min(int(where.target[pose]) + 1, waypoints)} of {waypoints}")
+        if np.isfinite(where.speed_m_s[pose]):
+            facts.append(f"{where.speed_m_s[pose]:.2f} m/s")
+        self._state.content = (
+            f"<div style='padding:0 .8em .4em'><b>{escape(self._run.name)}</b> on "
+            f"{escape(self._robot.name)}<br>{', '.join(facts)}<br>{escape(text)}</div>"
+        )
+
+    def show_servos(self, record: RunRecord, cycle: int, slow: int | None) -> None:
+        """Show a row of bars for each servo."""
+        rows, period_s = record.cycle, 1.0 / self._run.cycle_hz
+        heat, volts = np.full((2, self._robot.joint_count), np.nan)
+        if slow is not None:
+            heat, volts = record.slow.temperature_c[slow], record.slow.voltage_v[slow]
+        lines = []
+        for joint, name in enumerate(self._names):
+            age_s = rows.age_s[cycle, joint]
+            stale = age_s > self._stale_s
+            old = _BAD if stale else _WARN if age_s > _LATE_CYCLES * period_s else _INK
+            low, high = self._volts
+            bad_v = not low <= volts[joint] <= high and np.isfinite(volts[joint])
+            current_a = abs(rows.current_a[cycle, joint])
+            cells = (
+                escape(name),
+                _angle_bar(
+                    rows.measured_rad[cycle, joint],
+                    rows.sent_rad[cycle, joint],
+                    self._robot.limit_rad[joint],
+                ),
+                _bar(current_a / self._limit_a, f"{current_a:.2f}"),
+                _bar(
+                    (heat[joint] - _AMBIENT_C) / (self._limit_c - _AMBIENT_C), f"{heat[joint]:.0f}"
+                ),
+                f"<span style='color:{_BAD if bad_v else _INK}'>{_number(volts[joint], 1)}</span>",
+                f"<span style='color:{old}'>{_number(age_s * 1e3, 0)}</span>",
+            )
+            lines.append("<tr><td>" + "</td><td>".join(cells) + "</td></tr>")
+        heads = ("joint", "angle, rad", "A", "°C", "V", "age, ms")
+        head = "<tr><th>" + "</th><th>".join(heads) + "</th></tr>"
+        self._bars.content = (
+            "<table style='width:100%;font-size:11px;line-height:1.25;border-spacing:4px 1px;"
+            f"text-align:right'>{head}{''.join(lines)}</table>"
+        )
+
+    def show_curves(self, record: RunRecord, cycle: int, pose: int) -> None:
+        """Show the last seconds up to a row."""
+        rows, where = record.cycle, record.pose
+        first = int(np.searchsorted(rows.time_s, rows.time_s[cycle] - SPAN_S))
+        pick = _spread(first, cycle)
+        time_s = rows.time_s[pick]
+        joint = self._names.index(self.joint.value)
+        self._angle.data = (time_s, rows.sent_rad[pick, joint], rows.measured_rad[pick, joint])
+        self._current.data = (time_s, *rows.current_a[pick].T)
+        self._late.data = (time_s, rows.lateness_s[pick] * 1e3)
+        begin = int(np.searchsorted(where.time_s, time_s[0]))
+        at = _spread(begin, pose)
+        self._speed.data = (where.time_s[at], where.speed_m_s[at], where.predicted_speed_m_s[at])
+        if len(record.slow.time_s):
+            slow = np.maximum(np.searchsorted(record.slow.time_s, time_s, side="right") - 1, 0)
+            self._supply.data = (time_s, _known(record.slow.voltage_v[slow], np.min))
+            self._heat.data = (time_s, _known(record.slow.temperature_c[slow], np.max))
+
+    def show_events(self, events: tuple[Event, ...]) -> None:
+        """Show the newest events, the newest first."""
+        self._events.content = "".join(
+            f"<div style='padding:.15em .8em;font-size:12px;color:{_LEVELS.get(each.level, _INK)}'>"
+            f"{each.time_s:.1f} s &nbsp;{escape(each.kind)}: {escape(each.text)}</div>"
+            for each in reversed(events[-_EVENTS:])
+        )
+
+
+def _plot(
+    gui: viser.GuiApi, title: str, names: tuple[str, ...], *, legend: bool = True
+) -> viser.GuiUplotHandle:
+    series = [
+        uplot.Series(label=name, stroke=_COLORS[k % len(_COLORS)], width=1.5)
+        for k, name in enumerate(names)
+    ]
+    return gui.add_uplot(
+        tuple(np.zeros(2) for _ in range(len(names) + 1)),
+        (uplot.Series(label="s"), *series),
+        title=title,
+        scales={"x": uplot.Scale(time=False, auto=True)},
+        legend=uplot.Legend(show=legend and len(names) > 1),
+        axes=(uplot.Axis(), uplot.Axis(space=18)),
+        aspect=2.2,
+    )
+
+
+def _spread(first: int, last: int) -> np.ndarray:
+    """Rows from first to last, not too many, the last among them."""
+    count = min(last - first + 1, _POINTS)
+    return np.unique(np.linspace(first, last, max(count, 2)).astype(int))
+
+
+def _known(values: Floats, of: object) -> Floats:
+    """Least or greatest of each row's known values; NaN where none is known."""
+    fill = np.inf if of is np.min else -np.inf
+    found = np.where(np.isfinite(values), values, fill)
+    ends = found.min(axis=1) if of is np.min else found.max(axis=1)
+    return np.where(np.isfinite(ends), ends, np.nan)
+
+
+def _bar(share: float, text: str) -> str:
+    """A bar from the left; red where it nears its limit."""
+    known = np.isfinite(share)
+    width = 100.0 * min(max(share, 0.0), 1.0) if known else 0.0
+    color = _BAD if width > 85.0 else _WARN if width > 60.0 else _GOOD
+    return _box(
+        f"<div style='width:{width:.0f}%;height:100%;background:{color};opacity:.55'></div>",
+        text if known else "",
+    )
+
+
+def _angle_bar(measured_rad: float, goal_rad: float, limit_rad: float) -> str:
+    """A bar from the middle to where the joint is, and a stroke where it should be."""
+    here, goal = (
+        50.0 + 50.0 * min(max(value / limit_rad, -1.0), 1.0) if np.isfinite(value) else 50.0
+        for value in (measured_rad, goal_rad)
+    )
+    left, width = min(here, 50.0), abs(here - 50.0)
+    return _box(
+        f"<div style='position:absolute;left:{left:.1f}%;width:{width:.1f}%;height:100%;"
+        f"background:{_GOOD};opacity:.55'></div><div style='position:absolute;left:{goal:.1f}%;"
+        f"width:2px;height:100%;background:{_WARN}'></div>",
+        _number(measured_rad, 2),
+        wide=True,
+    )
+
+
+def _box(inside: str, text: str, *, wide: bool = False) -> str:
+    return (
+        f"<div style='position:relative;min-width:{8 if wide else 4}em;height:1.25em;"
+        "background:rgba(128,128,128,.15);border-radius:2px;overflow:hidden'>"
+        f"{inside}<span style='position:absolute;right:3px;top:0'>{text}</span></div>"
+    )
+
+
+def _number(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if np.isfinite(value) else "-"

@@ -1,0 +1,233 @@
+"""The body on its ground in 3-D: links and their goals, path, waypoints, and where the body was."""
+
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+import trimesh
+import viser
+from scipy.spatial.transform import Rotation
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.world import PoleObstacle
+from snakewalk.controller.kinematics.links import BodyView, body_in_world
+from snakewalk.controller.runlog.record import Header, RunRecord
+from snakewalk.drivers.types import BodyPose
+
+_HEAD: Final = (205, 72, 12)
+_LINKS: Final = ((26, 70, 128), (60, 118, 180))
+_HOT: Final = (214, 32, 38)
+_GOAL: Final = (250, 190, 40)
+_PATH: Final = (240, 170, 20)
+_OLD_PATH: Final = (165, 160, 150)
+_TRAIL: Final = (120, 120, 132)
+_WAYPOINT: Final = (40, 160, 80)
+_REACHED: Final = (150, 150, 150)
+_GROUND: Final = np.array([(96, 104, 84), (214, 208, 182)])
+"""Colours (ours); a link's hot at full current, the ground's from lowest to highest."""
+_ABOVE_M: Final = 0.006
+"""How far lines lie above the ground, so that they are seen (ours)."""
+_GOAL_ABOVE, _GOAL_WIDTH = 1.4, 0.14
+"""The goals' line: how far above the body's axis, and how thick, in radii of the body (ours)."""
+_LINE: Final = 3.0
+_TRAIL_POINTS: Final = 400
+
+
+class BodyScene:
+    """What is drawn of one run; everything moves below one frame, which can follow the body."""
+
+    def __init__(self, server: viser.ViserServer, header: Header) -> None:
+        self._scene, self._header = server.scene, header
+        self._robot, self._ground = header.robot, header.ground
+        self._limit_a = header.run.safety.current_limit_of_a(header.robot)
+        self._frame = self._scene.add_frame("/world", show_axes=False)
+        self._paths = 0
+        self._reached = -1
+        self._scene.set_up_direction("+z")
+        self._draw_ground()
+        self._draw_obstacle()
+        self._waypoints = self._draw_waypoints()
+        links = self._robot.link_count
+        colors = [_LINKS[k % 2] for k in range(links)]
+        self._colors = np.array([_HEAD, *colors[1:]], dtype=float)
+        radii_m = np.array(self._robot.radii_m(links))
+        self._goal_above_m = float(radii_m.max()) * _GOAL_ABOVE
+        self._body = self._links("/world/body", self._colors.astype(np.uint8), radii_m, 0.94)
+        line_m = np.full(links, _GOAL_WIDTH * float(radii_m.max()))
+        self._goals = self._links("/world/goals", np.array(_GOAL, dtype=np.uint8), line_m, 1.0)
+        self._joint_of = np.minimum(np.arange(links), links - 2)
+
+    def show(self, record: RunRecord, cycle: int, pose: int, *, follow: bool, goals: bool) -> None:
+        """Draw the body at a row of the cycles and of the poses."""
+        where, rows = record.pose, record.cycle
+        spine = self._robot.link_count - 1
+        head = BodyPose(0.0, where.head_m[pose], where.rotation[pose])
+        if not np.isfinite(head.head_in_world_m).all():
+            return
+        measured = body_in_world(self._robot, head, np.nan_to_num(rows.measured_rad[cycle, :spine]))
+        _place(self._body, measured)
+        load = np.nan_to_num(np.abs(rows.current_a[cycle, :spine])) / self._limit_a
+        share = np.clip(load, 0.0, 1.0)[self._joint_of, None]
+        shown = self._colors + share * (np.array(_HOT) - self._colors)
+        self._body.batched_colors = shown.astype(np.uint8)
+        self._goals.visible = goals
+        if goals:
+            sent = np.nan_to_num(rows.sent_rad[cycle, :spine])
+            _place(self._goals, body_in_world(self._robot, head, sent), self._goal_above_m)
+        if follow:
+            self._frame.position = (*(-measured.centre_m[:2]), 0.0)
+        reached = int(where.target[pose])
+        if reached != self._reached:
+            self._reached = reached
+            for number, sphere in enumerate(self._waypoints):
+                sphere.color = _REACHED if number < reached else _WAYPOINT
+
+    def show_paths(self, paths: tuple[tuple[float, Floats], ...], time_s: float) -> None:
+        """Draw the path in force at a time, and those that were laid before it in grey."""
+        laid = sum(since_s <= time_s for since_s, _ in paths)
+        if laid == self._paths:
+            return
+        self._paths = laid
+        for number, (_, points_m) in enumerate(paths):
+            name = f"/world/paths/{number}"
+            if number < laid and len(points_m) > 1:
+                new = number == laid - 1
+                self._line(name, points_m, _PATH if new else _OLD_PATH, _LINE if new else 1.5)
+            else:
+                self._scene.remove_by_name(name)
+
+    def show_trail(self, centre_m: Floats) -> None:
+        """Draw where the centre of the body, (n, 3), has been."""
+        known = centre_m[np.isfinite(centre_m).all(axis=1)]
+        step = max(1, len(known) // _TRAIL_POINTS)
+        if len(known) > step:
+            self._line("/world/trail", known[::step, :2], _TRAIL, 2.0)
+
+    def release(self) -> None:
+        """Put the ground back where it is: the camera no longer follows."""
+        self._frame.position = (0.0, 0.0, 0.0)
+
+    def first_camera(self, server: viser.ViserServer) -> None:
+        """Look from behind and above at the start, far enough to see body and path."""
+        plan, run, camera = self._header.plan, self._header.run, server.initial_camera
+        at = np.array([*run.start_m, 0.0])
+        length_m = self._robot.length_m
+        if len(plan.path_m) > 1:
+            at[:2] = 0.5 * (at[:2] + plan.path_m[:, :2].mean(axis=0))
+            length_m = max(length_m, float(np.ptp(plan.path_m[:, :2], axis=0).max()))
+        at[2] = self._height_m(at[None, :2])[0]
+        camera.look_at = tuple(at)
+        camera.position = tuple(at + length_m * np.array([-0.35, -0.75, 0.55]))
+
+    def _links(
+        self, name: str, colors: np.ndarray, radii_m: Floats, share: float
+    ) -> viser.BatchedMeshHandle:
+        """One mesh for all links: a cylinder along x, widened to their radii."""
+        length_m = self._robot.link_length_m * share
+        mesh = trimesh.creation.cylinder(1.0, length_m, sections=20)
+        links = self._robot.link_count
+        return self._scene.add_batched_meshes_simple(
+            name,
+            np.asarray(mesh.vertices)[:, [2, 0, 1]],  # the cylinder stands along z
+            np.asarray(mesh.faces),
+            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (links, 1)),
+            batched_positions=np.zeros((links, 3)),
+            batched_scales=np.column_stack([np.ones(links), radii_m, radii_m]),
+            batched_colors=colors,
+            flat_shading=False,
+            lod="off",
+            cast_shadow=False,
+        )
+
+    def _draw_ground(self) -> None:
+        if self._ground is None:
+            size_m = 12.0
+            self._scene.add_grid(
+                "/world/ground",
+                size_m,
+                size_m,
+                cell_size=0.25,
+                section_size=1.0,
+                cell_color=(214, 211, 202),
+                section_color=(186, 182, 172),
+                plane_color=(232, 230, 222),
+                plane_opacity=1.0,
+                position=(0.0, 0.0, -0.001),
+            )
+            return
+        self._scene.add_mesh_trimesh("/world/ground", _ground_mesh(self._ground))
+
+    def _draw_obstacle(self) -> None:
+        obstacle = self._header.world.obstacle
+        if not isinstance(obstacle, PoleObstacle):
+            return
+        length_m = obstacle.length_m
+        pole = trimesh.creation.cylinder(obstacle.radius_m, length_m, sections=32)
+        turn = (1.0, 0.0, 0.0, 0.0) if obstacle.upright else (0.5**0.5, 0.0, 0.5**0.5, 0.0)
+        height_m = 0.5 * length_m if obstacle.upright else obstacle.radius_m
+        self._scene.add_mesh_simple(
+            "/world/pole",
+            np.asarray(pole.vertices),
+            np.asarray(pole.faces),
+            color=(150, 120, 90),
+            wxyz=turn,
+            position=(*obstacle.at_m, height_m),
+        )
+
+    def _draw_waypoints(self) -> list[viser.IcosphereHandle]:
+        plan = self._header.plan
+        spheres = []
+        heights_m = self._height_m(plan.waypoints_m)
+        for number, (point_m, z_m) in enumerate(zip(plan.waypoints_m, heights_m, strict=True)):
+            at = (float(point_m[0]), float(point_m[1]), float(z_m))
+            name = f"/world/waypoints/{number}"
+            spheres.append(
+                self._scene.add_icosphere(
+                    name, plan.waypoint_radius_m, color=_WAYPOINT, opacity=0.35, position=at
+                )
+            )
+            self._scene.add_label(
+                f"{name}/label", str(number + 1), position=(0.0, 0.0, plan.waypoint_radius_m)
+            )
+        return spheres
+
+    def _line(self, name: str, points_m: Floats, color: tuple[int, int, int], width: float) -> None:
+        flat = points_m[:, :2]
+        raised = np.column_stack([flat, self._height_m(flat) + _ABOVE_M])
+        segments = np.array(list(pairwise(raised)))
+        self._scene.add_line_segments(
+            name, segments, color, thickness=width, thickness_units="screen"
+        )
+
+    def _height_m(self, points_m: Floats) -> Floats:
+        if self._ground is None:
+            return np.zeros(len(points_m))
+        return np.asarray(self._ground.elevation_m(points_m[:, 0], points_m[:, 1]))
+
+
+def _place(links: viser.BatchedMeshHandle, body: BodyView, above_m: float = 0.0) -> None:
+    links.batched_positions = (body.link_m + np.array([0.0, 0.0, above_m])).astype(np.float32)
+    turns = Rotation.from_matrix(body.rotation).as_quat()
+    links.batched_wxyzs = turns[:, [3, 0, 1, 2]].astype(np.float32)
+
+
+def _ground_mesh(field: HeightField) -> trimesh.Trimesh:
+    """The ground's triangles, coloured by height."""
+    rows, columns = field.z_m.shape
+    x, y = np.meshgrid(
+        field.x0_m + field.spacing_m * np.arange(columns),
+        field.y0_m + field.spacing_m * np.arange(rows),
+    )
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    lower = np.stack([corner, corner + 1, corner + columns + 1], axis=1)
+    upper = np.stack([corner, corner + columns + 1, corner + columns], axis=1)
+    height = field.z_m.ravel()
+    share = (height - height.min()) / max(float(np.ptp(height)), 1e-9)
+    colors = _GROUND[0] + share[:, None] * (_GROUND[1] - _GROUND[0])
+    return trimesh.Trimesh(
+        np.stack([x.ravel(), y.ravel(), height], axis=1),
+        np.concatenate([lower, upper]),
+        vertex_colors=np.column_stack([colors, np.full(len(colors), 255.0)]).astype(np.uint8),
+        process=False,
+    )

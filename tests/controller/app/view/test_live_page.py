@@ -1,0 +1,140 @@
+"""The page of a run that moves servos on a pseudo-terminal, in a browser: what it shows, E-STOP."""
+
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser")
+
+from snakewalk.controller.app.runs.execute import execute
+from snakewalk.controller.app.runs.factory import prepare_gait
+from snakewalk.controller.app.view.live_page import _LivePage
+from snakewalk.controller.app.view.live_view import LiveView
+from snakewalk.controller.app.view.page_server import open_page
+from snakewalk.controller.app.view.row_line import PageEnd, RunEnd
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runtime.drive import Progress
+from snakewalk.sim.serve.servo_bus import ServoBus
+
+ROOT = Path(__file__).parents[4]
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+COMMAND = "from snakewalk.controller.app.cli.main import main; main()"
+ROBOT = 'name = "quartet"\njoint_axes = "yyyy"\nyaw_limit_rad = 1.4\n'
+PATIENT = ("stale_limit_s=5", "slow_stale_limit_s=20", "watchdog_s=2.5", "following_time_s=20")
+"""Of a run whose machine also draws a page without a graphics card."""
+
+
+@pytest.fixture
+def run(
+    tmp_path: Path, servo_bus: Callable[..., ServoBus]
+) -> Iterator[tuple[subprocess.Popen[str], ServoBus]]:
+    bus = servo_bus("1-4")
+    (tmp_path / "quartet.toml").write_text(ROBOT)
+    words = ["gait", "run", "lateral-undulation", "--robot", "quartet.toml", "--seconds", "100"]
+    words += [word for key in PATIENT for word in ("--set", f"run.safety.{key}")]
+    words += ["--port", bus.path, "--view", "--view-at", "127.0.0.1:0", "--no-film", "--out", "run"]
+    with subprocess.Popen(
+        [sys.executable, "-c", COMMAND, *words],
+        cwd=tmp_path,
+        env=os.environ
+        | {"XDG_RUNTIME_DIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as child:
+        yield child, bus
+        child.kill()
+
+
+class View:
+    """The page of a run, in the same thread."""
+
+    def __init__(self) -> None:
+        ours, far = socket.socketpair()
+        self.end = RunEnd(ours)
+        self.on_row = self.end.add
+        server, _ = open_page("127.0.0.1", 0)
+        self.page = _LivePage(server, PageEnd(far))
+
+    def on_button(self, path: Path) -> None:
+        LiveView.on_button(self, path)  # type: ignore[arg-type]
+
+    _end = property(lambda self: self.end)
+
+    def shown(self, what: str) -> str:
+        return re.sub("<[^>]*>", " ", getattr(self.page._dashboard, what).content)
+
+
+def test_a_page_shows_a_run_and_its_e_stop_latches_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    view, seen = View(), []
+
+    def on_progress(progress: Progress) -> None:
+        view.page.step()
+        seen.append(progress.time_s)
+        if len(seen) == 40:
+            assert "waypoint" not in view.shown("_state")
+            assert view.shown("_bars").count("(ID ") == 16
+            assert view.page._scene is not None
+            assert np.ptp(view.page._scene._body.batched_positions, axis=0).max() > 0.5
+            view.page._stop._pressed(None)
+
+    finished = execute(
+        prepare_gait("lateral-undulation", seconds=10.0),
+        tmp_path / "run",
+        view=view,
+        on_progress=on_progress,
+    )
+    view.page.step()
+    view.page._server.stop()
+    assert finished.outcome.tripped == "stop requested by E-STOP of the page"
+    assert len(seen) == 41  # the cycle in which it latched
+    said = view.page._stop._text.content
+    assert "the run has ended: stop requested by E-STOP of the page" in said
+    assert view.page._stop._button.disabled
+    assert "trip: stop requested" in view.shown("_events")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page with")
+def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
+    run: tuple[subprocess.Popen[str], ServoBus], tmp_path: Path
+) -> None:
+    playwright = pytest.importorskip("playwright.sync_api")
+    child, bus = run
+    assert child.stderr is not None
+    line = child.stderr.readline()
+    url = re.search(r"http://127\.0\.0\.1:\d+", line)
+    assert url is not None, line + child.stderr.read()
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(
+            executable_path=CHROMIUM,
+            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+        )
+        page = browser.new_page(viewport={"width": 700, "height": 500})
+        page.set_default_timeout(60_000.0)
+        page.goto(url[0])
+        button = page.get_by_role("button", name="E-STOP")
+        page.get_by_text("torque off at once, latched").wait_for()
+        page.get_by_text("lateral-undulation").wait_for()
+        page.get_by_text("joint 4 (ID 4)").wait_for()
+        assert bus["Torque Enable"].tolist() == [1] * 4
+        page.keyboard.press("Escape")
+        page.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
+        assert button.is_disabled()
+        assert bus["Torque Enable"].tolist() == [0] * 4
+        browser.close()
+    assert child.wait(60.0) == 1
+    record = read_log(tmp_path / "run" / "log.mcap")
+    assert [event.kind for event in record.events][-2:] == ["trip", "stop"]

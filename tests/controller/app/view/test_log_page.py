@@ -1,0 +1,85 @@
+"""A log in the page: time goes on, is moved, and ends; without a browser."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("viser")
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.main import main
+from snakewalk.controller.app.view.log_page import LogPage
+from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.tables import record_of
+
+
+@pytest.fixture
+def page(record: RunRecord) -> Iterator[LogPage]:
+    made = LogPage(record, "127.0.0.1", 0)
+    yield made
+    made.server.stop()
+
+
+def state(page: LogPage) -> str:
+    return re.sub("<[^>]*>", " ", page._dashboard._state.content)
+
+
+def test_it_plays_in_time_follows_the_slider_and_stops_at_the_end(page: LogPage) -> None:
+    end_s = page._end_s
+    page.step(0.05, 0.0)
+    assert page.time_s == page._begin_s
+    page.toggle()
+    page.step(0.5, 0.5)
+    assert page.time_s == pytest.approx(page._begin_s + 0.5)
+    assert f"{page.time_s:.1f} s" in state(page)
+    page._slider.value = end_s - 0.5
+    page.step(0.05, 1.0)
+    assert page.time_s == pytest.approx(end_s - 0.5, abs=0.01)
+    page._speed.value = "10"
+    page.step(0.2, 1.5)
+    assert page.time_s == end_s
+    assert not page.playing
+    page.toggle()
+    assert page.time_s == page._begin_s
+
+
+def test_bars_and_curves_show_the_rows_of_the_time(page: LogPage, record: RunRecord) -> None:
+    page._slider.value = round(0.5 * (page._begin_s + page._end_s), 2)
+    page.step(0.05, 0.0)
+    cycle = int((record.cycle.time_s <= page.time_s).sum()) - 1
+    bars = re.sub("<[^>]*>", " ", page._dashboard._bars.content)
+    assert f"{record.cycle.measured_rad[cycle, 0]:.2f}" in bars
+    assert f"{abs(record.cycle.current_a[cycle, 0]):.2f}" in bars
+    time_s, goal, measured = page._dashboard._angle.data
+    assert time_s[-1] == record.cycle.time_s[cycle]
+    assert goal[-1] == record.cycle.sent_rad[cycle, 0]
+    assert measured[-1] == record.cycle.measured_rad[cycle, 0]
+
+
+def test_texts_of_a_log_steer_no_page(record: RunRecord) -> None:
+    run = record.header.run.model_copy(update={"name": "<img src=x onerror=alert(1)>"})
+    named = replace(record, header=replace(record.header, run=run))
+    page = LogPage(named, "127.0.0.1", 0)
+    page.step(0.05, 0.0)
+    page.server.stop()
+    assert "<img" not in page._dashboard._state.content
+
+
+def test_a_log_without_a_cycle_is_refused(record: RunRecord) -> None:
+    empty = record_of({}, complete=True, note="", header=record.header)
+    with pytest.raises(InputError, match="nothing to show"):
+        LogPage(empty, "127.0.0.1", 0)
+
+
+def test_the_command_refuses_in_a_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for words in (["nothing.mcap"], [str(tmp_path), "--view-at", "here:there"]):
+        monkeypatch.setattr("sys.argv", ["snakewalk", "view", *words])
+        with pytest.raises(SystemExit) as end:
+            main()
+        assert end.value.code == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
