@@ -157,7 +157,9 @@ class RunConfig(Strict):
         "own, run by `prepare_source`",
     )
     waypoints_m: tuple[tuple[float, float], ...] = Field(
-        (), description="in order; gait, playback and source need none"
+        (),
+        description="in order; playback and source need none; with them a gait of legs is steered "
+        "along its path",
     )
     start_m: tuple[float, float] = Field((0.0, 0.0), description="where the head starts")
     start_heading_rad: float | None = Field(None, description="default: towards the path")

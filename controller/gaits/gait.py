@@ -88,6 +88,8 @@ class Gait(ABC):
     """Shipped world of its runs, where none is given."""
     p_gain: ClassVar[int | None] = None
     """Register 84 of every servo where the robot's own would squeeze too hard."""
+    steers: ClassVar[bool] = False
+    """Whether its parameter ``turn``, positive to the left, steers it along waypoints."""
     aim: ClassVar[Aim] = "advance"
     """The purpose that its speed is measured by."""
     model: ClassVar[type[GaitParameters]] = GaitParameters

@@ -29,8 +29,12 @@ class LegParameters(GaitParameters):
     stance_rad: float = Field(0.6, ge=0.0, le=1.2, description="roll of a leg down to the ground")
     lift_rad: float = Field(0.35, ge=0.0, le=1.2, description="how far a leg rises in the air")
     bend_rad: float = Field(0.5, ge=0.0, le=1.5, description="front girdle against hind girdle")
-    turn_rad: float = Field(
-        0.0, ge=-1.0, le=1.0, description="bend of the trunk; positive turns left"
+    turn: float = Field(
+        0.0,
+        ge=-1.6,
+        le=1.6,
+        description="share of their stride that the inner legs leave out; positive turns left, "
+        "beyond 1 they step backwards",
     )
 
 
@@ -42,6 +46,7 @@ class LegGait(Gait, ABC):
     offsets: ClassVar[tuple[float, float, float, float]]
     """In cycles, when a foot comes down: hind left, hind right, front left, front right."""
     needs = Needs(yaw=True, legs=True)
+    steers = True
     model = LegParameters
 
     def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
@@ -54,17 +59,19 @@ class LegGait(Gait, ABC):
             at = (phase_rad / TURN - self.offsets[2 * joint.pair + (0 if left else 1)]) % 1.0
             axis = robot.limbs[joint.pair].joint_axes[joint.place]
             if axis == "y":
-                shorter = max(p.turn_rad if left else -p.turn_rad, 0.0)
+                shorter = max(p.turn if left else -p.turn, 0.0)
                 joints[:, first + k] = (1.0 - shorter) * p.stride_rad * self._swing(at)
             elif joint.place == _first_roll(robot.limbs[joint.pair].joint_axes):
                 joints[:, first + k] = -p.stance_rad + p.lift_rad * self._lift(at)
         return joints
 
     def _swing(self, at: Floats) -> Floats:
-        """1 where a foot comes down, evenly to -1 where it leaves, and smoothly back."""
-        back = 1.0 - 2.0 * at / self.duty
+        """1 where a foot comes down, evenly to -1 where it leaves, and back; no step in speed."""
+        ground = 1.0 - 2.0 * at / self.duty
         air = np.clip((at - self.duty) / (1.0 - self.duty), 0.0, 1.0)
-        return np.where(at < self.duty, back, 2.0 * smoothstep.cubic(air) - 1.0)
+        slope = -2.0 * (1.0 - self.duty) / self.duty  # at both ends of the air, as on the ground
+        back = 2.0 * smoothstep.cubic(air) - 1.0 + slope * air * (1.0 - air) * (1.0 - 2.0 * air)
+        return np.where(at < self.duty, ground, back)
 
     def _lift(self, at: Floats) -> Floats:
         """0 on the ground, to 1 in the middle of the air."""
@@ -80,7 +87,7 @@ class LegGait(Gait, ABC):
         p, hind, front = self.params, robot.limbs[0].link, robot.limbs[-1].link
         turned = 0.5 * p.bend_rad * np.cos(phase_rad - TURN * self.offsets[2])
         trunk = np.arange(front, hind)
-        joints[:, trunk] = (p.turn_rad - 2.0 * turned[:, None]) / max(len(trunk), 1)
+        joints[:, trunk] = -2.0 * turned[:, None] / max(len(trunk), 1)
         if front > 0:
             joints[:, front - 1] += turned
         if hind < robot.link_count - 1:

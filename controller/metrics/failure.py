@@ -58,7 +58,8 @@ def failure(record: RunRecord) -> Failure | None:
     if len(clamped) and clamped.mean() > CLAMP_SHARE:
         return Failure("joint", f"joints do not follow: {clamped.mean():.0%} of goals clamped")
     rows = np.flatnonzero(pose.time_s >= record.end_s - WINDOW_S)
-    rows = rows[pose.pulse_m_s[rows] > 0.0]
+    if record.header.run.gait is None:  # of a gait no pulse is known
+        rows = rows[pose.pulse_m_s[rows] > 0.0]
     if len(rows) < 2:
         return Failure("joint", "the shape did not travel along the body")
     return _of_advance(record, rows)
@@ -68,7 +69,7 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
     """Judge the rows (n,) of the pose in which the shape travels."""
     pose, header = record.pose, record.header
     advanced, predicted = pose.speed_m_s[rows].mean(), pose.predicted_speed_m_s[rows].mean()
-    share = advanced / predicted
+    share = advanced / predicted if predicted > 0.0 else 1.0
     if share < header.run.safety.advance_fraction:
         up_rad, holds_rad = float(np.mean(_up_rad(pose.links_m[rows]))), _holds_rad(record)
         cause: Cause = "climb" if up_rad > holds_rad else "slip"

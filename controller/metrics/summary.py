@@ -217,7 +217,7 @@ def _costs(
     record: RunRecord, energy: EnergyTrack, chosen: NDArray[np.bool_]
 ) -> tuple[float, float]:
     """Electrical and mechanical cost of transport between the first and last of ``chosen`` rows."""
-    if record.header.run.gait is not None:
+    if record.header.run.gait is not None and not len(record.header.plan.waypoints_m):
         gait = effort(record)
         return gait.cost_of_transport, gait.mechanical_cost
     rows = np.flatnonzero(chosen)

@@ -7,15 +7,12 @@ With ``feedback`` off it believes that the body goes where the track goes, witho
 method, kept to show what a body with friction makes of it.
 """
 
-import math
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.errors import InputError
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.roll_compensation import RollCompensation
@@ -26,25 +23,9 @@ from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.controller.walk.course import Course, aim_rad
 from snakewalk.controller.walk.steering import PathPose
 from snakewalk.controller.walk.time_law import TimeLaw
-
-
-def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -> float:
-    """Direction from a point to the carrot ``carrot_m`` beyond ``along_m`` on the path.
-
-    The path is taken to go on straight past its end, or the last carrot would turn the body around.
-    """
-    at = along_m + carrot_m
-    carrot = path.position(min(at, path.length_m))
-    if at > path.length_m:
-        before = path.position(path.length_m - 0.05)
-        step = carrot - before
-        carrot = carrot + step / max(float(np.hypot(*step)), 1e-9) * (at - path.length_m)
-    return float(np.arctan2(carrot[1] - from_m[1], carrot[0] - from_m[0]))
-
-
-_OFF_PATH_BODIES = 0.5
 
 # Segments of track that remain when the next piece is decided: the time law looks ahead.
 _LOOKAHEAD_SEGMENTS = 6.0
@@ -54,25 +35,6 @@ _PITCH_SMOOTHING_S = 0.1
 
 # Shorter steps are saved up: they are too short to measure a speed.
 _SHORTEST_STEP_S = 1e-5
-
-# Body lengths of track before another path may be planned: turning back takes about as much.
-_REPLAN_AFTER_BODIES = 2.0
-# A body that gains less than this on its path over so much track stands still.
-_STALL_BODIES = 0.25
-_STALL_AFTER_BODIES = 5.0
-
-
-class PathPlanner(Protocol):
-    """Plans paths."""
-
-    def __call__(
-        self, points_m: Floats, heading_rad: float | None, *, avoid_m: Floats
-    ) -> SplinePath:
-        """Plan through (n, 2) points in order, from a heading where one is given.
-
-        The path keeps off places ``avoid_m`` (k, 2) where another way exists.
-        """
-        ...
 
 
 class ShapeChooser(Protocol):
@@ -134,16 +96,13 @@ class Pilot:
         time_law: TimeLaw,
         *,
         pace: Pace,
-        plan: PathPlanner,
+        course: Course,
         pitch_fitter: PitchFitter | None = None,
         pitch_lead_s: float = 0.0,
         roll: RollCompensation | None = None,
         fall_back: Callable[[bool], None] | None = None,
-        start_m: Floats,
-        waypoints_m: Sequence[tuple[float, float]],
         length_m: float,
         carrot_m: float,
-        waypoint_radius_m: float,
         feedback: bool = True,
         aim_at_waypoint: bool = False,
     ) -> None:
@@ -153,47 +112,47 @@ class Pilot:
         self._goal_rad = time_law.goal_rad()
         self._last_rad = self._earlier_rad = self._goal_rad
         self._last_s = self._earlier_s = self._saved_s = 0.0
-        self._plan = plan
+        self._course = course
         self._pitch_fitter = pitch_fitter
         self._fall_back = fall_back or (lambda lost: None)
         self._pitch_rad: Floats | None = None
         self._roll = roll
-        self._waypoints_m = np.asarray(waypoints_m, float)
-        self._goals_m: list[list[float]] = self._waypoints_m.tolist()  # to numbers once, for speed
-        self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
-        self._length_m = length_m
-        self._along_m = np.zeros(2)
-        """Of the body's centre on the path, and of its head."""
-        self._gained_m = self._gained_at = 0.0
-        self._stalls_m: list[Floats] = []
-        self._plan_path(np.asarray(start_m, float), 0)
+        self._table: PathTable | None = None
+        self._table_of: SplinePath | None = None
         self._links = len(self._goal_rad) + 1
         self._pitch_lead_s = pitch_lead_s
         self._segment_m = length_m / chooser.track.points
         self._carrot_m = carrot_m
-        self._radius_m = waypoint_radius_m
         self._feedback = feedback
         self._aim_at_waypoint = aim_at_waypoint
         self._start: tuple[Floats, float] | None = None
-        self.reached = 0
-        self._replan_after = 0.0
-        self._missed_before = -1
-        self.missed = 0
-        """How often another path was laid to a waypoint."""
-        self.replanned: str | None = None
-        """Why another path was laid in the last step, if one was."""
         self.decision: Decision | None = None
         """Made in the last step, if one was."""
 
     @property
-    def complete(self) -> bool:
-        """Whether every waypoint has been reached."""
-        return self.reached == len(self._goals_m)
+    def path(self) -> SplinePath:
+        """The path in force."""
+        return self._course.path
+
+    @property
+    def reached(self) -> int:
+        """Number of waypoints reached."""
+        return self._course.reached
+
+    @property
+    def missed(self) -> int:
+        """How often another path was laid to a waypoint."""
+        return self._course.missed
+
+    @property
+    def replanned(self) -> str | None:
+        """Why another path was laid in the last step, if one was."""
+        return self._course.replanned
 
     @property
     def done(self) -> bool:
         """Whether every waypoint has been reached and the shape has come to rest."""
-        return self.complete and self._time_law.speed_segments_s == 0.0
+        return self._course.complete and self._time_law.speed_segments_s == 0.0
 
     @property
     def head(self) -> float:
@@ -203,7 +162,7 @@ class Pilot:
     @property
     def along_m(self) -> float:
         """Arc length of the path point nearest to the body's centre."""
-        return float(self._along_m[0])
+        return self._course.along_m
 
     @property
     def pulse_m_s(self) -> float:
@@ -212,7 +171,7 @@ class Pilot:
 
     def path_m(self, count: int) -> Floats:
         """(count, 2) points along the path in force."""
-        return self.path.position(np.linspace(0.0, self.path.length_m, count))
+        return self._course.path_m(count)
 
     def goal_rad(self) -> Floats:
         """(J,) joint targets now; before the first step, of the initial shape."""
@@ -249,17 +208,20 @@ class Pilot:
         return goal
 
     def _steer(self, dt_s: float, view: BodyView) -> Floats:
-        followers_m = self._followers_m
-        followers_m[0], followers_m[1] = view.centre_m[:2], view.link_m[0, :2]
-        self.path.project(followers_m, self._along_m, self._gap_m)
-        self._count(followers_m[0], followers_m[1], float(view.headings_rad.mean()))
+        self._course.follow(
+            view.centre_m[:2],
+            view.link_m[0, :2],
+            lambda: float(view.headings_rad.mean()),
+            self.head,
+            self._fall_back,
+        )
         self.decision = None
         left = self._chooser.track.end - self.head
         if left <= _LOOKAHEAD_SEGMENTS:
             self.decision = self._chooser.decide(self._path_pose(view))
         elif left <= _LOOKAHEAD_SEGMENTS + _THINK_SEGMENTS:
             self._chooser.think(lambda: self._path_pose(view))
-        if self.complete:
+        if self._course.complete:
             self._time_law.stop()
         self._time_law.advance(dt_s)
         goal_rad = self._on_ground(self._time_law.goal_rad(), dt_s, view)
@@ -301,74 +263,19 @@ class Pilot:
         at = (np.arange(self._links) + 0.5) * points / self._links - 0.5
         return np.interp(at, np.arange(points), body)
 
-    def _count(self, centre_m: Floats, head_m: Floats, heading_rad: float) -> None:
-        """Count a waypoint when the centre is near it; lay another path where this one failed."""
-        self.replanned = None
-        if self.complete:
-            return
-        x_m, y_m = self._goals_m[self.reached]
-        if math.hypot(x_m - centre_m[0], y_m - centre_m[1]) <= self._radius_m:
-            self.reached += 1
-            self._fall_back(False)
-        elif self._feedback and self.head >= self._replan_after:
-            self._note_gain()
-            if self._is_stalled:
-                self.replanned = "no advance on the path"
-                self._stalls_m.append(head_m.copy())
-            elif self._has_passed(centre_m):
-                self.replanned = f"waypoint {self.reached + 1} passed by"
-            elif self._gap_m[0] > _OFF_PATH_BODIES * self._length_m:
-                self.replanned = f"{self._gap_m[0]:.2f} m off the path"
-            else:
-                return
-            self.missed += 1
-            self._fall_back(self.reached == self._missed_before)
-            self._missed_before = self.reached
-            self._replan_after = self.head + _REPLAN_AFTER_BODIES * self._chooser.track.points
-            with suppress(InputError):  # no safe path leads back from here: the old one stays
-                self._plan_path(head_m, self.reached, heading_rad)
-
-    def _note_gain(self) -> None:
-        """Remember where on the track the body last came on by a share of its length."""
-        along_m = float(self._along_m[0])
-        if along_m > self._gained_m + _STALL_BODIES * self._length_m:
-            self._gained_m, self._gained_at = along_m, self.head
-
-    @property
-    def _is_stalled(self) -> bool:
-        """Whether the shape has travelled far, and the body not."""
-        track = (self.head - self._gained_at) / self._chooser.track.points
-        return track > _STALL_AFTER_BODIES
-
-    def _has_passed(self, centre_m: Floats) -> bool:
-        """Whether the body is beyond the next waypoint on the path, and did not come near it."""
-        path, end_m = self.path, self.path.length_m
-        along_m = float(self._along_m[0])
-        if along_m >= end_m - 1e-6:  # distance beyond the end, along the path's last direction
-            last = path.position([end_m - 0.05, end_m])
-            ahead = (last[1] - last[0]) / 0.05
-            along_m += float((centre_m - last[1]) @ ahead)
-        return bool(along_m > self._passed_m[self.reached] + self._radius_m)
-
-    def _plan_path(self, from_m: Floats, first: int, heading_rad: float | None = None) -> None:
-        """Plan from a point, with the body's heading, through the waypoints from ``first`` on."""
-        points_m = np.vstack([from_m, self._waypoints_m[first:]])
-        self.path = self._plan(
-            points_m, heading_rad, avoid_m=np.array(self._stalls_m).reshape(-1, 2)
-        )
-        self._gained_m, self._gained_at = 0.0, self.head
-        whole = np.arange(0.0, self.path.length_m, PATH_STEP_M)
-        self._table = PathTable.of(self.path.position(np.append(whole, self.path.length_m)))
-        self._along_m = np.zeros(2)
-        self._passed_m = [0.0] * len(self._waypoints_m)
-        at = 0.0
-        for k in range(first, len(self._waypoints_m)):
-            at = self._passed_m[k] = self.path.first_pass(self._waypoints_m[k], at)
-
     def _path_pose(self, view: BodyView) -> PathPose:
         offset, aim = self._aim(view)
         at = round(self.along_m / PATH_STEP_M)
-        return PathPose(self.head, offset, view.centre_m[:2].copy(), aim, self._table, at)
+        return PathPose(self.head, offset, view.centre_m[:2].copy(), aim, self._path_table(), at)
+
+    def _path_table(self) -> PathTable:
+        """Table of the path in force, made once a path."""
+        path = self.path
+        if self._table is None or self._table_of is not path:
+            whole = np.arange(0.0, path.length_m, PATH_STEP_M)
+            self._table = PathTable.of(path.position(np.append(whole, path.length_m)))
+            self._table_of = path
+        return self._table
 
     def _aim(self, view: BodyView) -> tuple[float, float]:
         """Offset from track to world, and the direction of the aim there."""
@@ -376,7 +283,8 @@ class Pilot:
         if self._start is None:
             self._start = (head_m, offset)
         if self._aim_at_waypoint:
-            target = self._waypoints_m[min(self.reached, len(self._waypoints_m) - 1)]
+            waypoints_m = self._course.waypoints_m
+            target = waypoints_m[min(self.reached, len(waypoints_m) - 1)]
             return offset, float(np.arctan2(*(target - centre_m)[::-1]))
         if not self._feedback:
             offset = self._start[1]
@@ -387,7 +295,9 @@ class Pilot:
         lead_m = (self._chooser.track.end - self.head) * self._segment_m
         heading = view.headings_rad.mean()
         ahead_m = head_m + lead_m * np.array([np.cos(heading), np.sin(heading)])
-        return offset, aim_rad(self.path, ahead_m, float(self._along_m[1]) + lead_m, self._carrot_m)
+        return offset, aim_rad(
+            self.path, ahead_m, self._course.head_along_m + lead_m, self._carrot_m
+        )
 
     def _measured(self, view: BodyView) -> tuple[float, Floats, Floats]:
         believed = self._at_links(self._chooser.track.body_rad(self.head))

@@ -26,6 +26,7 @@ from snakewalk.controller.app.runs.gait_run import GaitRun, MakeOperator
 from snakewalk.controller.app.runs.playback_run import PlaybackRun
 from snakewalk.controller.app.runs.prepared_run import PreparedRun
 from snakewalk.controller.app.runs.source_run import MakeSource, SourceRun
+from snakewalk.controller.app.runs.steered_run import SteeredRun
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.capture.readers.load import track_beside
 from snakewalk.controller.gaits.gait import Gait, fitting_robot
@@ -59,7 +60,7 @@ def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Prepa
 
     """
     if run.motion == "gait":
-        return GaitRun(run, robot, world)
+        return (SteeredRun if run.waypoints_m else GaitRun)(run, robot, world)
     if run.motion == "playback":
         return PlaybackRun(run, robot, world)
     if run.motion == "repertoire":
@@ -81,6 +82,28 @@ def prepare_walk(
     on_paper: bool = False,
     **changes: object,
 ) -> WalkRun:
+    """Load a walk's run: as ``prepare_job``, which takes gaits along waypoints, too.
+
+    Raises:
+        ConfigError: every fault of a file at once.
+        InputError: as ``prepare_job``, and for a gait.
+
+    """
+    found = prepare_job(name, keys=keys, on_paper=on_paper, **changes)
+    if isinstance(found, SteeredRun):
+        raise InputError(
+            f"run {found.run.name}: a gait along waypoints; run it by: snakewalk run {name}"
+        )
+    return found
+
+
+def prepare_job(
+    name: str,
+    *,
+    keys: Mapping[str, object] | None = None,
+    on_paper: bool = False,
+    **changes: object,
+) -> WalkRun | SteeredRun:
     """Load a run with its robot and world; ``changes`` replace fields of the run where not None.
 
     ``keys`` replace single values of the three files: ``run.seed``, ``robot.link_mass_kg``,
@@ -104,7 +127,7 @@ def prepare_walk(
             f"run {run.name}: kp is a motion on paper: snakewalk synthesise RUN --motion kp "
             "-o NAME, then snakewalk play NAME.npz"
         )
-    if run.motion == "gait":
+    if run.motion == "gait" and not run.waypoints_m:
         raise InputError(f"run {run.name}: a gait is run by: snakewalk gait run NAME")
     if run.motion == "playback":
         raise InputError(f"run {run.name}: a recording is played by: snakewalk play TRACK")
@@ -113,10 +136,17 @@ def prepare_walk(
     if run.motion == "source":
         raise InputError(f"run {run.name}: a source of your own is run by prepare_source")
     robot = _with_keys_of("robot", load_robot(run.robot, beside), keys)
+    _check_servos(run, robot)
+    world = _with_keys_of("world", load_world(run.world, beside), keys)
+    if run.motion == "gait":
+        steered = SteeredRun(run, robot, world)
+        steered.check_plan()
+        gait = steered.gait
+        soft = [gait.p_gain] if gait.p_gain is not None else []
+        return replace(steered, robot=_with_gains(robot, pitch=gait.needs.pitch, soft=soft))
     _refuse_legs(robot)
     _refuse_one_joint(robot)
-    _check_servos(run, robot)
-    return WalkRun(run, robot, _with_keys_of("world", load_world(run.world, beside), keys))
+    return WalkRun(run, robot, world)
 
 
 def _checked_keys(
@@ -184,7 +214,8 @@ def _refuse_legs(robot: RobotConfig) -> None:
     if robot.limbs:
         raise InputError(
             f"robot {robot.name}: walks and recordings move a body without legs; a robot with legs "
-            "runs gaits (snakewalk gait run) and sources of your own"
+            "runs gaits (snakewalk gait run), gaits along waypoints (snakewalk run "
+            "salamander-square) and sources of your own"
         )
 
 
@@ -262,6 +293,11 @@ def prepare_gait(
 def is_gait(name: str) -> bool:
     """Whether this is the name of a gait or of a shipped set of its parameters."""
     return name in GAITS or name in shipped("gaits")
+
+
+def moves_by_gait(name: str) -> bool:
+    """Whether this names a gait, or a run that goes along its waypoints by a gait."""
+    return is_gait(name) or load_run(name).motion == "gait"
 
 
 def with_compliance(run: RunConfig, on: bool | None) -> RunConfig:

@@ -28,6 +28,7 @@ from snakewalk.controller.runtime.forecast import Forecast, forecast, margin_fau
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
+from snakewalk.controller.walk.course import Course
 from snakewalk.controller.walk.joint_track import JointTrack
 from snakewalk.controller.walk.pilot import Aimed, Pilot, ShapeChooser
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker
@@ -143,16 +144,26 @@ class WalkRun:
         """
         run, robot = self.run, self.robot
         chooser = self._chooser()
+        time_law = TimeLaw(
+            JointTrack(chooser.track, self.retarget.joints_rad, robot.limit_rad),
+            self.pulse_segments_s,
+            speed_limit_rad_s=robot.joint_speed_limit_rad_s,
+            acceleration_limit_rad_s2=robot.joint_acceleration_limit_rad_s2,
+        )
         return Pilot(
             chooser,
-            TimeLaw(
-                JointTrack(chooser.track, self.retarget.joints_rad, robot.limit_rad),
-                self.pulse_segments_s,
-                speed_limit_rad_s=robot.joint_speed_limit_rad_s,
-                acceleration_limit_rad_s2=robot.joint_acceleration_limit_rad_s2,
-            ),
+            time_law,
             pace=Pace.limit(robot),
-            plan=self.planner,
+            course=Course(
+                self.planner,
+                run.waypoints_m,
+                start_m=np.array(run.start_m),
+                radius_m=run.waypoint_radius_m,
+                length_m=robot.length_m,
+                travel_per_body=chooser.track.points,
+                travel=time_law.head,
+                feedback=run.motion != "walk-blind",
+            ),
             pitch_fitter=None if level or self.ground is None else self.pitch_fitter,
             pitch_lead_s=robot.servo.pitch_lead_s,
             roll=None if level or not robot.pitch_joints else RollCompensation(robot),
@@ -161,11 +172,8 @@ class WalkRun:
                 if isinstance(chooser, PredictiveWalker) and run.walk.fallback
                 else None
             ),
-            start_m=np.array(run.start_m),
-            waypoints_m=run.waypoints_m,
             length_m=robot.length_m,
             carrot_m=run.walk.carrot_m,
-            waypoint_radius_m=run.waypoint_radius_m,
             feedback=run.motion != "walk-blind",
             aim_at_waypoint=run.motion == "walk-printed",
         )

@@ -18,7 +18,7 @@ from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import (
     is_gait,
     prepare_gait,
-    prepare_walk,
+    prepare_job,
     with_compliance,
 )
 from snakewalk.controller.app.runs.gait_run import GaitRun
@@ -135,7 +135,7 @@ def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> WalkRun |
     seconds = options.pop("seconds", None)
     if not case.is_gait:
         options |= {"motion": case.motion, "seed": seed}
-        return prepare_walk(case.run, keys=dict(case.keys), **options)
+        return prepare_job(case.run, keys=dict(case.keys), **options)
     world = options.get("world")
     return prepare_gait(
         case.run,

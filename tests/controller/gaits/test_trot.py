@@ -47,9 +47,11 @@ def test_with_one_height_for_both_feet_as_printed_one_foot_walks_backwards() -> 
         air = in_the_air(gait)
         rate = np.gradient(joints[:, SWING], axis=0)
         for leg in range(4):
+            # just lifted, it still goes back as on the ground, and so before it comes down
+            margins = (round(100 * (1.0 - gait.duty)), 5)
             inside, ground = (
-                np.all([np.roll(where, k) for k in range(-5, 6)], axis=0)
-                for where in (air[:, leg], ~air[:, leg])
+                np.all([np.roll(where, k) for k in range(-margin, margin + 1)], axis=0)
+                for where, margin in zip((air[:, leg], ~air[:, leg]), margins, strict=True)
             )
             assert (rate[inside, leg] > 0.0).all()
             np.testing.assert_allclose(rate[ground, leg], rate[ground, leg].mean(), rtol=1e-6)
@@ -65,13 +67,13 @@ def test_the_girdles_turn_with_their_legs_and_the_head_keeps_its_heading() -> No
     assert np.abs(turned[:, front]).max() == pytest.approx(0.3)
     # the front girdle to the right where the left front leg is foremost
     foremost = int(np.argmax(joints[:, SWING[2]]))
-    assert turned[foremost, front] == pytest.approx(-0.3, abs=0.01)
+    assert turned[foremost, front] == pytest.approx(-0.3, abs=0.02)
 
 
 @pytest.mark.parametrize("gait", [Trot, LateralWalk])
 def test_mirrored_left_and_right_are_exchanged(gait: type[LegGait]) -> None:
-    one = gait.of({"turn_rad": 0.4}).joints_rad(ROBOT, PHASE)
-    other = gait.of({"turn_rad": 0.4, "mirror": True}).joints_rad(ROBOT, PHASE)
+    one = gait.of({"turn": 0.4}).joints_rad(ROBOT, PHASE)
+    other = gait.of({"turn": 0.4, "mirror": True}).joints_rad(ROBOT, PHASE)
     legs = [SPINE + k for k in (2, 3, 0, 1, 6, 7, 4, 5)]
     np.testing.assert_allclose(other[:, :SPINE], -one[:, :SPINE])
     np.testing.assert_allclose(other[:, SPINE:], one[:, legs])
@@ -114,9 +116,17 @@ def test_it_walks_forward_by_less_than_its_strides_and_farther_with_a_bent_spine
     assert way[0.5] > 1.1 * way[0.0]
 
 
-def test_a_bent_trunk_turns_the_way_it_is_bent() -> None:
-    _, left = travel(Trot.of({"turn_rad": 0.6}), 1)
-    _, right = travel(Trot.of({"turn_rad": -0.6}), 1)
+@pytest.mark.parametrize("gait", [Trot, LateralWalk])
+def test_legs_never_step_in_speed(gait: type[LegGait]) -> None:
+    fine = np.linspace(0.0, 2.0 * np.pi, 4001)
+    rate = np.diff(gait().joints_rad(ROBOT, fine)[:, SWING], axis=0) / np.diff(fine)[:, None]
+    steps = np.abs(np.diff(np.vstack([rate, rate[:1]]), axis=0)).max()
+    assert steps < 0.02 * np.abs(rate).max()
+
+
+def test_shorter_strides_inside_turn_the_body() -> None:
+    _, left = travel(Trot.of({"turn": 0.6}), 1)
+    _, right = travel(Trot.of({"turn": -0.6}), 1)
     assert left > 0.1
     assert right == pytest.approx(-left, abs=0.05)
 

@@ -58,11 +58,11 @@ def run(
     from snakewalk.controller.app.progress import PathBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.recordings.body_look import check_look  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.app.runs.factory import prepare_walk, with_compliance  # noqa: PLC0415
+    from snakewalk.controller.app.runs.factory import prepare_job, with_compliance  # noqa: PLC0415
     from snakewalk.controller.app.view.live_view import open_view  # noqa: PLC0415
 
     check_look(look)
-    prepared = prepare_walk(
+    prepared = prepare_job(
         run, keys=key_values("--set", set_), seed=seed, motion=motion, robot=robot, world=world,
         track=track, pose=pose,
     )  # fmt: skip

@@ -94,7 +94,7 @@ def trials(
     is the same for the same files: after an update of the program begin a new --out.
     """
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
-    from snakewalk.controller.app.runs.factory import is_gait  # noqa: PLC0415
+    from snakewalk.controller.app.runs.factory import moves_by_gait  # noqa: PLC0415
     from snakewalk.controller.app.studies import trials as study  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.studies.trials_table import TrialsTable  # noqa: PLC0415
 
@@ -111,7 +111,7 @@ def trials(
         for run in (runs or [DEFAULT_RUN])
         for r in (robot if robot else (None,))
         for k in (relief if relief else (1.0,))
-        for m in (["gait"] if is_gait(run) else motions)
+        for m in (["gait"] if moves_by_gait(run) else motions)
         for c in ([word == "on" for word in compliance] if compliance else (None,))
         for values in product(*axes)
     ]

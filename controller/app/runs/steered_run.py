@@ -1,0 +1,78 @@
+"""A run of a gait along waypoints: its path, its checks and its motion."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.runs.gait_run import GaitRun
+from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.runlog.record import PlanSummary
+from snakewalk.controller.runtime.drive import OnEvent
+from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.terrain.planner import TerrainPlanner
+from snakewalk.controller.walk.course import Course
+from snakewalk.controller.walk.steered_gait import CYCLES_PER_BODY, SteeredGait, check_turns
+
+
+@dataclass(frozen=True)
+class SteeredRun(GaitRun):
+    """A ``PreparedRun`` of a gait that is steered along a path; flat floors only."""
+
+    @cached_property
+    def planner(self) -> TerrainPlanner:
+        """Plans paths."""
+        return TerrainPlanner(self.ground, self.world.planner)
+
+    @cached_property
+    def path(self) -> SplinePath:
+        """Through the start and the waypoints."""
+        return self.planner.plan(np.vstack([self.run.start_m, self.run.waypoints_m]))
+
+    @property
+    def start_heading_rad(self) -> float:
+        """Mean heading of the body at the start."""
+        given = self.run.start_heading_rad
+        return self.path.heading_rad(0.05) if given is None else given
+
+    def check_plan(self) -> PlanSummary:
+        """Check that the gait can be steered, and within the joints' ranges; lay the path.
+
+        Raises:
+            InputError: it cannot, or the run asks for what belongs to a gait without waypoints.
+
+        """
+        if self.ground is not None:
+            raise InputError(
+                f"run {self.run.name}: a gait goes along waypoints on flat floors only"
+            )
+        config = self.config
+        if config.then or config.look_heading_rad is not None or config.look_at_m is not None:
+            raise InputError(
+                f"run {self.run.name}: a gait along waypoints takes no then, look_heading_rad or "
+                "look_at_m in its table [gait]"
+            )
+        try:
+            check_turns(self.gait, self.robot)
+        except InputError as error:
+            faults = [f"run {self.run.name}: {fault}" for fault in error.faults]
+            raise InputError(faults) from None
+        return PlanSummary(
+            path_m=self.path.position(np.linspace(0.0, self.path.length_m, 200)),
+            waypoints_m=np.array(self.run.waypoints_m),
+            waypoint_radius_m=self.run.waypoint_radius_m,
+        )
+
+    def make_source(self, on_event: OnEvent) -> MotionSource:
+        """Return a fresh motion."""
+        run = self.run
+        course = Course(
+            self.planner,
+            run.waypoints_m,
+            start_m=np.array(run.start_m),
+            radius_m=run.waypoint_radius_m,
+            length_m=self.robot.length_m,
+            travel_per_body=CYCLES_PER_BODY,
+        )
+        return SteeredGait(self.gait, self.robot, course, run.walk.carrot_m)

@@ -1,0 +1,207 @@
+"""The course: the path in force through the waypoints, and how far the body has come on it.
+
+A waypoint counts when the body's centre is near it. Where the body passes by one, is half its
+length off the path, or stands still, another path is planned from its head, in its direction, off
+the places where it stood still.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Protocol
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.terrain.path import SplinePath
+
+_OFF_PATH_BODIES = 0.5
+# Body lengths of travel before another path may be planned: turning back takes about as much.
+_REPLAN_AFTER_BODIES = 2.0
+# A body that gains less than this on its path over so much travel stands still.
+_STALL_BODIES = 0.25
+_STALL_AFTER_BODIES = 5.0
+
+
+class PathPlanner(Protocol):
+    """Plans paths."""
+
+    def __call__(
+        self, points_m: Floats, heading_rad: float | None, *, avoid_m: Floats
+    ) -> SplinePath:
+        """Plan through (n, 2) points in order, from a heading where one is given.
+
+        The path keeps off places ``avoid_m`` (k, 2) where another way exists.
+        """
+        ...
+
+
+def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -> float:
+    """Direction from a point to the carrot ``carrot_m`` beyond ``along_m`` on the path.
+
+    The path is taken to go on straight past its end, or the last carrot would turn the body around.
+    """
+    at = along_m + carrot_m
+    carrot = path.position(min(at, path.length_m))
+    if at > path.length_m:
+        before = path.position(path.length_m - 0.05)
+        step = carrot - before
+        carrot = carrot + step / max(float(np.hypot(*step)), 1e-9) * (at - path.length_m)
+    return float(np.arctan2(carrot[1] - from_m[1], carrot[0] - from_m[0]))
+
+
+class Course:
+    """Waypoints in order, and the path to those that are left."""
+
+    def __init__(
+        self,
+        plan: PathPlanner,
+        waypoints_m: Sequence[tuple[float, float]],
+        *,
+        start_m: Floats,
+        radius_m: float,
+        length_m: float,
+        travel_per_body: float,
+        travel: float = 0.0,
+        feedback: bool = True,
+    ) -> None:
+        """Plan the first path.
+
+        Args:
+            plan: plans every path.
+            waypoints_m: in order.
+            start_m: (2,) where the head is.
+            radius_m: how near to a waypoint the centre has to come.
+            length_m: of the body.
+            travel_per_body: what the motion counts as a body length of travel, in its own unit.
+            travel: of the motion at its begin.
+            feedback: whether another path is laid where one failed.
+
+        Raises:
+            InputError: as the planner.
+
+        """
+        self._plan = plan
+        self.waypoints_m = np.asarray(waypoints_m, float)
+        """(k, 2) in order."""
+        self._goals_m: list[list[float]] = self.waypoints_m.tolist()  # to numbers once, for speed
+        self._radius_m, self._length_m = radius_m, length_m
+        self._per_body, self._feedback = travel_per_body, feedback
+        self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
+        self._along_m = np.zeros(2)
+        """Of the body's centre on the path, and of its head."""
+        self._travel, self._replan_after = travel, 0.0
+        self._gained_m, self._gained_at = 0.0, travel
+        self._stalls_m: list[Floats] = []
+        self._missed_before = -1
+        self.reached = 0
+        """Number of waypoints reached."""
+        self.missed = 0
+        """How often another path was laid to a waypoint."""
+        self.replanned: str | None = None
+        """Why another path was laid in the last step, if one was."""
+        self._lay(np.asarray(start_m, float), None)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every waypoint has been reached."""
+        return self.reached == len(self._goals_m)
+
+    @property
+    def along_m(self) -> float:
+        """Arc length of the path point nearest to the body's centre."""
+        return float(self._along_m[0])
+
+    @property
+    def head_along_m(self) -> float:
+        """The same of the head."""
+        return float(self._along_m[1])
+
+    def path_m(self, count: int) -> Floats:
+        """(count, 2) points along the path in force."""
+        return self.path.position(np.linspace(0.0, self.path.length_m, count))
+
+    def follow(
+        self,
+        centre_m: Floats,
+        head_m: Floats,
+        heading_rad: Callable[[], float],
+        travel: float,
+        fall_back: Callable[[bool], None] = lambda lost: None,
+    ) -> None:
+        """Count a waypoint when the centre is near it; lay another path where this one failed.
+
+        Args:
+            centre_m: (2,) of mass.
+            head_m: (2,)
+            heading_rad: of the body; asked only for another path.
+            travel: of the motion since its begin, whether or not the body came on.
+            fall_back: told whether the same waypoint was missed again, and when one is reached.
+
+        """
+        self._followers_m[0], self._followers_m[1] = centre_m, head_m
+        self.path.project(self._followers_m, self._along_m, self._gap_m)
+        self.replanned, self._travel = None, travel
+        if self.complete:
+            return
+        x_m, y_m = self._goals_m[self.reached]
+        if math.hypot(x_m - centre_m[0], y_m - centre_m[1]) <= self._radius_m:
+            self.reached += 1
+            fall_back(False)
+        elif self._feedback and travel >= self._replan_after:
+            self._note_gain()
+            self.replanned = self._failing(centre_m)
+            if self.replanned is None:
+                return
+            if self._is_stalled:
+                self._stalls_m.append(np.array(head_m))
+            self.missed += 1
+            fall_back(self.reached == self._missed_before)
+            self._missed_before = self.reached
+            self._replan_after = travel + _REPLAN_AFTER_BODIES * self._per_body
+            with suppress(InputError):  # no safe path leads back from here: the old one stays
+                self._lay(self._followers_m[1].copy(), heading_rad())
+
+    def _failing(self, centre_m: Floats) -> str | None:
+        """Why the path in force is none any more; None while it is."""
+        if self._is_stalled:
+            return "no advance on the path"
+        if self._has_passed(centre_m):
+            return f"waypoint {self.reached + 1} passed by"
+        if self._gap_m[0] > _OFF_PATH_BODIES * self._length_m:
+            return f"{self._gap_m[0]:.2f} m off the path"
+        return None
+
+    def _note_gain(self) -> None:
+        """Remember at which travel the body last came on by a share of its length."""
+        along_m = float(self._along_m[0])
+        if along_m > self._gained_m + _STALL_BODIES * self._length_m:
+            self._gained_m, self._gained_at = along_m, self._travel
+
+    @property
+    def _is_stalled(self) -> bool:
+        """Whether the motion has travelled far, and the body not."""
+        return (self._travel - self._gained_at) / self._per_body > _STALL_AFTER_BODIES
+
+    def _has_passed(self, centre_m: Floats) -> bool:
+        """Whether the body is beyond the next waypoint on the path, and did not come near it."""
+        path, end_m = self.path, self.path.length_m
+        along_m = float(self._along_m[0])
+        if along_m >= end_m - 1e-6:  # distance beyond the end, along the path's last direction
+            last = path.position([end_m - 0.05, end_m])
+            ahead = (last[1] - last[0]) / 0.05
+            along_m += float((centre_m - last[1]) @ ahead)
+        return bool(along_m > self._passed_m[self.reached] + self._radius_m)
+
+    def _lay(self, from_m: Floats, heading_rad: float | None) -> None:
+        """Plan from a point, with the body's heading, through the waypoints that are left."""
+        points_m = np.vstack([from_m, self.waypoints_m[self.reached :]])
+        stalls_m = np.array(self._stalls_m).reshape(-1, 2)
+        self.path = self._plan(points_m, heading_rad, avoid_m=stalls_m)
+        self._gained_m, self._gained_at = 0.0, self._travel
+        self._along_m[:] = 0.0
+        self._passed_m = [0.0] * len(self.waypoints_m)
+        at = 0.0
+        for k in range(self.reached, len(self.waypoints_m)):
+            at = self._passed_m[k] = self.path.first_pass(self.waypoints_m[k], at)

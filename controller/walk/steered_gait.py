@@ -1,0 +1,188 @@
+"""A steered gait: a gait with a turn goes along a path through waypoints.
+
+The straight motion is turned along the path, as [KP] 4.4 bends the motion of its animals along
+theirs; here by the gait's own parameter ``turn``, from where the body is measured in every cycle.
+"""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import CYCLE_SAMPLES, Gait, Needs
+from snakewalk.controller.gaits.registry import GAITS
+from snakewalk.controller.gaits.wave import TURN
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.motion.gait_cycle import GaitCycle
+from snakewalk.controller.motion.path_progress import Decision
+from snakewalk.controller.motion.rate_limiter import RateLimiter
+from snakewalk.controller.motion.source import Pace
+from snakewalk.controller.motion.stop_profile import StopProfile
+from snakewalk.controller.walk.course import Course, aim_rad
+
+TURN_LIMIT = 1.4
+"""Of the gait's turn (ours): with it a trot turns on an arc of 0.4 m."""
+TURN_PER_RAD = 3.0
+"""Turn per error of the heading (ours)."""
+TURN_RATE_PER_S = 0.5
+"""How fast the turn changes (ours): within a cycle of 4 s it goes from straight to its limit."""
+_TURN_PER_S2 = 1.0
+CYCLES_PER_BODY = 4.0
+"""Cycles that go by while a body goes its length: a trot makes 0.24 to 0.42 lengths a cycle."""
+
+
+class SteeredGait:
+    """A ``MotionSource`` with ``PathProgress``: it comes to rest when all waypoints are reached."""
+
+    pulse_m_s = 0.0
+    decision: Decision | None = None
+
+    def __init__(self, gait: Gait, robot: RobotConfig, course: Course, carrot_m: float) -> None:
+        """Begin at phase 0, straight.
+
+        Args:
+            gait: one that ``steers``.
+            robot: that it moves.
+            course: of which a body length is ``CYCLES_PER_BODY``.
+            carrot_m: how far ahead on the path the body aims.
+
+        Raises:
+            InputError: as ``check_turns``.
+
+        """
+        check_turns(gait, robot)
+        self._gait, self._robot, self._course, self._carrot_m = gait, robot, course, carrot_m
+        cycle = GaitCycle(gait, robot)
+        self._rate_rad_s = cycle.rate_rad_s * _rate_beside_turn(gait, robot, cycle.pace())
+        self._turn = RateLimiter(np.zeros(1), TURN_RATE_PER_S, _TURN_PER_S2)
+        self._stop_profile = StopProfile()
+        self._phase_rad = 0.0
+        self._cycles = 0.0
+
+    @property
+    def needs(self) -> Needs:
+        """Those of the gait."""
+        return self._gait.needs
+
+    @property
+    def done(self) -> bool:
+        """Whether every waypoint has been reached and the gait has come to rest."""
+        return self._stop_profile.over
+
+    @property
+    def reached(self) -> int:
+        """Number of waypoints reached."""
+        return self._course.reached
+
+    @property
+    def missed(self) -> int:
+        """How often another path was laid."""
+        return self._course.missed
+
+    @property
+    def replanned(self) -> str | None:
+        """Why another path was laid in the last step, if one was."""
+        return self._course.replanned
+
+    @property
+    def along_m(self) -> float:
+        """Arc length of the path point nearest to the body's centre."""
+        return self._course.along_m
+
+    @property
+    def turn(self) -> float:
+        """The gait's turn now."""
+        return float(self._turn.angle_rad[0])
+
+    @property
+    def frequency_hz(self) -> float:
+        """Cycles a second at full rate: as asked, or what the joints can follow while it turns."""
+        return float(self._rate_rad_s / TURN)
+
+    def path_m(self, count: int) -> Floats:
+        """(count, 2) points along the path in force."""
+        return self._course.path_m(count)
+
+    def begin(self, view: BodyView) -> Floats:
+        """(J,) where the gait begins: the ground is flat."""
+        return self.goal_rad()
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return self._joints_rad(self._phase_rad, self.turn)
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) central difference over 4e-4 s of phase and turn."""
+        rate, half_s = self._rate_rad_s * self._stop_profile.rate, 2e-4
+        turning = float(self._turn.speed_rad_s[0])
+        before, after = (
+            self._joints_rad(self._phase_rad + at_s * rate, self.turn + at_s * turning)
+            for at_s in (-half_s, half_s)
+        )
+        return np.asarray((after - before) / (2.0 * half_s))
+
+    def pace(self) -> Pace:
+        """The robot's limits: when it turns is not known."""
+        return Pace.limit(self._robot)
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Go on by ``dt_s`` and return the new targets (J,)."""
+        course, centre_m = self._course, view.centre_m[:2]
+        heading_rad = float(view.headings_rad.mean())
+        course.follow(centre_m, view.link_m[0, :2], lambda: heading_rad, self._cycles)
+        if course.complete:
+            self._stop_profile.stop()
+        aim = aim_rad(course.path, centre_m, course.along_m, self._carrot_m)
+        wanted = TURN_PER_RAD * float(wrap(aim - heading_rad))
+        part_s = self._stop_profile.step(dt_s)
+        self._turn.step(part_s, np.clip([wanted], -TURN_LIMIT, TURN_LIMIT))
+        self._phase_rad = (self._phase_rad + part_s * self._rate_rad_s) % TURN
+        self._cycles += part_s * self._rate_rad_s / TURN
+        return self.goal_rad()
+
+    def _joints_rad(self, phase_rad: float, turn: float) -> Floats:
+        turned = _turned(self._gait, turn)
+        return np.asarray(turned.joints_rad(self._robot, np.array([phase_rad]))[0])
+
+
+def check_turns(gait: Gait, robot: RobotConfig) -> None:
+    """Refuse a gait that cannot be steered by its turn on this robot.
+
+    Raises:
+        InputError: it is none of those, its turn is given, joints are missing or do not bend so far
+            at the largest turn.
+
+    """
+    if not gait.steers:
+        able = ", ".join(name for name, kind in GAITS.items() if kind.steers)
+        raise InputError(
+            f"gait {gait.name}: not steered along waypoints; those that are: {able}; "
+            f"without waypoints: snakewalk gait run {gait.name}"
+        )
+    if gait.params.turn != 0.0:
+        raise InputError(f"gait {gait.name}: turn is what steers it along waypoints; leave it out")
+    for turn in (-TURN_LIMIT, 0.0, TURN_LIMIT):
+        _turned(gait, turn).check(robot)
+
+
+def _turned(gait: Gait, turn: float) -> Gait:
+    turn = -turn if gait.params.mirror else turn
+    return type(gait)(gait.params.model_copy(update={"turn": turn}))
+
+
+def _rate_beside_turn(gait: Gait, robot: RobotConfig, pace: Pace) -> float:
+    """Share of the gait's rate that leaves the joints room for a change of the turn."""
+    phases = np.linspace(0.0, TURN, CYCLE_SAMPLES)
+    turned = _turned(gait, 1.0).joints_rad(robot, phases) - gait.joints_rad(robot, phases)
+    reach_rad = float(np.abs(turned).max())  # of a joint, for a turn of 1
+    room = Pace.limit(robot)
+    speed = room.speed_rad_s - reach_rad * TURN_RATE_PER_S
+    # a leg's swing is a product with the turn: both rates together count twice
+    spent = reach_rad * _TURN_PER_S2 + 2.0 * TURN_RATE_PER_S * pace.speed_rad_s
+    hard = np.maximum(room.acceleration_rad_s2 - spent, 1e-3)
+    share = np.minimum(
+        speed / np.maximum(pace.speed_rad_s, 1e-9),
+        np.sqrt(hard / np.maximum(pace.acceleration_rad_s2, 1e-9)),
+    )
+    return float(np.clip(share.min(), 0.05, 1.0))
