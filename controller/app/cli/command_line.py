@@ -35,6 +35,7 @@ from snakewalk.controller.app.cli.commands.gait_run import run_gait
 from snakewalk.controller.app.cli.commands.listing import export_robot, list_, show_robot
 from snakewalk.controller.app.cli.commands.logs.compare import compare
 from snakewalk.controller.app.cli.commands.logs.export import export
+from snakewalk.controller.app.cli.commands.logs.identify import identify
 from snakewalk.controller.app.cli.commands.logs.replay import replay
 from snakewalk.controller.app.cli.commands.logs.report import report
 from snakewalk.controller.app.cli.commands.logs.view import view
@@ -156,6 +157,14 @@ app.command(epilog=_examples("report runs/flat-square-walk-seed0/log.mcap"), ric
 app.command(
     epilog=_examples("replay runs/flat-square-walk-seed0/log.mcap --json"), rich_help_panel=_JOB
 )(replay)
+
+app.command(
+    epilog=_examples(
+        "identify kp200.json kp800.json -o xl330.json",
+        "identify kp400.json --start xl330.json --no-fit --json",
+    ),
+    rich_help_panel=_BUS,
+)(identify)
 
 app.command(
     epilog=_examples(

@@ -1,0 +1,159 @@
+"""Constants of a servo fitted to recordings of a pendulum, each with an interval.
+
+The whole recording is computed from its first angle, and no measured angle helps on the way: what
+fits has the servo's motion, not its next sample. Many starts find the basin, steps from the best
+ones its ground; all chance comes from one seed.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+from scipy.stats import t as student
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.app.identification.pendulum_log import PendulumLog
+from snakewalk.controller.app.identification.pendulum_swing import FINE_S, swing_rad
+from snakewalk.controller.app.identification.servo_constants import (
+    CONSTANTS,
+    HIGH,
+    LOW,
+    NAMES,
+    ServoConstants,
+)
+
+STARTS: Final = 24
+HOPS: Final = 60
+_COARSE_S: Final = 2e-3
+_COARSE_TURNS: Final = 25
+_FINE_TURNS: Final = 100
+_SPREAD: Final = 0.4
+"""Of the starts, as a factor's logarithm."""
+_FIRST: Final = 4
+"""Best fits that hops begin from."""
+_OUTLIER_RAD: Final = 0.02
+"""Errors above this count linearly, as in a mean absolute error."""
+_TURN: Final = 1e-3
+"""Of a constant's range: step of the derivatives."""
+_BLOCK_S: Final = 0.5
+"""Errors within this are not independent: they count as one in the intervals (ours)."""
+_COVERAGE: Final = 0.95
+_LEAST_SHARE: Final = 0.01
+"""No constant is known better than mass, arm and supply, which are given to a per cent (ours)."""
+_SLOW_TERMS: Final = ("stribeck_n_m", "by_motor_slow", "by_load_slow")
+
+
+def error_deg(constants: ServoConstants, log: PendulumLog) -> float:
+    """Mean absolute error of the angle over a log, in degrees."""
+    return float(np.degrees(np.abs(swing_rad(constants.values, log) - log.position_rad).mean()))
+
+
+def fit_pendulum(
+    logs: Sequence[PendulumLog],
+    start: ServoConstants | None = None,
+    *,
+    seed: int = 0,
+    starts: int = STARTS,
+    hops: int = HOPS,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+) -> ServoConstants:
+    """Fit all constants to all logs.
+
+    Args:
+        logs: of one servo.
+        start: constants to begin with; by default the middle of what such servos have.
+        seed: of the starts and steps.
+        starts: fits from constants drawn around the start.
+        hops: fits from constants drawn around the best ones.
+        on_progress: takes the number of fits done, and of all.
+
+    """
+    rng = np.random.default_rng(seed)
+    first = np.array([c.start for c in CONSTANTS]) if start is None else start.values
+    width, total = HIGH - LOW, starts + hops + 1
+    pool: list[OptimizeResult] = []
+    for k in range(starts):
+        factor, shift = np.exp(rng.normal(0.0, _SPREAD, len(first))), rng.normal(size=len(first))
+        drawn = first if k == 0 else first * factor + 0.02 * width * shift
+        pool.append(_fit(logs, drawn, _COARSE_S, _COARSE_TURNS))
+        on_progress(k + 1, total)
+    pool.sort(key=lambda fit: float(fit.cost))
+    for k in range(hops):
+        best = pool[rng.integers(min(_FIRST, len(pool)))].x if rng.random() < 0.3 else pool[0].x
+        other = pool[rng.integers(min(2 * _FIRST, len(pool)))].x
+        size = 0.15 * np.maximum(np.abs(best), 0.01 * width) * (rng.random(len(best)) < 0.4)
+        drawn = best + rng.normal(size=len(best)) * size
+        drawn = drawn + (rng.random() < 0.3) * 0.3 * (other - best)
+        pool.append(_fit(logs, drawn, _COARSE_S, _COARSE_TURNS))
+        pool.sort(key=lambda fit: float(fit.cost))
+        on_progress(starts + k + 1, total)
+    values = np.asarray(_fit(logs, pool[0].x, FINE_S, _FINE_TURNS).x)
+    on_progress(total, total)
+    low, high = _intervals(logs, values)
+    return ServoConstants(values, low, high, logs[0].actuator)
+
+
+def _errors(values: Floats, logs: Sequence[PendulumLog], step_s: float) -> Floats:
+    """(M,) errors of all logs, one after the other."""
+    return np.concatenate([swing_rad(values, log, step_s) - log.position_rad for log in logs])
+
+
+def _fit(logs: Sequence[PendulumLog], values: Floats, step_s: float, turns: int) -> OptimizeResult:
+    width = HIGH - LOW
+    inside = np.clip(values, LOW + 1e-6 * width, HIGH - 1e-6 * width)
+    return least_squares(
+        _errors,
+        inside,
+        bounds=(LOW, HIGH),
+        args=(logs, step_s),
+        x_scale=width,
+        diff_step=[_TURN],
+        loss="soft_l1",
+        f_scale=_OUTLIER_RAD,
+        max_nfev=turns,
+    )
+
+
+def _intervals(logs: Sequence[PendulumLog], values: Floats) -> tuple[Floats, Floats]:
+    """Ends of the 95 % intervals, by blocks of errors (a sandwich), within the ranges.
+
+    A model that is wrong leaves errors that last: within a block they count as one, so that the
+    intervals grow with the blocks' sums, not shrink with the number of samples. What the logs do
+    not tell has an interval as wide as its range.
+    """
+    width = HIGH - LOW
+    jacobian = np.stack(
+        [
+            (_errors(values + turn, logs, FINE_S) - _errors(values - turn, logs, FINE_S))
+            / (2.0 * _TURN)
+            for turn in np.diag(_TURN * width)
+        ],
+        axis=1,
+    )  # of each constant in units of its range
+    errors = _errors(values, logs, FINE_S)
+    weight = 1.0 / np.sqrt(1.0 + (errors / _OUTLIER_RAD) ** 2)
+    blocks = np.concatenate(
+        [1000 * k + (log.time_s / _BLOCK_S).astype(int) for k, log in enumerate(logs)]
+    )
+    sums = np.stack(
+        [
+            (jacobian[at] * (weight[at] * errors[at])[:, None]).sum(axis=0)
+            for at in (blocks == block for block in np.unique(blocks))
+        ]
+    )
+    # a prior as wide as the range keeps what the logs do not tell from blowing the rest up
+    curvature = (jacobian * weight[:, None]).T @ jacobian
+    noise = float((weight * errors**2).mean())
+    bread = np.linalg.inv(curvature + noise * np.eye(len(values)))
+    degrees = max(len(sums) - len(values), 1)
+    meat = sums.T @ sums * len(sums) / degrees + noise * np.eye(len(values)) * noise
+    spread = np.sqrt(np.diag(bread @ meat @ bread)) * width
+    reach = float(student.ppf(0.5 + 0.5 * _COVERAGE, degrees)) * spread
+    reach = np.maximum(reach, _LEAST_SHARE * np.abs(values))
+    low, high = np.maximum(values - reach, LOW), np.minimum(values + reach, HIGH)
+    if not low[[NAMES.index(name) for name in _SLOW_TERMS]].any():
+        # whether friction grows when the shaft is slow is open, so how slow is open, too
+        shape = [NAMES.index(name) for name in ("stribeck_rad_s", "stribeck_exponent")]
+        low[shape], high[shape] = LOW[shape], HIGH[shape]
+    return low, high

@@ -1,0 +1,155 @@
+"""What identification finds of a servo, by name, with its BAM name, range and unit; BAM's JSON.
+
+BAM ("Better Actuator Models", Rhoban) writes the constants of a servo with a friction of this form:
+the greatest friction torque is ``dry + |by_load t_load - by_motor t_motor|``, and while the shaft
+is slow ``stribeck + |by_load_slow t_load - by_motor_slow t_motor|`` more, times
+``exp(-(|w| / stribeck_rad_s)^exponent)``; ``viscous w`` beside it. (Duclusaud et al., "Extended
+Friction Models for the Physics Simulation of Servo Actuators", ICRA 2025: models M1 to M5.)
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+
+
+class Constant(NamedTuple):
+    """One constant of a servo."""
+
+    name: str
+    """With its unit."""
+    bam: str
+    """In BAM's files."""
+    low: float
+    high: float
+    """Where it is looked for (ours)."""
+    start: float
+    absent: float
+    """What a file of BAM means that does not have it."""
+
+
+_XL330_P_UNIT: Final = 4096.0 / math.tau / 256.0 / 885.0
+"""Of an encoder of 4096 counts, a divisor of 256 and 885 units of the output (``docs/bus.md``)."""
+CONSTANTS: Final = (
+    Constant("torque_constant_n_m_a", "kt", 0.05, 5.0, 0.4, math.nan),
+    Constant("resistance_ohm", "R", 0.3, 20.0, 4.0, math.nan),
+    Constant("armature_kg_m2", "armature", 1e-5, 0.1, 2e-3, math.nan),
+    Constant("offset_rad", "q_offset", -0.1, 0.1, 0.0, 0.0),
+    Constant("dry_n_m", "friction_base", 0.0, 0.3, 0.01, math.nan),
+    Constant("stribeck_n_m", "friction_stribeck", 0.0, 0.3, 0.005, 0.0),
+    Constant("by_motor", "load_friction_motor", 0.0, 0.6, 0.2, 0.0),
+    Constant("by_load", "load_friction_external", 0.0, 0.6, 0.2, 0.0),
+    Constant("by_motor_slow", "load_friction_motor_stribeck", 0.0, 0.6, 0.05, 0.0),
+    Constant("by_load_slow", "load_friction_external_stribeck", 0.0, 0.6, 0.05, 0.0),
+    Constant("stribeck_rad_s", "dtheta_stribeck", 0.05, 2.0, 0.3, 0.3),
+    Constant("stribeck_exponent", "alpha", 0.8, 6.0, 2.0, 2.0),
+    Constant("viscous_n_m_s", "friction_viscous", 0.0, 0.5, 0.02, math.nan),
+    Constant("p_unit_per_rad", "error_gain", 5e-4, 2e-2, 3e-3, _XL330_P_UNIT),
+    Constant("delay_s", "command_delay", 0.0, 0.04, 0.004, 0.0),
+)
+"""``p_unit_per_rad`` is the share of the supply that a radian of error gets for each unit of the P
+gain; ``offset_rad`` and ``delay_s`` are the bench's: of its zero, and until a goal takes effect."""
+NAMES: Final = tuple(constant.name for constant in CONSTANTS)
+LOW: Final = np.array([constant.low for constant in CONSTANTS])
+HIGH: Final = np.array([constant.high for constant in CONSTANTS])
+_FORMS: Final = ("m1", "m2", "m3", "m4", "m5")
+_BOTH_SIDES: Final = {
+    "load_friction_base": ("load_friction_motor", "load_friction_external"),
+    "load_friction_stribeck": (
+        "load_friction_motor_stribeck",
+        "load_friction_external_stribeck",
+    ),
+}
+"""Of BAM's models M3 and M4, which do not ask from which side a torque comes."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServoConstants:
+    """Values of ``CONSTANTS``, and how far they may be off."""
+
+    values: Floats
+    """(15,) in the order of ``CONSTANTS``."""
+    low: Floats
+    high: Floats
+    """(15,) ends of the 95 % intervals; NaN where nobody has worked them out."""
+    actuator: str
+    """BAM's name of the servo: ``xl330``, ``mx64``, ..."""
+
+    def __getitem__(self, name: str) -> float:
+        """Value of a constant."""
+        return float(self.values[NAMES.index(name)])
+
+
+def bam_text(constants: ServoConstants) -> str:
+    """JSON as BAM writes it (model M5); the intervals stand beside, where BAM does not look."""
+    data: dict[str, object] = {
+        c.bam: float(v) for c, v in zip(CONSTANTS, constants.values, strict=True)
+    }
+    data |= {"model": "m5", "actuator": constants.actuator}
+    if np.isfinite(constants.low).all():
+        data["interval_95"] = {
+            c.bam: [float(low), float(high)]
+            for c, low, high in zip(CONSTANTS, constants.low, constants.high, strict=True)
+        }
+    return json.dumps(data, indent=2) + "\n"
+
+
+def read_bam(path: Path) -> ServoConstants:
+    """Read a file of BAM's constants, models M1 to M5.
+
+    BAM knows the unit of the P gain by the servo's name: of a file without ``error_gain`` it is
+    that of the XL330.
+
+    Raises:
+        InputError: it is no such file, or needs a term that is not modelled here.
+
+    """
+    data = read_json(path)
+    if data.get("model") not in _FORMS:
+        raise InputError(
+            f"{path}: model is {data.get('model')!r}; expected one of {', '.join(_FORMS)}"
+        )
+    for shared, sides in _BOTH_SIDES.items():
+        if shared in data:
+            data = dict.fromkeys(sides, data[shared]) | data
+    values = np.empty(len(CONSTANTS))
+    faults = []
+    for k, constant in enumerate(CONSTANTS):
+        value = data.get(constant.bam, constant.absent)
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not math.isfinite(value)
+        ):
+            faults.append(f"{path}: {constant.bam}: expected a number, found {value}")
+        else:
+            values[k] = value
+    if faults:
+        raise InputError(faults)
+    unknown = np.full(len(CONSTANTS), np.nan)
+    return ServoConstants(values, unknown, unknown, str(data.get("actuator", "")))
+
+
+def read_json(path: Path) -> dict[str, object]:
+    """Read a JSON object.
+
+    Raises:
+        InputError: the file is not there, or holds something else.
+
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except (ValueError, RecursionError):
+        raise InputError(f"{path}: is not JSON") from None
+    if not isinstance(data, Mapping):
+        raise InputError(f"{path}: expected a JSON object")
+    return dict(data)

@@ -1,0 +1,89 @@
+"""``snakewalk identify``: BAM's files in and out, and what it refuses."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.command_line import app
+from tests.controller.app.identification.conftest import PLANTED
+
+BAM = {
+    "kt": PLANTED["torque_constant_n_m_a"],
+    "R": PLANTED["resistance_ohm"],
+    "armature": PLANTED["armature_kg_m2"],
+    "friction_base": PLANTED["dry_n_m"],
+    "friction_stribeck": PLANTED["stribeck_n_m"],
+    "dtheta_stribeck": PLANTED["stribeck_rad_s"],
+    "alpha": 2.0,
+    "friction_viscous": PLANTED["viscous_n_m_s"],
+    "error_gain": PLANTED["p_unit_per_rad"],
+    "command_delay": 0.003,
+    "model": "m2",
+    "actuator": "xl330",
+}
+
+
+def run(*words: str | Path) -> str:
+    done = CliRunner().invoke(app, ["identify", *map(str, words)], catch_exceptions=False)
+    return done.output
+
+
+def refused(*words: str | Path) -> str:
+    done = CliRunner().invoke(app, ["identify", *map(str, words)])
+    assert isinstance(done.exception, InputError), done.output
+    return str(done.exception)
+
+
+def test_constants_are_judged_and_written(files: list[Path], tmp_path: Path) -> None:
+    start, out = tmp_path / "bam.json", tmp_path / "out.json"
+    start.write_text(json.dumps(BAM))
+    words = (*files[:2], "--judge", files[2], "--start", start, "--no-fit", "-o", out)
+    told = json.loads(run(*words, "--json"))
+    assert told["mean_error_deg"] < 0.1
+    assert set(told["errors_deg"]) == set(map(str, files))
+    assert told["fitted"] == []
+    written = json.loads(out.read_text())
+    assert {key: written[key] for key in BAM if key != "model"} == {
+        key: value for key, value in BAM.items() if key != "model"
+    }
+    assert written["model"] == "m5"
+    assert written["load_friction_motor"] == 0.0
+    again = json.loads(run(*files, "--start", out, "--no-fit", "--json"))
+    assert again["constants"] == told["constants"]
+    assert "out.json: exists; --force" in refused(*words)
+
+
+def test_models_that_do_not_ask_for_the_side(files: list[Path], tmp_path: Path) -> None:
+    start = tmp_path / "m3.json"
+    start.write_text(json.dumps(BAM | {"model": "m3", "load_friction_base": 0.3}))
+    told = json.loads(run(files[0], "--start", start, "--no-fit", "--json"))
+    assert told["constants"]["by_motor"] == told["constants"]["by_load"] == 0.3
+
+
+def test_what_is_refused(files: list[Path], tmp_path: Path) -> None:
+    bad = tmp_path / "bad.json"
+    bad.write_text("{")
+    assert "bad.json: is not JSON" in refused(bad)
+    bad.write_text('{"kp": 200, "entries": []}')
+    assert "mass: is missing" in refused(bad)
+    bad.write_text(json.dumps({"mass": 1, "length": 1, "kp": 1, "entries": [{"position": 1}]}))
+    assert "is no log of a pendulum" in refused(bad)
+    bad.write_text(json.dumps(BAM | {"model": "m6"}))
+    assert "model is 'm6'" in refused(files[0], "--start", bad)
+    bad.write_text(json.dumps(BAM | {"kt": "much"}))
+    assert "kt: expected a number, found much" in refused(files[0], "--start", bad)
+    assert "give them with --start" in refused(files[0], "--no-fit")
+    other = json.loads(files[1].read_text()) | {"motor": "mx64"}
+    bad.write_text(json.dumps(other))
+    assert "several servos: mx64, xl330" in refused(files[0], bad)
+    assert "no/such.json: No such file" in refused("no/such.json")
+
+
+@pytest.mark.parametrize("line", ["resistance ohm", "mean"])
+def test_a_person_reads_a_table(files: list[Path], tmp_path: Path, line: str) -> None:
+    start = tmp_path / "bam.json"
+    start.write_text(json.dumps(BAM))
+    assert line in run(files[0], "--start", start, "--no-fit")

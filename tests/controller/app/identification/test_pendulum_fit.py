@@ -1,0 +1,72 @@
+"""Constants that were planted in another simulation come back inside their intervals."""
+
+import numpy as np
+import pytest
+
+from snakewalk.controller.app.identification.pendulum_fit import error_deg, fit_pendulum
+from snakewalk.controller.app.identification.pendulum_log import PendulumLog
+from snakewalk.controller.app.identification.pendulum_swing import _swing, swing_rad
+from snakewalk.controller.app.identification.servo_constants import (
+    CONSTANTS,
+    HIGH,
+    LOW,
+    NAMES,
+    ServoConstants,
+)
+from tests.controller.app.identification.conftest import PLANTED, TICK_RAD
+
+
+@pytest.fixture(scope="module")
+def found(logs: list[PendulumLog]) -> ServoConstants:
+    return fit_pendulum(logs, starts=6, hops=4)
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_a_planted_constant_comes_back(found: ServoConstants, name: str) -> None:
+    k = NAMES.index(name)
+    assert found.low[k] <= PLANTED[name] <= found.high[k]
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["torque_constant_n_m_a", "resistance_ohm", "armature_kg_m2", "viscous_n_m_s", "dry_n_m"],
+)
+def test_what_the_logs_tell_is_told_narrowly(found: ServoConstants, name: str) -> None:
+    k = NAMES.index(name)
+    assert found.values[k] == pytest.approx(PLANTED[name], rel=0.03)
+    assert found.high[k] - found.low[k] < 0.1 * PLANTED[name]
+
+
+def test_what_is_left_is_the_encoder(found: ServoConstants, logs: list[PendulumLog]) -> None:
+    # rounding to a tick is off by a quarter of it on average
+    for log in logs:
+        assert error_deg(found, log) < 1.5 * np.degrees(TICK_RAD) / 4.0
+
+
+def test_a_log_that_tells_little_has_wide_intervals(logs: list[PendulumLog]) -> None:
+    found = fit_pendulum(logs[2:], starts=2, hops=0)  # one gain, never let go
+    width = (found.high - found.low) / (HIGH - LOW)
+    assert width[NAMES.index("stribeck_exponent")] == 1.0
+    resistance = NAMES.index("resistance_ohm")
+    assert found.high[resistance] - found.low[resistance] > 0.1 * PLANTED["resistance_ohm"]
+
+
+def test_a_free_pendulum_swings_at_its_frequency(logs: list[PendulumLog]) -> None:
+    log = logs[0]
+    values = np.array([c.start for c in CONSTANTS])
+    for name in ("dry_n_m", "stribeck_n_m", "by_motor", "by_load", "viscous_n_m_s"):
+        values[NAMES.index(name)] = 0.0
+    for name in ("by_motor_slow", "by_load_slow", "armature_kg_m2"):
+        values[NAMES.index(name)] = 0.0
+    position = np.full(len(log.time_s), 0.01)
+    free = PendulumLog(
+        *(log.path, "", 0.5, 0.1, 400.0, log.time_s, log.goal_rad, position, log.supply_v),
+        np.zeros(len(log.time_s)),
+    )
+    angle = swing_rad(values, free)
+    expected = 0.01 * np.cos(np.sqrt(9.80665 / 0.1) * log.time_s)
+    np.testing.assert_allclose(angle, expected, atol=1e-4)
+    out = np.empty(50)
+    rows = (free.time_s[:50], free.goal_rad[:50], free.supply_v[:50], free.torque_on[:50])
+    _swing.py_func(values, *rows, 0.01, 0.5, 0.1, 400.0, 1e-3, out)
+    np.testing.assert_allclose(out, angle[:50], rtol=1e-12)
