@@ -235,7 +235,7 @@ def test_a_port_vanishes_and_comes_back() -> None:
         ("[[fault]]\nkind = 'drop'\nchance = 2.0", "chance"),
         ("[[fault]]\nkind = 'drop'\nby_s = 2.0", "has no 'by_s'"),
         ("[[fault]]\nkind = 'mute'", "ids: is required"),
-        ("[[fault]]\nkind = 'mute'\nids = [253]", "less than or equal to 252"),
+        ("[[fault]]\nkind = 'mute'\nids = [253]", "must be at most 252 \\(got 253\\)"),
         ("sed = 1", "sed: unknown key"),
         ("[[fault", "not TOML"),
     ],
