@@ -36,7 +36,11 @@ WRITERS = {
 }
 EXPORTS = {"write_csv", "write_parquet", "write_ros_bag", "write_foxglove_scene"}
 """Writers themselves, as `save` is: their callers are examined."""
-STREAMS = {"bus.py": "a recording of the line grows", "table.py": "a table grows by rows"}
+STREAMS = {
+    "bus.py": "a recording of the line grows",
+    "table.py": "a table grows by rows",
+    "live_page.py": "what viser prints goes to the null device",
+}
 """Files that grow, each row whole, in place of being written at once."""
 
 

@@ -102,10 +102,11 @@ def test_workers_are_started_in_one_place_and_every_process_is_spawned() -> None
     names = ("multiprocessing", "ProcessPoolExecutor", "os.fork")
     texts = {p.relative_to(root).as_posix(): p.read_text() for p in sources}
     starters = {p: text for p, text in texts.items() if any(name in text for name in names)}
-    drawing = "controller/app/cli/live_table.py"  # no worker: it draws what it is sent
-    assert set(starters) == {"controller/app/studies/pool.py", drawing}
-    assert starters[drawing].count("get_context(") == starters[drawing].count(
-        'get_context("spawn")'
-    )
+    # no workers: they draw what they are sent
+    drawing = {"controller/app/cli/live_table.py", "controller/app/view/live_view.py"}
+    assert set(starters) == {"controller/app/studies/pool.py", *drawing}
+    for each in drawing:
+        contexts = starters[each].count("get_context(")
+        assert contexts == starters[each].count('get_context("spawn")')
     with process_pool(1) as pool:
         assert pool._mp_context.get_start_method() == "spawn"
