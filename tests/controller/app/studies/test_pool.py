@@ -105,8 +105,8 @@ def test_workers_are_started_in_one_place_and_every_process_is_spawned() -> None
     # no workers: they draw what they are sent
     drawing = {"controller/app/cli/live_table.py", "controller/app/view/live_view.py"}
     assert set(starters) == {"controller/app/studies/pool.py", *drawing}
-    for each in drawing:
-        contexts = starters[each].count("get_context(")
-        assert contexts == starters[each].count('get_context("spawn")')
+    for drawer in drawing:
+        contexts = starters[drawer].count("get_context(")
+        assert contexts == starters[drawer].count('get_context("spawn")')
     with process_pool(1) as pool:
         assert pool._mp_context.get_start_method() == "spawn"
