@@ -4,6 +4,11 @@ from pathlib import Path
 
 import pytest
 from dynamixel_sdk import PortHandler
+from hypothesis import settings
+
+# no test asserts wall-clock times: hypothesis would, at 200 ms an example
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session")

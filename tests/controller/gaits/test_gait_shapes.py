@@ -94,7 +94,7 @@ def test_shipped_sets_suit_the_robots_that_they_name(name: str) -> None:
     make_gait(known.gait, known.parameters).check(load_robot(known.robot))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     winding=st.floats(0.1, 1.0),
     waves=st.floats(0.75, 2.0),

@@ -28,7 +28,7 @@ def at(pose: BodyPose, phase_rad: float, last: Frame | None = None) -> Frame:
     return chassis_at(pose, GAIT.joints_rad(ROBOT, np.array([phase_rad]))[0], last)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(turn=st.tuples(angles, angles, angles), shift=st.tuples(angles, angles, angles), p=angles)
 def test_the_chassis_moves_with_the_body_and_the_body_looks_the_same_from_it(
     turn: tuple[float, float, float], shift: tuple[float, float, float], p: float

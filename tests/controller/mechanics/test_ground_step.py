@@ -30,7 +30,7 @@ def slope(angle_rad: float) -> HeightField:
     return HeightField(np.tile(np.tan(angle_rad) * x, (11, 1)), 1.0, -5.0, -5.0)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.integers(0, 10_000),
     st.floats(0.0, 0.15),
@@ -171,7 +171,7 @@ def test_a_bridged_trench_is_as_deep_as_the_ball_sinks_in(radius_m: float) -> No
     np.testing.assert_allclose(found.elevation_m(np.array([-0.3, 0.3]), np.zeros(2)), 0.0)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000), st.floats(0.05, 0.3))
 def test_bridging_never_digs_and_bridges_nothing_twice(seed: int, radius_m: float) -> None:
     ground = rough(seed, 0.05)

@@ -69,7 +69,7 @@ def test_no_load_changes_no_bit(windows: int | None, deadband_a: float) -> None:
 
 
 @given(currents)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_it_is_passive(load_a: list[float]) -> None:
     """What the load has put in is never less than what the spring holds, so none comes from it."""
     one, before = Compliance(FREE, ROBOT), np.zeros(J)
@@ -82,7 +82,7 @@ def test_it_is_passive(load_a: list[float]) -> None:
 
 
 @given(currents, st.floats(-1.2, 1.2))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_goals_keep_range_rate_and_greatest_yield(load_a: list[float], goal_rad: float) -> None:
     config = ComplianceConfig(joints="all", stiffness_a_rad=0.1, damping_a_s_rad=0.1)
     one, goal, before = Compliance(config, ROBOT), np.full(J, goal_rad), np.zeros(J)

@@ -208,7 +208,7 @@ def test_all_pairs_of_sources_join_within_the_limits(name: str) -> None:
         assert duration_s < 5.0, (first, second)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_chains_of_joins_at_any_time_stay_within_the_limits(data: st.DataObject) -> None:
     name = data.draw(st.sampled_from(sorted(ROBOTS)))
@@ -227,7 +227,7 @@ def test_chains_of_joins_at_any_time_stay_within_the_limits(data: st.DataObject)
     assert acceleration < STEP_TOLERANCE
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_jumps_of_a_gaits_parameters_become_smooth(data: st.DataObject) -> None:
     robot = ROBOTS["alternating16"]

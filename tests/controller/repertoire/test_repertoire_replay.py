@@ -55,7 +55,7 @@ def recorded(seed: int) -> tuple[Segment, list[Frame], Floats]:
 
 
 @given(seed=st.integers(0, 1000), scale=st.floats(0.2, 5.0))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_replay_from_any_pose_is_the_recording_moved_there(seed: int, scale: float) -> None:
     segment, frames, links = recorded(seed)
     random = np.random.default_rng(seed + 1)
@@ -134,7 +134,7 @@ def test_without_scaling_the_way_a_larger_body_makes_too_few_body_lengths() -> N
 
 
 @given(way=st.floats(0.0, 3.0), largest=st.floats(0.01, 1.0))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_no_step_of_a_bridge_is_over_the_largest_and_one_frame_less_would_be(
     way: float, largest: float
 ) -> None:

@@ -65,7 +65,7 @@ def test_near_a_limit_it_slows_down_and_names_joint_value_and_limit(
     assert now.reason == reason
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     a=st.floats(20.0, 90.0), b=st.floats(20.0, 90.0),
     u=st.floats(0.0, 3.0), v=st.floats(0.0, 3.0),

@@ -125,7 +125,7 @@ def test_the_drift_is_what_the_body_does_beside_the_prediction() -> None:
     assert steering.drift.ahead_m == pytest.approx(0.0, abs=0.1 * left_m)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 10_000), before=st.integers(1, 25))
 def test_the_serpenoid_takes_over_without_a_jump_and_hands_back(seed: int, before: int) -> None:
     chooser = walker(seed)

@@ -76,7 +76,7 @@ def test_at_any_speed_every_point_stays_on_the_head_s_way() -> None:
         assert off.max() < 0.25 * R
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(0, 1), st.floats(0, 0.3), st.integers(0, 99))
 def test_segments_keep_their_length_and_steps_are_the_speed(
     sliding: float, pulse: float, seed: int

@@ -126,7 +126,7 @@ def test_replies_are_kept_apart(servos: Servos) -> None:
 
 @both_kinds
 @both_calls
-@settings(deadline=None, max_examples=30)  # waits for another thread
+@settings(max_examples=30)  # waits for another thread
 @given(st.data())
 def test_what_is_not_as_expected_is_handed_back(
     is_fast: bool, with_goals: bool, draw: st.DataObject

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from snakewalk.config.robot import JointConfig, RobotConfig
@@ -23,7 +23,6 @@ large = st.integers(-(2**31), 2**31 - 1)
     "loop", [decode_state, decode_state.py_func], ids=["compiled", "interpreted"]
 )
 @pytest.mark.parametrize("model", MODELS)
-@settings(deadline=None)  # interpreted loops are slow
 @given(
     sign=st.sampled_from([1, -1]),
     raw=st.lists(st.tuples(small, large, large), min_size=1, max_size=5),

@@ -146,7 +146,7 @@ def test_a_damaged_instruction_is_not_heard() -> None:
     errors=st.lists(st.sampled_from([0, 0x20]), min_size=3, max_size=3),
     goals=st.lists(st.integers(-20, 4_200), min_size=3, max_size=3),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_group_path_says_what_the_general_one_says(
     ticks: list[int], code: int, block: tuple[int, int], errors: list[int], goals: list[int]
 ) -> None:

@@ -29,7 +29,7 @@ def test_columns_are_unique() -> None:
     assert len(set(COLUMNS)) == len(COLUMNS)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(finished=st.integers(0, 6), torn=st.integers(0, 400))
 def test_cut_off_anywhere_it_goes_on_where_it_was(
     tmp_path_factory: pytest.TempPathFactory, finished: int, torn: int

@@ -135,7 +135,7 @@ def test_dead_ends_are_avoided_while_there_is_another_way() -> None:
     assert made.forced == 0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_every_join_is_within_one_class_and_seeds_repeat(seed: int) -> None:
     stock = piece_graph(TRUTH, segment_motion(TRUTH))

@@ -62,7 +62,7 @@ def test_an_odd_number_cuts_the_corner_of_a_v(n: int) -> None:
     assert equipartition(V, n).chord == pytest.approx(chord)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.integers(0, 2**32 - 1),
     st.sampled_from([2, 3, 5, 8, 20, 100, 257]),
@@ -87,7 +87,7 @@ def test_chords_are_equal_and_on_the_curve_in_order(
     assert on_curve(curve, found.points) < 1e-6
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(1, 1000))
 def test_every_number_of_chords_divides_a_bent_body(n: int) -> None:
     s = np.linspace(0.0, 1.0, 400)
