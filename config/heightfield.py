@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.archive import read_arrays
-from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
 
 MOST_SAMPLES: Final = 4_000_000
@@ -88,6 +88,20 @@ class HeightField:
         first, second = third - z00, z11 - third
         gx, gy = np.where(lower, first, second), np.where(lower, second, first)
         return z00 + gx * fu + gy * fv, gx / self.spacing_m, gy / self.spacing_m
+
+
+def surface(field: HeightField) -> tuple[Floats, Ints]:
+    """Corners (n, 3), in m, and triangles (k, 3), by numbers of corners, of a field's surface."""
+    rows, columns = field.z_m.shape
+    x, y = np.meshgrid(
+        field.x0_m + field.spacing_m * np.arange(columns),
+        field.y0_m + field.spacing_m * np.arange(rows),
+    )
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    lower = np.stack([corner, corner + 1, corner + columns + 1], axis=1)
+    upper = np.stack([corner, corner + columns + 1, corner + columns], axis=1)
+    corners_m = np.stack([x.ravel(), y.ravel(), field.z_m.ravel()], axis=1)
+    return corners_m, np.concatenate([lower, upper])
 
 
 def write_map(file: Path, ground: HeightField) -> None:

@@ -51,6 +51,42 @@ def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -
     return float(np.arctan2(carrot[1] - from_m[1], carrot[0] - from_m[0]))
 
 
+class OnCourse:
+    """What a motion along a course tells of it: part of ``PathProgress``."""
+
+    def __init__(self, course: "Course") -> None:
+        self._course = course
+
+    @property
+    def path(self) -> SplinePath:
+        """The path in force."""
+        return self._course.path
+
+    @property
+    def reached(self) -> int:
+        """Number of waypoints reached."""
+        return self._course.reached
+
+    @property
+    def missed(self) -> int:
+        """How often another path was laid to a waypoint."""
+        return self._course.missed
+
+    @property
+    def replanned(self) -> str | None:
+        """Why another path was laid in the last step, if one was."""
+        return self._course.replanned
+
+    @property
+    def along_m(self) -> float:
+        """Arc length of the path point nearest to the body's centre."""
+        return self._course.along_m
+
+    def path_m(self, count: int) -> Floats:
+        """(count, 2) points along the path in force."""
+        return self._course.path_m(count)
+
+
 class Course:
     """Waypoints in order, and the path to those that are left."""
 

@@ -23,7 +23,7 @@ from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.angle_track import AngleTrack
-from snakewalk.controller.walk.course import Course, aim_rad
+from snakewalk.controller.walk.course import Course, OnCourse, aim_rad
 from snakewalk.controller.walk.steering import PathPose
 from snakewalk.controller.walk.time_law import TimeLaw
 
@@ -82,7 +82,7 @@ class Aimed:
         return self._chooser.decide(pose.offset_rad, pose.aim_rad)
 
 
-class Pilot:
+class Pilot(OnCourse):
     """Steers a chooser of shapes along a path through waypoints.
 
     The time law keeps the joints within the robot's limits.
@@ -112,7 +112,7 @@ class Pilot:
         self._goal_rad = time_law.goal_rad()
         self._last_rad = self._earlier_rad = self._goal_rad
         self._last_s = self._earlier_s = self._saved_s = 0.0
-        self._course = course
+        super().__init__(course)
         self._pitch_fitter = pitch_fitter
         self._fall_back = fall_back or (lambda lost: None)
         self._pitch_rad: Floats | None = None
@@ -130,26 +130,6 @@ class Pilot:
         """Made in the last step, if one was."""
 
     @property
-    def path(self) -> SplinePath:
-        """The path in force."""
-        return self._course.path
-
-    @property
-    def reached(self) -> int:
-        """Number of waypoints reached."""
-        return self._course.reached
-
-    @property
-    def missed(self) -> int:
-        """How often another path was laid to a waypoint."""
-        return self._course.missed
-
-    @property
-    def replanned(self) -> str | None:
-        """Why another path was laid in the last step, if one was."""
-        return self._course.replanned
-
-    @property
     def done(self) -> bool:
         """Whether every waypoint has been reached and the shape has come to rest."""
         return self._course.complete and self._time_law.speed_segments_s == 0.0
@@ -160,18 +140,9 @@ class Pilot:
         return self._time_law.head
 
     @property
-    def along_m(self) -> float:
-        """Arc length of the path point nearest to the body's centre."""
-        return self._course.along_m
-
-    @property
     def pulse_m_s(self) -> float:
         """TimeLaw speed u: how fast the shape travels along the body."""
         return self._time_law.speed_segments_s * self._segment_m
-
-    def path_m(self, count: int) -> Floats:
-        """(count, 2) points along the path in force."""
-        return self._course.path_m(count)
 
     def goal_rad(self) -> Floats:
         """(J,) joint targets now; before the first step, of the initial shape."""

@@ -19,7 +19,7 @@ from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.rate_limiter import RateLimiter
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.motion.stop_profile import StopProfile
-from snakewalk.controller.walk.course import Course, aim_rad
+from snakewalk.controller.walk.course import Course, OnCourse, aim_rad
 
 TURN_LIMIT = 1.4
 """Of the gait's turn (ours): with it a trot turns on an arc of 0.4 m."""
@@ -32,7 +32,7 @@ CYCLES_PER_BODY = 4.0
 """Cycles that go by while a body goes its length: a trot makes 0.24 to 0.42 lengths a cycle."""
 
 
-class SteeredGait:
+class SteeredGait(OnCourse):
     """A ``MotionSource`` with ``PathProgress``: it comes to rest when all waypoints are reached."""
 
     pulse_m_s = 0.0
@@ -52,7 +52,8 @@ class SteeredGait:
 
         """
         check_turns(gait, robot)
-        self._gait, self._robot, self._course, self._carrot_m = gait, robot, course, carrot_m
+        super().__init__(course)
+        self._gait, self._robot, self._carrot_m = gait, robot, carrot_m
         cycle = GaitCycle(gait, robot)
         self._rate_rad_s = cycle.rate_rad_s * _rate_beside_turn(gait, robot, cycle.pace())
         self._turn = RateLimiter(np.zeros(1), TURN_RATE_PER_S, _TURN_PER_S2)
@@ -71,26 +72,6 @@ class SteeredGait:
         return self._stop_profile.over
 
     @property
-    def reached(self) -> int:
-        """Number of waypoints reached."""
-        return self._course.reached
-
-    @property
-    def missed(self) -> int:
-        """How often another path was laid."""
-        return self._course.missed
-
-    @property
-    def replanned(self) -> str | None:
-        """Why another path was laid in the last step, if one was."""
-        return self._course.replanned
-
-    @property
-    def along_m(self) -> float:
-        """Arc length of the path point nearest to the body's centre."""
-        return self._course.along_m
-
-    @property
     def turn(self) -> float:
         """The gait's turn now."""
         return float(self._turn.angle_rad[0])
@@ -99,10 +80,6 @@ class SteeredGait:
     def frequency_hz(self) -> float:
         """Cycles a second at full rate: as asked, or what the joints can follow while it turns."""
         return float(self._rate_rad_s / TURN)
-
-    def path_m(self, count: int) -> Floats:
-        """(count, 2) points along the path in force."""
-        return self._course.path_m(count)
 
     def begin(self, view: BodyView) -> Floats:
         """(J,) where the gait begins: the ground is flat."""

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from snakewalk.config.heightfield import HeightField
+from snakewalk.config.heightfield import HeightField, surface
 
 RNG = np.random.default_rng(3)
 
@@ -40,3 +40,17 @@ def test_points_outside_are_told_and_clamped() -> None:
 def test_what_is_no_surface_is_refused(bad: np.ndarray) -> None:
     with pytest.raises(ValueError, match="finite"):
         HeightField(bad, 1.0, 0.0, 0.0)
+
+
+def test_the_surface_is_what_the_elevation_says_inside_each_triangle_too() -> None:
+    field = HeightField(RNG.normal(size=(5, 7)), 0.2, -1.0, 0.5)
+    corners_m, faces = surface(field)
+    assert corners_m.shape == (35, 3)
+    assert len(faces) == 2 * 4 * 6
+    inside_m = corners_m[faces].mean(axis=1)
+    np.testing.assert_allclose(
+        field.elevation_m(inside_m[:, 0], inside_m[:, 1]), inside_m[:, 2], atol=1e-12
+    )
+    one, other = (corners_m[faces[:, k], :2] - corners_m[faces[:, 0], :2] for k in (1, 2))
+    area_m2 = 0.5 * (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
+    np.testing.assert_allclose(area_m2, 0.02)

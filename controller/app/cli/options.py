@@ -64,6 +64,21 @@ TrackFile = Annotated[
     str | None, typer.Option("--track", help="shipped recording, or a file of midlines or angles")
 ]
 
+Rate = Annotated[
+    float | None, typer.Option(help="frames a second of the files, instead of what they say")
+]
+MinScore = Annotated[
+    float | None,
+    typer.Option(help="keypoints scoring less are missing; default 0, of DeepLabCut 0.6"),
+]
+Individual = Annotated[
+    str | None, typer.Option(help="of a file of several animals: the one that is taken")
+]
+Keypoints = Annotated[
+    str | None,
+    typer.Option(help="A,B,C: names along the midline, head first; default: all, as listed"),
+]
+Plane = Annotated[str | None, typer.Option(help="of markers in space: xy (default), xz or yz")]
 Set = Annotated[
     list[str] | None,
     typer.Option(

@@ -14,7 +14,7 @@ import numpy as np
 from mcap.writer import Writer
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.heightfield import HeightField
+from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.controller.app.exports.body_frames import WORLD, body_frames, joint_names
 from snakewalk.controller.app.exports.foxglove_schema import SCHEMAS
 from snakewalk.controller.runlog.encode import encode, floats, number
@@ -163,23 +163,16 @@ def _body(record: RunRecord) -> Iterator[Json]:
 def _ground(record: RunRecord) -> Json:
     """The ground's triangles, the same as those of the physics, coloured by height."""
     field = _drawn_ground(record)
-    rows, columns = field.z_m.shape
-    x, y = np.meshgrid(
-        field.x0_m + field.spacing_m * np.arange(columns),
-        field.y0_m + field.spacing_m * np.arange(rows),
-    )
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    lower = np.stack([corner, corner + 1, corner + columns + 1], axis=1)
-    upper = np.stack([corner, corner + columns + 1, corner + columns], axis=1)
-    height = field.z_m.ravel()
+    corners_m, faces = surface(field)
+    height = corners_m[:, 2]
     share = (height - height.min()) / max(float(np.ptp(height)), 1e-9)
     low, high = np.array(_GROUND)
     triangles = {
         "pose": _pose([0.0, 0.0, 0.0], _UPRIGHT),
-        "points": _points(np.stack([x.ravel(), y.ravel(), height], axis=1)),
+        "points": _points(corners_m),
         "color": _color(_GROUND[1]),
         "colors": [_color(one) for one in floats(low + share[:, None] * (high - low))],
-        "indices": np.concatenate([lower, upper]).ravel().tolist(),
+        "indices": faces.ravel().tolist(),
     }
     return _entity("ground", 0.0, triangles=[triangles])
 

@@ -16,6 +16,8 @@ from snakewalk.controller.kinematics.links import mean_heading_rad
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
+from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.terrain.planner import TerrainPlanner
 
 
 class PreparedRun(Protocol):
@@ -81,24 +83,50 @@ def plan_without_path(run: RunConfig) -> PlanSummary:
 
 
 @dataclass(frozen=True)
-class PathlessRun:
-    """Base of prepared runs without a path."""
+class GroundedRun:
+    """Base of prepared runs: what is configured, and the ground of it."""
 
     run: RunConfig
     robot: RobotConfig
     world: WorldConfig
-
-    @property
-    def gain(self) -> float:
-        """NaN: without a path no speed is predicted."""
-        return float("nan")
 
     @cached_property
     def ground(self) -> HeightField | None:
         """The world's height field; None on a flat floor."""
         return build_ground(self.world)
 
+
+@dataclass(frozen=True)
+class PathlessRun(GroundedRun):
+    """Base of prepared runs without a path."""
+
+    @property
+    def gain(self) -> float:
+        """NaN: without a path no speed is predicted."""
+        return float("nan")
+
     @property
     def start_heading_rad(self) -> float:
         """Mean heading of the body at the start."""
         return self.run.start_heading_rad or 0.0
+
+
+@dataclass(frozen=True)
+class PathRun(GroundedRun):
+    """Base of prepared runs along a path that is planned through waypoints."""
+
+    @cached_property
+    def planner(self) -> TerrainPlanner:
+        """Plans paths over safe ground."""
+        return TerrainPlanner(self.ground, self.world.planner)
+
+    @cached_property
+    def path(self) -> SplinePath:
+        """Through the start and the waypoints."""
+        return self.planner.plan(np.vstack([self.run.start_m, self.run.waypoints_m]))
+
+    @property
+    def start_heading_rad(self) -> float:
+        """Mean heading of the body at the start."""
+        given = self.run.start_heading_rad
+        return self.path.heading_rad(0.05) if given is None else given

@@ -1,40 +1,22 @@
 """A run of a gait along waypoints: its path, its checks and its motion."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.runs.gait_run import GaitRun
+from snakewalk.controller.app.runs.prepared_run import PathRun
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.record import PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
-from snakewalk.controller.terrain.path import SplinePath
-from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.walk.course import Course
 from snakewalk.controller.walk.steered_gait import CYCLES_PER_BODY, SteeredGait, check_turns
 
 
 @dataclass(frozen=True)
-class SteeredRun(GaitRun):
+class SteeredRun(PathRun, GaitRun):
     """A ``PreparedRun`` of a gait that is steered along a path; flat floors only."""
-
-    @cached_property
-    def planner(self) -> TerrainPlanner:
-        """Plans paths."""
-        return TerrainPlanner(self.ground, self.world.planner)
-
-    @cached_property
-    def path(self) -> SplinePath:
-        """Through the start and the waypoints."""
-        return self.planner.plan(np.vstack([self.run.start_m, self.run.waypoints_m]))
-
-    @property
-    def start_heading_rad(self) -> float:
-        """Mean heading of the body at the start."""
-        given = self.run.start_heading_rad
-        return self.path.heading_rad(0.05) if given is None else given
 
     def check_plan(self) -> PlanSummary:
         """Check that the gait can be steered, and within the joints' ranges; lay the path.

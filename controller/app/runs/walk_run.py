@@ -8,12 +8,8 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
-from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import RunConfig
-from snakewalk.config.world import WorldConfig
-from snakewalk.controller.app.runs.prepared_run import pose_with
+from snakewalk.controller.app.runs.prepared_run import PathRun, pose_with
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.kinematics.roll_compensation import RollCompensation
@@ -26,8 +22,6 @@ from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.runtime.forecast import Forecast, forecast, margin_faults
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
-from snakewalk.controller.terrain.path import SplinePath
-from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.walk.course import Course
 from snakewalk.controller.walk.joint_track import JointTrack
 from snakewalk.controller.walk.pilot import Aimed, Pilot, ShapeChooser
@@ -45,17 +39,8 @@ in 41 s with 4, in 49 s with 1, by one of eight bodies not with 0."""
 
 
 @dataclass(frozen=True)
-class WalkRun:
+class WalkRun(PathRun):
     """A ``PreparedRun`` of the snake walk, or of the serpenoid, along a path."""
-
-    run: RunConfig
-    robot: RobotConfig
-    world: WorldConfig
-
-    @cached_property
-    def ground(self) -> HeightField | None:
-        """The world's height field; None on a flat floor."""
-        return build_ground(self.world)
 
     @cached_property
     def bridged(self) -> HeightField | None:
@@ -88,16 +73,6 @@ class WalkRun:
         )
 
     @cached_property
-    def planner(self) -> TerrainPlanner:
-        """Plans paths over safe ground."""
-        return TerrainPlanner(self.ground, self.world.planner)
-
-    @cached_property
-    def path(self) -> SplinePath:
-        """Through the start and the waypoints."""
-        return self.planner.plan(np.vstack([self.run.start_m, self.run.waypoints_m]))
-
-    @cached_property
     def pitch_fitter(self) -> PitchFitter:
         """Fits the pitch joints to the ground; on a level floor they stay at 0."""
         return PitchFitter(self.robot, self.bridged)
@@ -120,12 +95,6 @@ class WalkRun:
         """How fast the shape shall travel along the body."""
         behaviour = self.run.behaviour
         return behaviour.pulse_body_lengths_s * (1.0 - behaviour.sliding) * POINTS
-
-    @property
-    def start_heading_rad(self) -> float:
-        """Mean heading of the body at the start."""
-        given = self.run.start_heading_rad
-        return self.path.heading_rad(0.05) if given is None else given
 
     def initial_pose(self) -> InitialPose:
         """Return the pose in which a simulated robot is put on the ground.

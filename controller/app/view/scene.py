@@ -9,7 +9,7 @@ import viser
 from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.heightfield import HeightField
+from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.config.world import PoleObstacle
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.runlog.record import Header, RunRecord
@@ -214,20 +214,13 @@ def _place(links: viser.BatchedMeshHandle, body: BodyView, above_m: float = 0.0)
 
 def _ground_mesh(field: HeightField) -> trimesh.Trimesh:
     """The ground's triangles, coloured by height."""
-    rows, columns = field.z_m.shape
-    x, y = np.meshgrid(
-        field.x0_m + field.spacing_m * np.arange(columns),
-        field.y0_m + field.spacing_m * np.arange(rows),
-    )
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    lower = np.stack([corner, corner + 1, corner + columns + 1], axis=1)
-    upper = np.stack([corner, corner + columns + 1, corner + columns], axis=1)
-    height = field.z_m.ravel()
+    corners_m, faces = surface(field)
+    height = corners_m[:, 2]
     share = (height - height.min()) / max(float(np.ptp(height)), 1e-9)
     colors = _GROUND[0] + share[:, None] * (_GROUND[1] - _GROUND[0])
     return trimesh.Trimesh(
-        np.stack([x.ravel(), y.ravel(), height], axis=1),
-        np.concatenate([lower, upper]),
+        corners_m,
+        faces,
         vertex_colors=np.column_stack([colors, np.full(len(colors), 255.0)]).astype(np.uint8),
         process=False,
     )

@@ -8,7 +8,15 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.options import Json, console
+from snakewalk.controller.app.cli.options import (
+    Individual,
+    Json,
+    Keypoints,
+    MinScore,
+    Plane,
+    Rate,
+    console,
+)
 from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
 
@@ -17,23 +25,11 @@ def analyse(
         list[str],
         typer.Argument(help="shipped names, or files of tracked bodies", metavar="TRACK"),
     ],
-    rate: Annotated[
-        float | None, typer.Option(help="frames a second of the files, instead of what they say")
-    ] = None,
-    min_score: Annotated[
-        float | None,
-        typer.Option(help="keypoints scoring less are missing; default 0, of DeepLabCut 0.6"),
-    ] = None,
-    individual: Annotated[
-        str | None, typer.Option(help="of a file of several animals: the one that is taken")
-    ] = None,
-    keypoints: Annotated[
-        str | None,
-        typer.Option(help="A,B,C: names along the midline, head first; default: all, as listed"),
-    ] = None,
-    plane: Annotated[
-        str | None, typer.Option(help="of markers in space: xy (default), xz or yz")
-    ] = None,
+    rate: Rate = None,
+    min_score: MinScore = None,
+    individual: Individual = None,
+    keypoints: Keypoints = None,
+    plane: Plane = None,
     picture: Annotated[
         Path | None,
         typer.Option(help="draw tracks and maps: a file (.png, .svg, .pdf), or a folder for PNGs"),

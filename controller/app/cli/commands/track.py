@@ -8,7 +8,16 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.options import Force, Json, console
+from snakewalk.controller.app.cli.options import (
+    Force,
+    Individual,
+    Json,
+    Keypoints,
+    MinScore,
+    Plane,
+    Rate,
+    console,
+)
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.recordings.recording import RecordingFacts
@@ -22,23 +31,11 @@ def track(
     ] = None,
     robot: Annotated[str, typer.Option(help="shipped robot, or a TOML file")] = "yaw16",
     world: Annotated[str, typer.Option(help="shipped world, or a TOML file")] = "flat",
-    rate: Annotated[
-        float | None, typer.Option(help="frames a second of the files, instead of what they say")
-    ] = None,
-    min_score: Annotated[
-        float | None,
-        typer.Option(help="keypoints scoring less are missing; default 0, of DeepLabCut 0.6"),
-    ] = None,
-    individual: Annotated[
-        str | None, typer.Option(help="of a file of several animals: the one that is taken")
-    ] = None,
-    keypoints: Annotated[
-        str | None,
-        typer.Option(help="A,B,C: names along the midline, head first; default: all, as listed"),
-    ] = None,
-    plane: Annotated[
-        str | None, typer.Option(help="of markers in space: xy (default), xz or yz")
-    ] = None,
+    rate: Rate = None,
+    min_score: MinScore = None,
+    individual: Individual = None,
+    keypoints: Keypoints = None,
+    plane: Plane = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="write what was chosen as a track of its own (.npz)"),

@@ -106,12 +106,13 @@ def trials(
     for word in compliance or ():
         if word not in {"on", "off"}:
             raise InputError(f"--compliance {word}: expected on or off")
+    moved_by = {run: ["gait"] if moves_by_gait(run) else motions for run in runs or [DEFAULT_RUN]}
     cases = [
         study.Case(run, m, r, k, tuple(zip(keys, values, strict=True)), c)
-        for run in (runs or [DEFAULT_RUN])
+        for run in runs or [DEFAULT_RUN]
         for r in (robot if robot else (None,))
         for k in (relief if relief else (1.0,))
-        for m in (["gait"] if moves_by_gait(run) else motions)
+        for m in moved_by[run]
         for c in ([word == "on" for word in compliance] if compliance else (None,))
         for values in product(*axes)
     ]

@@ -1,7 +1,7 @@
 """``snakewalk terrain from``: a world from a file of real ground."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -80,11 +80,7 @@ def elevation(
         "--scale": scale, "--vertical-scale": vertical_scale, "--spacing": spacing,
         "--cell": cell, "--height-step": height_step,
     }  # fmt: skip
-    faults = [
-        f"{option} {value:g}: must be above 0"
-        for option, value in positive.items()
-        if value is not None and not 0.0 < value < math.inf
-    ]
+    faults = not_positive(positive)
     check_fill(fill, faults)
     known = {"--unit": (unit, (*UNITS_M, DEGREE)), "--point": (point, CELL_HEIGHTS)}
     known["--up"] = (up, ("z", "y"))
@@ -148,6 +144,15 @@ def check_world_files(
     same = {path.resolve() for path in sources} & {path.resolve() for path in results if path}
     if same:
         raise InputError([f"{path}: is read, and would be overwritten" for path in same])
+
+
+def not_positive(options: Mapping[str, float | None]) -> list[str]:
+    """Say which options have a value that is not above 0."""
+    return [
+        f"{option} {value:g}: must be above 0"
+        for option, value in options.items()
+        if value is not None and not 0.0 < value < math.inf
+    ]
 
 
 def check_fill(fill_m: float, faults: list[str]) -> None:

@@ -17,6 +17,7 @@ from snakewalk.controller.app.cli.commands.files.elevation import (
     check_fill,
     check_world_files,
     finish,
+    not_positive,
 )
 from snakewalk.controller.app.cli.options import Force, Json
 
@@ -75,11 +76,7 @@ def stereo(
     positive = {
         "--height": height, "--spacing": spacing, "--error": error, "--far": far, "--scale": scale,
     }  # fmt: skip
-    faults = [
-        f"{option} {value:g}: must be above 0"
-        for option, value in positive.items()
-        if value is not None and not 0.0 < value < math.inf
-    ]
+    faults = not_positive(positive)
     check_fill(fill, faults)
     faults += [
         f"{option} {angle:g}: must be within 90 degrees"
