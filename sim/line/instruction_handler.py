@@ -117,7 +117,8 @@ class InstructionHandler:
         return 0, self.bank.table[row, address : address + length].tobytes()
 
     def _read(self, servo_id: int, params: bytes) -> list[Reply]:
-        self.firmware.refresh()
+        if len(params) == 4:
+            self.firmware.refresh(word(params, 0), word(params, 2))
         replies = []
         for row in self.directory.replying(servo_id):
             if self.bank["Status Return Level"][row] < 1:

@@ -55,7 +55,7 @@ class ControlLoops:
         """Apply modes, gains and profiles after a write; servos that join start where they are."""
         bank = self._bank
         mode = bank["Operating Mode"]
-        placed = np.isin(mode, (POSITION_MODE, EXTENDED_MODE, CURRENT_POSITION_MODE))
+        placed = (mode == POSITION_MODE) | (mode == EXTENDED_MODE) | (mode == CURRENT_POSITION_MODE)
         beyond_p = (bank["Position D Gain"] != 0) | (bank["Position I Gain"] != 0)
         beyond_p |= bank["Profile Velocity"] != 0
         for name in _FORWARD:

@@ -172,7 +172,7 @@ class Firmware:
             if goal in bank:
                 self._push += (mode == pushing) * self._sign * np.sign(bank[goal]) * FAR_RAD
         self._push[tripped] = 0.0
-        self._pushed = bool(np.isin(mode, (PWM_MODE, CURRENT_MODE)).any())
+        self._pushed = bool(((mode == PWM_MODE) | (mode == CURRENT_MODE)).any())
         limited = (mode == CURRENT_POSITION_MODE) | (mode == CURRENT_MODE)
         if "Goal Current" in bank:
             goal_a = np.abs(bank["Goal Current"].astype(float)) * self._motor.current_unit_a

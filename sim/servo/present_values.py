@@ -94,7 +94,8 @@ class PresentValues:
         )
         ongoing = control_loops.position & path.ongoing
         bank["Moving"][:] = self.turning() | ongoing
-        placed = ~np.isin(bank["Operating Mode"], (CURRENT_MODE, VELOCITY_MODE, PWM_MODE))
+        mode = bank["Operating Mode"]
+        placed = (mode != CURRENT_MODE) & (mode != VELOCITY_MODE) & (mode != PWM_MODE)
         status = IN_POSITION * (np.abs(goal - present) <= IN_POSITION_TICKS)
         status |= FOLLOWING_ERROR * (np.abs(shown - present) > FOLLOWING_TICKS)
         status = np.where(placed, status, 0) | PROFILE_ONGOING * ongoing

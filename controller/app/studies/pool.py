@@ -1,11 +1,13 @@
 """The one pool of processes: on this machine, or on the workers of a Dask cluster."""
 
+import os
 import signal
 import tempfile
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children, get_context, parent_process
 from typing import Any, TypeVar
 
 from snakewalk.config.errors import InputError
@@ -32,14 +34,15 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
     A forked worker would inherit the threads of MuJoCo and numba in whatever state they are. Where
     the block ends by an exception, an interrupt first of all, nobody waits for what the workers are
-    at: they are killed, and their temporary files go with the pool's own folder.
+    at: they are killed, and their temporary files go with the pool's own folder. Workers whose
+    parent is killed end by themselves.
     """
     others = {child.pid for child in active_children()}
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         pool = _Pool(
             workers,
             mp_context=get_context("spawn"),
-            initializer=_use_folder,
+            initializer=_begin,
             initargs=(folder,),
         )
         with pool:
@@ -53,9 +56,20 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
                 raise
 
 
-def _use_folder(folder: str) -> None:
-    """Let a worker's temporary files lie in the pool's folder."""
+def _begin(folder: str) -> None:
+    """Let a worker's temporary files lie in the pool's folder, and the worker end with its parent.
+
+    A worker that is at work does not notice that nobody will take its result.
+    """
     tempfile.tempdir = folder
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def each(

@@ -346,7 +346,7 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
                 in_air=_mean([t.in_air for t in some], 2),
                 alarms=sum(t.alarms for t in some),
                 causes=_counts([t.cause for t in some if not t.complete]),
-                why=_why([t for t in some if not t.complete]),
+                why=reasons([t for t in some if not t.complete]),
                 compliance={None: "", True: "on", False: "off"}[case.compliance],
                 speed_m_s=_mean([t.speed_m_s for t in some], 4),
                 speed_sd_m_s=_deviation([t.speed_m_s for t in some], 4),
@@ -370,7 +370,8 @@ def wilson(successes: int, runs: int) -> tuple[float, float]:
     return round(max(middle - half, 0.0), 3), round(min(middle + half, 1.0), 3)
 
 
-def _why(failed: Sequence[Trial]) -> str:
+def reasons(failed: Sequence[Trial]) -> str:
+    """Why runs failed and in a line: ``2 slip; 1 refused: ...``."""
     words = [t.why if t.cause in {"safety", "refused", "error"} else t.cause for t in failed]
     return "; ".join(f"{count} {word}" for word, count in _counts(words).items())
 

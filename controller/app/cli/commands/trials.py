@@ -5,7 +5,7 @@ from contextlib import nullcontext
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
@@ -143,10 +143,16 @@ def trials(
     if as_json:
         settings = {"seeds": list(seen), "start_spread_m": start_spread}
         print(json.dumps(settings | {"table": rows, "trials": [asdict(t) for t in found]}))
-        return
-    varied = [key for key, values in overs if len(values) > 1]
+    else:
+        _print(rows, [key for key, values in overs if len(values) > 1])
+    if all(trial.cause == "refused" for trial in found):
+        raise InputError(f"no run was possible: {study.reasons(found)}")
+
+
+def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
+    """Print the table; ``varied``: keys that become columns of their own."""
     shown = [key for key in _HEADS if any(row[key] not in {"", None} for row in rows)]
-    if len({case.relief for case in cases}) == 1:
+    if len({row["relief"] for row in rows}) == 1:
         shown.remove("relief")
     grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     for key in varied:

@@ -56,20 +56,26 @@ if __name__ == "__main__":
 """
 
 
-def test_an_interrupt_waits_for_no_worker(tmp_path: Path) -> None:
-    script = tmp_path / "blocked.py"
+def blocked_parent(folder: Path) -> "subprocess.Popen[str]":
+    """A program whose one worker is at work for ever, and has said so."""
+    script = folder / "blocked.py"
     script.write_text(_BLOCKED)
-    with subprocess.Popen(
+    parent = subprocess.Popen(
         [sys.executable, script],
-        cwd=tmp_path,
+        cwd=folder,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        env=os.environ | {"TMPDIR": str(tmp_path)},
-    ) as parent:
-        ready = tmp_path / "ready"
-        while not ready.is_file() or not ready.read_text():
-            assert parent.poll() is None
+        env=os.environ | {"TMPDIR": str(folder)},
+    )
+    ready = folder / "ready"
+    while not ready.is_file() or not ready.read_text():
+        assert parent.poll() is None
+    return parent
+
+
+def test_an_interrupt_waits_for_no_worker(tmp_path: Path) -> None:
+    with blocked_parent(tmp_path) as parent:
         os.killpg(parent.pid, signal.SIGINT)  # as a terminal does
         try:
             said = parent.communicate(timeout=30)[1]
@@ -78,8 +84,18 @@ def test_an_interrupt_waits_for_no_worker(tmp_path: Path) -> None:
                 os.killpg(parent.pid, signal.SIGKILL)
     assert said.count("Traceback") == 1, "the parent's own; the worker is silent"
     with pytest.raises(ProcessLookupError):
-        os.kill(int(ready.read_text()), 0)
+        os.kill(int((tmp_path / "ready").read_text()), 0)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["blocked.py", "fifo", "ready"]
+
+
+def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+    with blocked_parent(tmp_path) as parent:
+        parent.kill()
+        try:
+            parent.communicate(timeout=30)  # until nobody holds the other end: no orphan is left
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(parent.pid, signal.SIGKILL)
 
 
 def test_trials_never_fork_beside_the_physics(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -98,6 +98,21 @@ def test_the_command_runs_each_case_and_a_fixed_one_once(
     assert (trial["seed"], trial["start_m"], trial["cause"]) == (40, [0.0, 0.0], "")
 
 
+def test_where_every_run_is_refused_the_command_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(case: Case, seed: int, *_: object) -> Trial:
+        return Trial(case, seed, cause="refused", why="refused: too steep")
+
+    monkeypatch.setattr(study, "run_trial", refused)
+    monkeypatch.setattr(
+        study, "each", lambda work, items, **_: zip(items, map(work, items), strict=True)
+    )
+    with pytest.raises(InputError, match="no run was possible: 2 refused: too steep"):
+        command(["flat-slalom"], seeds=2, motion=["walk"], workers=1)
+    assert "0 of 2" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("successes", "runs", "interval"),
     [  # R. G. Newcombe (1998), Statistics in Medicine 17, Table I

@@ -19,8 +19,8 @@ def stop(
     run: Annotated[
         str | None,
         typer.Argument(
-            help="name, folder or process of a run; default: every run that holds a port, else "
-            "the newest in simulation",
+            help="name, folder or process of a run; default: every run of yours on this machine "
+            "that holds a port, else the newest in simulation",
             show_default=False,
         ),
     ] = None,
