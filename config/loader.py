@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Final, Literal, TypeVar, get_args
+from typing import Any, Final, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticSerializationError, to_json
@@ -135,6 +135,17 @@ def load_gait(name_or_path: str) -> GaitSetConfig:
     return load(locate("gaits", name_or_path), GaitSetConfig)
 
 
+def known_keys() -> list[str]:
+    """Keys of a run, a robot and a world, dotted behind the name of their file."""
+    models: dict[str, type[BaseModel]] = {
+        "run": RunConfig,
+        "robot": RobotConfig,
+        "world": WorldConfig,
+    }
+    found = [key for name, model in models.items() for key in _dotted(name, model)]
+    return list(dict.fromkeys(found))
+
+
 def digest(*models: BaseModel) -> str:
     """SHA-256 (16 hex digits) over the canonical JSON of the models: the configuration hash."""
     text = "\n".join(model.model_dump_json() for model in models)
@@ -197,6 +208,17 @@ def _keys(kind: Any) -> Iterator[str]:
     else:
         for part in get_args(kind):
             yield from _keys(part)
+
+
+def _dotted(path: str, kind: Any) -> Iterator[str]:
+    """Keys of a table and of the tables in it that hold a single value, dotted behind ``path``."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        for name, field in kind.model_fields.items():
+            below = list(_dotted(f"{path}.{name}", field.annotation))
+            yield from below or [f"{path}.{name}"]
+    elif get_origin(kind) not in {list, tuple, dict}:
+        for part in get_args(kind):
+            yield from _dotted(path, part)
 
 
 def _meant(model: type[BaseModel], key: str) -> str:

@@ -51,6 +51,8 @@ def make_gait(name: str, values: dict[str, Any] | None = None, source: str = "")
         InputError: no such gait, unknown parameters, values out of range; one line each.
 
     """
+    from snakewalk.controller.gaits import spine_heading  # noqa: F401, PLC0415  compiled here, never within a run
+
     if name not in GAITS:
         raise InputError(f"{name}: no such gait; there are {', '.join(GAITS)}")
     return GAITS[name].of(values, source)

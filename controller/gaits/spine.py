@@ -15,7 +15,6 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Frequency, Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import TURN
-from snakewalk.drivers.compiling import compiled
 
 SAMPLES = 257
 """Of the spine, before it is divided into equal links."""
@@ -52,10 +51,12 @@ def spine_bends_rad(
     at the shares ``edges`` of it) before its headings are read: they are those of rigid links, not
     of slices in u.
     """
+    from snakewalk.controller.gaits.spine_heading import write_headings  # noqa: PLC0415  compiled: slow to import
+
     shares = np.linspace(0.0, 1.0, joints + 2) if edges is None else edges
     u = np.linspace(0.0, TURN, SAMPLES)
     headings = np.empty((len(phase_rad), len(shares) - 1))
-    _headings(u, _shapes(u, p), np.cos(phase_rad), np.sin(phase_rad), shares, headings)
+    write_headings(u, _shapes(u, p), np.cos(phase_rad), np.sin(phase_rad), shares, headings)
     return np.asarray(headings[:, :-1] - headings[:, 1:])
 
 
@@ -70,32 +71,6 @@ def _shapes(u: Floats, p: SpineParameters) -> Floats:
     if p.standing:  # size cos(waves u + phi) sin(phase)
         return np.stack([np.zeros_like(u), size * np.cos(p.waves * u + p.phase_rad)])
     return np.stack([size * np.sin(p.waves * u), -size * np.cos(p.waves * u)])
-
-
-@compiled(
-    "void(float64[::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[:, ::1])"
-)
-def _headings(
-    u: Floats, shapes: Floats, cosine: Floats, sine: Floats, shares: Floats, headings: Floats
-) -> None:
-    """Write the headings (T, n) of travel, towards the head, of chords between ``shares``."""
-    run, side = np.zeros(len(u)), np.empty(len(u))
-    for t in range(len(cosine)):
-        for i in range(len(u)):
-            side[i] = shapes[0, i] * cosine[t] + shapes[1, i] * sine[t]
-        for i in range(1, len(u)):
-            du, dy = u[i] - u[i - 1], side[i] - side[i - 1]
-            run[i] = run[i - 1] + np.sqrt(du * du + dy * dy)
-        i, back, left = 0, u[0], side[0]
-        for k in range(len(shares)):
-            at = shares[k] * run[-1]
-            while i < len(u) - 2 and run[i + 1] < at:
-                i += 1
-            part = (at - run[i]) / (run[i + 1] - run[i])
-            here, aside = u[i] + part * (u[i + 1] - u[i]), side[i] + part * (side[i + 1] - side[i])
-            if k > 0:
-                headings[t, k - 1] = np.arctan2(left - aside, here - back)
-            back, left = here, aside
 
 
 class SpineGait(Gait):

@@ -1,7 +1,6 @@
 """The command line: ``snakewalk COMMAND --help``. One line registers a command."""
 
 import sys
-from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
@@ -97,6 +96,8 @@ app = _App(
 
 def _show_version(asked: bool) -> None:
     if asked:
+        from importlib.metadata import version  # noqa: PLC0415  --help stays quick
+
         print(f"snakewalk {version('snakewalk')}")
         raise typer.Exit
 

@@ -23,7 +23,7 @@ def main() -> None:
         _check_words(sys.argv[1:])
         from snakewalk.controller.app.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it
 
-        app()
+        app(prog_name="snakewalk")
     except InputError as error:
         _end(2, *error.faults)
     except DriverError as error:

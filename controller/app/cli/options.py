@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.result_files import LOG
 
 if TYPE_CHECKING:
@@ -25,17 +26,31 @@ _WIDE: Final = 200
 """Columns of a pipe or a file, which break no line."""
 console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else _WIDE)
 DEFAULT_RUN = "jacksboro-traverse"
-RunName = Annotated[str, typer.Argument(help="shipped run, or a RUN.toml", show_default=True)]
+RunName = Annotated[
+    str,
+    typer.Argument(
+        help="shipped run, or a RUN.toml", show_default=True, autocompletion=completion.RUNS
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 Seed = Annotated[int | None, typer.Option(help="of every random choice")]
-Motion = Annotated[str | None, typer.Option(help="walk, walk-printed, walk-blind or serpenoid")]
+Motion = Annotated[
+    str | None,
+    typer.Option(
+        help="walk, walk-printed, walk-blind or serpenoid", autocompletion=completion.MOTIONS
+    ),
+]
 Port = Annotated[
     str | None, typer.Option(help="serial port; default: the only USB adapter there is")
 ]
 RunPort = Annotated[str | None, typer.Option(help="serial port; without it, the simulator")]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
 Look = Annotated[
-    str, typer.Option(help="body in the film: servos, animal, or a BODY as of `snakewalk body`")
+    str,
+    typer.Option(
+        help="body in the film: servos, animal, or a BODY as of `snakewalk body`",
+        autocompletion=completion.LOOKS,
+    ),
 ]
 RunFolder = Annotated[
     Path | None,
@@ -58,10 +73,25 @@ ViewAt = Annotated[
 ]
 VIEW_AT = "127.0.0.1:8080"
 Force = Annotated[bool, typer.Option("--force", help="overwrite files")]
-Robot = Annotated[str | None, typer.Option(help="shipped robot, or a TOML file")]
-World = Annotated[str | None, typer.Option(help="shipped world, or a TOML file")]
+Robot = Annotated[
+    str | None, typer.Option(help="shipped robot, or a TOML file", autocompletion=completion.ROBOTS)
+]
+GivenRobot = Annotated[
+    str, typer.Option(help="shipped robot, or a TOML file", autocompletion=completion.ROBOTS)
+]
+World = Annotated[
+    str | None, typer.Option(help="shipped world, or a TOML file", autocompletion=completion.WORLDS)
+]
+GivenWorld = Annotated[
+    str, typer.Option(help="shipped world, or a TOML file", autocompletion=completion.WORLDS)
+]
 TrackFile = Annotated[
-    str | None, typer.Option("--track", help="shipped recording, or a file of midlines or angles")
+    str | None,
+    typer.Option(
+        "--track",
+        help="shipped recording, or a file of midlines or angles",
+        autocompletion=completion.RECORDINGS,
+    ),
 ]
 
 Rate = Annotated[
@@ -86,6 +116,7 @@ Set = Annotated[
         help="replace a value of the run's, robot's or world's file, e.g. "
         "world.ground.slope_deg=10; may be given again",
         metavar="KEY=VALUE",
+        autocompletion=completion.keys,
     ),
 ]
 

@@ -8,6 +8,7 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import (
     Individual,
     Json,
@@ -23,7 +24,11 @@ from snakewalk.controller.app.result_files import check_picture, refuse_to_overw
 def analyse(
     recordings: Annotated[
         list[str],
-        typer.Argument(help="shipped names, or files of tracked bodies", metavar="TRACK"),
+        typer.Argument(
+            help="shipped names, or files of tracked bodies",
+            metavar="TRACK",
+            autocompletion=completion.RECORDINGS,
+        ),
     ],
     rate: Rate = None,
     min_score: MinScore = None,

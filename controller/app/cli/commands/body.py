@@ -10,6 +10,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force, Json, show
 from snakewalk.controller.app.result_files import atomic_write, check_picture, refuse_to_overwrite
 
@@ -31,13 +32,15 @@ def body(
         typer.Argument(
             metavar="BODY",
             help="an .npz of skeletons with widths, a shipped recording or skin, an .obj or a .glb",
+            autocompletion=completion.BODIES,
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="body.glb or body.obj")],
     animate: Annotated[
         str | None,
         typer.Option(
-            help="what moves it: a recording, the log of a run, or a spine gait (anguilliform, ...)"
+            help="what moves it: a recording, the log of a run, or a spine gait",
+            autocompletion=completion.MOVING,
         ),
     ] = None,
     fps: Annotated[

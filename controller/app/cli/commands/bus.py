@@ -14,6 +14,7 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force, Json, Port, console, show
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
@@ -40,7 +41,11 @@ def serve(
         typer.Option(help="IDS[:MODEL],... on a bench: 1-16, or 1-2:XL430-W250,3-6:XL330-M288"),
     ] = None,
     robot: Annotated[
-        str | None, typer.Option(help="shipped robot or a TOML file, in MuJoCo on flat ground")
+        str | None,
+        typer.Option(
+            help="shipped robot or a TOML file, in MuJoCo on flat ground",
+            autocompletion=completion.ROBOTS,
+        ),
     ] = None,
     baud: Annotated[int | None, typer.Option(help="of the servos, bit/s")] = None,
     pace: Annotated[float, typer.Option(help="simulated seconds a second")] = 1.0,

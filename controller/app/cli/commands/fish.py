@@ -6,13 +6,20 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force, Json, show
 from snakewalk.controller.app.result_files import atomic_write, check_picture, refuse_to_overwrite
 
 if TYPE_CHECKING:
     from snakewalk.controller.capture.fish.postures import Postures
 
-_Build = Annotated[str, typer.Option(help="carp (A0..A3 behind a rigid head) or eel (8 angles)")]
+_Build = Annotated[
+    str,
+    typer.Option(
+        help="carp (A0..A3 behind a rigid head) or eel (8 angles)",
+        autocompletion=completion.words("carp", "eel"),
+    ),
+]
 _Rate = Annotated[float | None, typer.Option(help="frames a second, instead of what the file says")]
 _Picture = Annotated[Path | None, typer.Option(help="draw here (.png, .svg, .pdf)")]
 
@@ -20,7 +27,11 @@ _Picture = Annotated[Path | None, typer.Option(help="draw here (.png, .svg, .pdf
 def film(
     folder: Annotated[Path, typer.Argument(help="folder to write frames and truth.npz into")],
     motion: Annotated[
-        str | None, typer.Option(help="recording to render; default: a scripted fish")
+        str | None,
+        typer.Option(
+            help="recording to render; default: a scripted fish",
+            autocompletion=completion.RECORDINGS,
+        ),
     ] = None,
     build: _Build = "carp",
     length_px: Annotated[float, typer.Option(min=20, max=2000, help="body length")] = 120.0,
@@ -136,7 +147,9 @@ def synthesise(
         str, typer.Option(help="basic posture: straight, or the commonest of the film")
     ] = "straight",
     blend: Annotated[float, typer.Option(min=0.02, help="seconds of the blend of a join")] = 0.25,
-    robot: Annotated[str, typer.Option(help="whose joints are written along")] = "yaw16",
+    robot: Annotated[
+        str, typer.Option(help="whose joints are written along", autocompletion=completion.ROBOTS)
+    ] = "yaw16",
     output: Annotated[Path, typer.Option("--output", "-o", help="track")] = Path("track.npz"),
     picture: _Picture = None,
     force: Force = False,

@@ -7,13 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force, Json, Robot, console, key_values, show
 from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
 if TYPE_CHECKING:
     from snakewalk.controller.gaits.gait import Gait
 
-Name = Annotated[str, typer.Argument(help="gait, shipped set of parameters, or a SET.toml")]
+Name = Annotated[
+    str,
+    typer.Argument(
+        help="gait, shipped set of parameters, or a SET.toml", autocompletion=completion.GAITS
+    ),
+]
 Param = Annotated[
     list[str] | None, typer.Option("--param", "-p", help="NAME=VALUE; may be given again")
 ]

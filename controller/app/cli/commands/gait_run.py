@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.commands.gait import Name, Param, parameters
 from snakewalk.controller.app.cli.options import (
     VIEW_AT,
@@ -43,7 +44,13 @@ def run_gait(
         list[str] | None,
         typer.Option(help="NAME@SECONDS [,PARAM=VALUE...]: change gait; may be given again"),
     ] = None,
-    by: Annotated[str, typer.Option(help="how gaits change: blend, or cpg: oscillators")] = "blend",
+    by: Annotated[
+        str,
+        typer.Option(
+            help="how gaits change: blend, or cpg: oscillators",
+            autocompletion=completion.words("blend", "cpg"),
+        ),
+    ] = "blend",
     seconds: Annotated[float, typer.Option(help="then it comes to rest")] = 20.0,
     look_heading_rad: Annotated[
         float | None, typer.Option(help="world heading that the head keeps")

@@ -8,10 +8,13 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force, Json, console, show
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
-RobotName = Annotated[str, typer.Argument(help="shipped robot, or a TOML file")]
+RobotName = Annotated[
+    str, typer.Argument(help="shipped robot, or a TOML file", autocompletion=completion.ROBOTS)
+]
 
 
 def list_(as_json: Json = False) -> None:

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import (
     VIEW_AT,
     Film,
@@ -25,7 +26,10 @@ from snakewalk.controller.app.result_files import run_folder
 
 
 def play(
-    track: Annotated[str, typer.Argument(help="shipped recording, or a file")],
+    track: Annotated[
+        str,
+        typer.Argument(help="shipped recording, or a file", autocompletion=completion.RECORDINGS),
+    ],
     robot: Robot = None,
     world: World = None,
     speed: Annotated[

@@ -8,9 +8,11 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import (
     Film,
     Force,
+    GivenRobot,
     Json,
     RunFolder,
     RunPort,
@@ -33,8 +35,11 @@ Picture = Annotated[Path | None, typer.Option(help="draw the actions' ways here"
 
 
 def record(
-    robot: Annotated[str, typer.Option(help="shipped robot, or a TOML file")] = "yaw16",
-    world: Annotated[str, typer.Option(help="shipped flat world, or a TOML file")] = "flat",
+    robot: GivenRobot = "yaw16",
+    world: Annotated[
+        str,
+        typer.Option(help="shipped flat world, or a TOML file", autocompletion=completion.WORLDS),
+    ] = "flat",
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="default: repertoire-ROBOT-WORLD.npz")
     ] = None,

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import (
     DEFAULT_RUN,
     VIEW_AT,
@@ -42,7 +43,11 @@ def run(
     seed: Seed = None,
     motion: Motion = None,
     pose: Annotated[
-        str | None, typer.Option(help="what measures the head: simulator, camera or joints")
+        str | None,
+        typer.Option(
+            help="what measures the head: simulator, camera or joints",
+            autocompletion=completion.words("simulator", "camera", "joints"),
+        ),
     ] = None,
     set_: Set = None,
     out: RunFolder = None,

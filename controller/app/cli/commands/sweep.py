@@ -11,6 +11,7 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force, Json, console
 from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
@@ -30,10 +31,16 @@ _HEADS = {
 
 
 def sweep(
-    gaits: Annotated[list[str] | None, typer.Argument(help="default: all", metavar="GAIT")] = None,
+    gaits: Annotated[
+        list[str] | None,
+        typer.Argument(help="default: all", metavar="GAIT", autocompletion=completion.GAITS),
+    ] = None,
     robot: Annotated[
         list[str] | None,
-        typer.Option(help="may be given again; default: yaw16 and alternating16"),
+        typer.Option(
+            help="may be given again; default: yaw16 and alternating16",
+            autocompletion=completion.ROBOTS,
+        ),
     ] = None,
     points: Annotated[int, typer.Option(min=1, max=100_000, help="of each gait and robot")] = 30,
     seconds: Annotated[float, typer.Option(min=4.0, max=3600.0, help="of each run")] = 12.0,

@@ -8,8 +8,11 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import (
     Force,
+    GivenRobot,
+    GivenWorld,
     Individual,
     Json,
     Keypoints,
@@ -27,10 +30,14 @@ from snakewalk.controller.app.result_files import atomic_write, check_picture, r
 def track(
     recordings: Annotated[
         list[str] | None,
-        typer.Argument(help="shipped names or files; default: the shipped ones", metavar="NAME"),
+        typer.Argument(
+            help="shipped names or files; default: the shipped ones",
+            metavar="NAME",
+            autocompletion=completion.RECORDINGS,
+        ),
     ] = None,
-    robot: Annotated[str, typer.Option(help="shipped robot, or a TOML file")] = "yaw16",
-    world: Annotated[str, typer.Option(help="shipped world, or a TOML file")] = "flat",
+    robot: GivenRobot = "yaw16",
+    world: GivenWorld = "flat",
     rate: Rate = None,
     min_score: MinScore = None,
     individual: Individual = None,

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, TrackFile, World, console
 from snakewalk.controller.app.result_files import check_picture
 
@@ -44,7 +45,9 @@ def trials(
     runs: Annotated[
         list[str] | None,
         typer.Argument(
-            help=f"shipped runs, RUN.toml, or gaits [default: {DEFAULT_RUN}]", metavar="RUN"
+            help=f"shipped runs, RUN.toml, or gaits [default: {DEFAULT_RUN}]",
+            metavar="RUN",
+            autocompletion=completion.RUNS_OR_GAITS,
         ),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a row")] = 20,
@@ -53,10 +56,14 @@ def trials(
         float, typer.Option(min=0.0, max=1.0, help="of the start in x and y, m; 0: not moved")
     ] = 0.04,
     motion: Annotated[
-        list[str] | None, typer.Option(help="may be given again; default: all")
+        list[str] | None,
+        typer.Option(help="may be given again; default: all", autocompletion=completion.MOTIONS),
     ] = None,
     robot: Annotated[
-        list[str] | None, typer.Option(help="may be given again; default: the run's")
+        list[str] | None,
+        typer.Option(
+            help="may be given again; default: the run's", autocompletion=completion.ROBOTS
+        ),
     ] = None,
     relief: Annotated[
         list[float] | None,

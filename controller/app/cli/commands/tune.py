@@ -8,12 +8,15 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Json, Robot, show
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
 
 def tune(
-    gait: Annotated[str, typer.Argument(help="one of: snakewalk gait list")],
+    gait: Annotated[
+        str, typer.Argument(help="one of: snakewalk gait list", autocompletion=completion.GAITS)
+    ],
     aim: Annotated[
         Literal["speed", "efficiency"], typer.Option("--for", help="what to make better")
     ] = "speed",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force, Json, Port, console, show
 
 if TYPE_CHECKING:
@@ -15,7 +16,11 @@ if TYPE_CHECKING:
 def calibrate(
     out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
     robot: Annotated[
-        str, typer.Option(help="shipped robot, or a TOML file, with the same axes and links")
+        str,
+        typer.Option(
+            help="shipped robot, or a TOML file, with the same axes and links",
+            autocompletion=completion.ROBOTS,
+        ),
     ] = "alternating16",
     port: Port = None,
     baud: Annotated[int | None, typer.Option(help="default: as the robot says")] = None,

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, Port, Robot, console
 
 _COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
@@ -16,7 +17,9 @@ _COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 def doctor(
     port: Port = None,
     robot: Robot = None,
-    run: Annotated[str, typer.Option(help="run whose rate and limits count")] = DEFAULT_RUN,
+    run: Annotated[
+        str, typer.Option(help="run whose rate and limits count", autocompletion=completion.RUNS)
+    ] = DEFAULT_RUN,
     wiggle: Annotated[
         bool,
         typer.Option("--wiggle", help="move all joints by 0.15 rad for 2 s: does the supply sag?"),

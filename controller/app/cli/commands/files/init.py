@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force, Json, Robot, show
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
@@ -31,7 +32,12 @@ def init(
     ] = Path(),
     robot: Robot = None,
     from_: Annotated[
-        str | None, typer.Option("--from", help="run to begin with, shipped or a TOML file")
+        str | None,
+        typer.Option(
+            "--from",
+            help="run to begin with, shipped or a TOML file",
+            autocompletion=completion.RUNS,
+        ),
     ] = None,
     force: Force = False,
     as_json: Json = False,

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
@@ -14,7 +15,12 @@ from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwr
 def schema(
     kind: Annotated[
         str,
-        typer.Argument(help="run, robot, world, synthesis, gait, recording, skin or faults"),
+        typer.Argument(
+            help="run, robot, world, synthesis, gait, recording, skin or faults",
+            autocompletion=completion.words(
+                "run", "robot", "world", "synthesis", "gait", "recording", "skin", "faults"
+            ),
+        ),
     ],
     out: Annotated[Path | None, typer.Option("-o", "--out", help="write it here")] = None,
     force: Force = False,

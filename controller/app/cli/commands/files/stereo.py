@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from snakewalk.config.archive import check_expansion
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.commands.files.elevation import (
@@ -139,6 +138,8 @@ def _picture(file: Path) -> "Image":
     import cv2  # noqa: PLC0415  an extra
     import numpy as np  # noqa: PLC0415
     from PIL import Image as Pictures  # noqa: PLC0415  an extra
+
+    from snakewalk.config.archive import check_expansion  # noqa: PLC0415  --help stays quick
 
     data = file.read_bytes()
     try:

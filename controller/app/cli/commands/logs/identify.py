@@ -1,10 +1,11 @@
 """``snakewalk identify``: constants of a servo from recordings of it."""
 
 import json
+import math
 from pathlib import Path
+from statistics import fmean
 from typing import Annotated
 
-import numpy as np
 import typer
 from rich.table import Table
 
@@ -65,14 +66,14 @@ def identify(
         str(log.path): (round(error_deg(found, log), 3), fit and k < len(fitted))
         for k, log in enumerate((*fitted, *judged))
     }
-    mean_deg = round(float(np.mean([error for error, _ in errors.values()])), 3)
+    mean_deg = round(fmean(error for error, _ in errors.values()), 3)
     rows = list(zip(CONSTANTS, found.values, found.low, found.high, strict=True))
     if as_json:
         result = {
             "actuator": found.actuator,
             "constants": {c.name: float(value) for c, value, _, _ in rows},
             "interval_95": {
-                c.name: [float(low), float(high)] for c, _, low, high in rows if np.isfinite(low)
+                c.name: [float(low), float(high)] for c, _, low, high in rows if math.isfinite(low)
             },
             "mean_error_deg": mean_deg,
             "errors_deg": {path: error for path, (error, _) in errors.items()},
@@ -83,7 +84,7 @@ def identify(
         return
     table = Table("constant", "value", "95 % interval", box=None)
     for constant, value, low, high in rows:
-        interval = f"{low:.4g} to {high:.4g}" if np.isfinite(low) else "-"
+        interval = f"{low:.4g} to {high:.4g}" if math.isfinite(low) else "-"
         table.add_row(constant.name.replace("_", " "), f"{value:.4g}", interval)
     console.print(table)
     for path, (error, used) in errors.items():

@@ -1,0 +1,32 @@
+"""Headings of the links of a chain that is laid along a moving spine, in a compiled loop."""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.drivers.compiling import compiled
+
+
+@compiled(
+    "void(float64[::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[:, ::1])"
+)
+def write_headings(
+    u: Floats, shapes: Floats, cosine: Floats, sine: Floats, shares: Floats, headings: Floats
+) -> None:
+    """Write the headings (T, n) of travel, towards the head, of chords between ``shares``."""
+    run, side = np.zeros(len(u)), np.empty(len(u))
+    for t in range(len(cosine)):
+        for i in range(len(u)):
+            side[i] = shapes[0, i] * cosine[t] + shapes[1, i] * sine[t]
+        for i in range(1, len(u)):
+            du, dy = u[i] - u[i - 1], side[i] - side[i - 1]
+            run[i] = run[i - 1] + np.sqrt(du * du + dy * dy)
+        i, back, left = 0, u[0], side[0]
+        for k in range(len(shares)):
+            at = shares[k] * run[-1]
+            while i < len(u) - 2 and run[i + 1] < at:
+                i += 1
+            part = (at - run[i]) / (run[i + 1] - run[i])
+            here, aside = u[i] + part * (u[i + 1] - u[i]), side[i] + part * (side[i + 1] - side[i])
+            if k > 0:
+                headings[t, k - 1] = np.arctan2(left - aside, here - back)
+            back, left = here, aside
