@@ -1,17 +1,19 @@
 """A whole recording captured: bodies detected, outliers marked, head and tail kept."""
 
+import hashlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.body_detector import BodyDetector
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.identity import align_ends, head_end, margins
-from snakewalk.controller.capture.image.medial_axis import Skeleton
+from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.capture.outlier_frames import mark_outliers
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
 from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Crop, crop_body
@@ -122,16 +124,26 @@ def capture(
     )
 
 
-def save_capture(
-    path: Path,
-    captured: Capture,
-    *,
-    name: str,
-    m_per_px: float | None = None,
-    rate_assumed: bool = False,
-    source: str = "not stated",
-    licence: str = "not stated",
-) -> None:
+@dataclass(frozen=True, slots=True)
+class CaptureFile:
+    """What a file of a captured recording holds."""
+
+    captured: Capture
+    name: str
+    m_per_px: float | None = None
+    """None: no scale."""
+    rate_assumed: bool = False
+    source: str = "not stated"
+    licence: str = "not stated"
+
+    @property
+    def fingerprint(self) -> str:
+        """Of the points: another capture, or a corrected one, has another."""
+        points = np.ascontiguousarray(self.captured.points_px, dtype="<f8")
+        return hashlib.sha256(points.tobytes()).hexdigest()[:16]
+
+
+def save_capture(path: Path, held: CaptureFile) -> None:
     """Write an .npz that ``load_track`` reads, with the data of every frame beside the track.
 
     ``points`` (T, 101, 2) head first, m (pixels where there is no scale), y upwards; ``rate_hz``,
@@ -141,18 +153,19 @@ def save_capture(
     ``expected_px`` (T,), the error of a point, ``company`` (T,), the size of the next largest
     object. Once: ``m_per_px`` (NaN: no scale), ``head_by``, ``head_sure``.
     """
-    scale = 1.0 if m_per_px is None else m_per_px
-    length_m = np.nan if m_per_px is None else float(np.nanmedian(captured.length_px)) * scale
+    captured = held.captured
+    scale = 1.0 if held.m_per_px is None else held.m_per_px
+    length_m = np.nan if held.m_per_px is None else float(np.nanmedian(captured.length_px)) * scale
     with path.open("wb") as stream:
         np.savez_compressed(
             stream,
             points=captured.points_px * [scale, -scale],
             rate_hz=captured.rate_hz,
-            rate_assumed=rate_assumed,
+            rate_assumed=held.rate_assumed,
             length_m=length_m,
-            name=name,
-            source=source,
-            licence=licence,
+            name=held.name,
+            source=held.source,
+            licence=held.licence,
             verdict=np.array([str(one) for one in captured.status]),
             points_px=captured.points_px,
             radius_px=captured.radius_px,
@@ -160,10 +173,62 @@ def save_capture(
             head_margin=captured.margin,
             expected_px=captured.expected_px,
             company=captured.distractors,
-            m_per_px=np.nan if m_per_px is None else m_per_px,
+            m_per_px=np.nan if held.m_per_px is None else held.m_per_px,
             head_by=captured.head_by,
             head_sure=captured.head_sure,
         )
+
+
+def load_capture(path: Path) -> CaptureFile:
+    """Read what ``save_capture`` wrote.
+
+    Raises:
+        InputError: no such file, or it was not captured from a film.
+
+    """
+    try:
+        held, _ = read_arrays(path)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except ValueError:
+        raise InputError(f"{path}: is no .npz; a track that `capture` wrote is needed") from None
+    frames = len(held["verdict"]) if "verdict" in held and held["verdict"].ndim == 1 else 0
+    shapes: dict[str, tuple[int, ...]] = {}
+    shapes |= dict.fromkeys(("length_px", "head_margin", "expected_px", "company"), (frames,))
+    shapes |= dict.fromkeys(("rate_hz", "m_per_px", "head_sure", "rate_assumed"), ())
+    shapes |= {"points_px": (frames, SEGMENTS + 1, 2), "radius_px": (frames, SEGMENTS + 1)}
+    known = {str(one) for one in FrameStatus}
+    whole = (
+        frames > 0
+        and {str(one) for one in held["verdict"]} <= known
+        and all(
+            name in held and held[name].shape == shape and held[name].dtype.kind in "biuf"
+            for name, shape in shapes.items()
+        )
+        and {"name", "source", "licence", "head_by"} <= held.keys()
+    )
+    if not whole:
+        raise InputError(f"{path}: is no track that `capture` wrote: it lacks data of the frames")
+    scale = float(held["m_per_px"])
+    return CaptureFile(
+        Capture(
+            points_px=np.asarray(held["points_px"], dtype=float),
+            radius_px=np.asarray(held["radius_px"], dtype=float),
+            length_px=np.asarray(held["length_px"], dtype=float),
+            status=tuple(FrameStatus(str(one)) for one in held["verdict"]),
+            expected_px=np.asarray(held["expected_px"], dtype=float),
+            distractors=np.asarray(held["company"], dtype=float),
+            margin=np.asarray(held["head_margin"], dtype=float),
+            rate_hz=float(held["rate_hz"]),
+            head_by=str(held["head_by"]),
+            head_sure=float(held["head_sure"]),
+        ),
+        name=str(held["name"]),
+        m_per_px=scale if np.isfinite(scale) else None,
+        rate_assumed=bool(held["rate_assumed"]),
+        source=str(held["source"]),
+        licence=str(held["licence"]),
+    )
 
 
 @dataclass(slots=True)

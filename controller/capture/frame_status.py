@@ -4,11 +4,12 @@ from enum import StrEnum
 
 
 class FrameStatus(StrEnum):
-    """``GOOD``, ``ROUGH`` and ``BRIDGED`` frames hold points; others only the reason why not."""
+    """``GOOD``, ``ROUGH``, ``BRIDGED`` and ``BY_HAND`` frames hold points; others say why not."""
 
     GOOD = "good"
     ROUGH = "rough: the points may be off by more than 1 % of the body"
     BRIDGED = "rough: a keypoint was not seen; it lies on the curve through the others"
+    BY_HAND = "by hand: a person drew the points"
     MISSING = "keypoints are missing"
     NOTHING = "nothing seen"
     SEVERAL = "several animals"
@@ -20,8 +21,14 @@ class FrameStatus(StrEnum):
     PART = "a part is missing: something goes on beyond its end"
     GHOST = "the background shows the animal"
     BLOB = "not a long body"
+    LEFT_OUT = "left out by a person"
 
     @property
     def has_points(self) -> bool:
         """Whether the frame holds points."""
-        return self in {FrameStatus.GOOD, FrameStatus.ROUGH, FrameStatus.BRIDGED}
+        return self in {
+            FrameStatus.GOOD,
+            FrameStatus.ROUGH,
+            FrameStatus.BRIDGED,
+            FrameStatus.BY_HAND,
+        }

@@ -227,6 +227,8 @@ app.command(
     epilog=_examples(
         "capture film.mp4 -o track.npz --length-m 0.4 --sheet sheet.png",
         "capture frames/ --cropped --overlay overlay.mp4 --force --json",
+        "capture film.mp4 --review review.html",
+        "capture track.npz --corrections track-corrections.json -o corrected.npz",
     ),
     rich_help_panel=_RECORDINGS,
 )(capture)

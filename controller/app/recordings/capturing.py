@@ -1,4 +1,7 @@
-"""One recording captured: frames read, the animal detected in them, track and pictures written."""
+"""One recording captured: frames read, the animal detected in them, track and pictures written.
+
+A track that was captured before is corrected by what a person has saved from its review page.
+"""
 
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -11,15 +14,24 @@ from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.progress import ProgressBar
 from snakewalk.controller.app.report.plots.capture import contact_sheet, overlay_film, step_picture
+from snakewalk.controller.app.report.review import picture_scale, review_page
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.capture.body_detector import BodyDetector, make_detector
-from snakewalk.controller.capture.capture import Capture, capture, save_capture
+from snakewalk.controller.capture.capture import (
+    Capture,
+    CaptureFile,
+    capture,
+    load_capture,
+    save_capture,
+)
+from snakewalk.controller.capture.corrections import apply_corrections, read_corrections
 from snakewalk.controller.capture.image.region import WHOLE, region_of
 from snakewalk.controller.capture.image.video import Footage, open_footage, read_image
 from snakewalk.controller.capture.scale import scale_of_length, scale_of_marker
 
 _SAMPLE = 25  # frames from which the background is learnt
 _FILMS = (".mp4", ".mkv", ".avi")
+_PAGES = (".html", ".htm")
 _SHEETS = (".png", ".jpg", ".jpeg")
 
 
@@ -41,6 +53,8 @@ class CaptureOptions:
     overlay: Path | None = None
     sheet: Path | None = None
     steps: Path | None = None
+    review: Path | None = None
+    corrections: Path | None = None
     force: bool = False
 
 
@@ -68,6 +82,60 @@ class CaptureFacts:
     head_by: str
     head_sure: float
     frames_with_unsure_head: int
+
+
+@dataclass(frozen=True, slots=True)
+class CorrectionFacts:
+    """Counts of a corrected recording."""
+
+    corrected: str
+    track: str
+    frames: int
+    frames_used: int
+    frames_flipped: int
+    frames_left_out: int
+    frames_redrawn: int
+    verdicts: dict[str, int]
+    """Frames of each status."""
+    frames_with_unsure_head: int
+
+
+def correct_recording(options: CaptureOptions) -> CorrectionFacts:
+    """Correct a captured track by the file of ``--corrections`` and write it anew.
+
+    Raises:
+        InputError: no captured track, no corrections of it, another option, a result that exists.
+
+    """
+    if options.corrections is None:
+        raise ValueError("there are no corrections")
+    plain = CaptureOptions(
+        options.recording, options.output, corrections=options.corrections, force=options.force
+    )
+    if options != plain:
+        raise InputError(
+            "--corrections takes the TRACK.npz of an earlier capture, -o and --force; the other "
+            "options belong to a film"
+        )
+    if options.output.suffix.lower() != ".npz":
+        raise InputError(f"{options.output}: a track is an .npz")
+    refuse_to_overwrite([options.output], options.force)
+    said = read_corrections(options.corrections)
+    held = apply_corrections(load_capture(options.recording), said, str(options.corrections))
+    with atomic_write(options.output) as part:
+        save_capture(part, held)
+    captured = held.captured
+    return CorrectionFacts(
+        corrected=str(options.recording),
+        track=str(options.output),
+        frames=len(captured.status),
+        frames_used=int(captured.used.sum()),
+        frames_flipped=len(said.flipped),
+        frames_left_out=len(said.left_out),
+        frames_redrawn=len(said.redrawn),
+        verdicts=captured.counts,
+        frames_with_unsure_head=_unsure_heads(captured),
+    )
 
 
 def capture_recording(options: CaptureOptions) -> CaptureFacts:
@@ -106,6 +174,9 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             bare = detector.background if region is WHOLE else None
             ground = whole[0] if bare is None else bare
             m_per_px = scale_of_marker(options.marker, ground)
+    scale = 1.0
+    if options.review is not None:
+        scale = picture_scale(some[::3], footage.count, str(options.recording))
     fixed = not options.cropped and len({frame.shape for frame in whole}) == 1
     with ProgressBar("frames", footage.count, transient=True) as bar:
         captured = capture(
@@ -120,15 +191,15 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         captured = replace(captured, points_px=region.moved(captured.points_px))
         if options.length_m is not None:
             m_per_px = scale_of_length(options.length_m, captured.length_px)
+        held = CaptureFile(
+            captured,
+            name=options.recording.stem,
+            m_per_px=m_per_px,
+            rate_assumed=footage.rate_assumed,
+            source=f"captured from {options.recording.name}",
+        )
         with atomic_write(options.output) as part:
-            save_capture(
-                part,
-                captured,
-                name=options.recording.stem,
-                m_per_px=m_per_px,
-                rate_assumed=footage.rate_assumed,
-                source=f"captured from {options.recording.name}",
-            )
+            save_capture(part, held)
         if options.sheet is not None:
             contact_sheet(options.sheet, footage.read(), captured)
         if options.steps is not None:
@@ -139,6 +210,18 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         if options.overlay is not None:
             bar.update(0, footage.count, description="overlay film")
             overlay_film(options.overlay, footage.read(), captured, bar.advance)
+        if options.review is not None:
+            bar.update(0, footage.count, description="review page")
+            text = review_page(
+                held,
+                map(region.cut, footage.read()),
+                scale=scale,
+                track=options.output,
+                origin_px=region.origin_px,
+                on_progress=bar.advance,
+            )
+            with atomic_write(options.review) as part:
+                part.write_text(text, encoding="utf-8")
     return _facts(options, footage, detector, captured, m_per_px)
 
 
@@ -161,8 +244,11 @@ def _check(options: CaptureOptions) -> None:
     for picture in (options.sheet, options.steps):
         if picture is not None and picture.suffix.lower() not in _SHEETS:
             raise InputError(f"{picture}: a picture is one of {', '.join(_SHEETS)}")
+    if options.review is not None and options.review.suffix.lower() not in _PAGES:
+        raise InputError(f"{options.review}: a review page is an .html")
     refuse_to_overwrite(
-        [options.output, options.overlay, options.sheet, options.steps], options.force
+        [options.output, options.overlay, options.sheet, options.steps, options.review],
+        options.force,
     )
 
 
@@ -195,7 +281,6 @@ def _facts(
     length_px = float(np.nanmedian(captured.length_px))
     known = captured.expected_px[np.isfinite(captured.expected_px)]
     error_px = float(np.median(known)) if known.size else float("nan")
-    unsure = int(np.count_nonzero(captured.margin < 0.1))
     return CaptureFacts(
         recording=str(options.recording),
         track=str(options.output),
@@ -213,5 +298,9 @@ def _facts(
         length_m=None if m_per_px is None else round(length_px * m_per_px, 5),
         head_by=captured.head_by,
         head_sure=round(captured.head_sure, 3),
-        frames_with_unsure_head=unsure,
+        frames_with_unsure_head=_unsure_heads(captured),
     )
+
+
+def _unsure_heads(captured: Capture) -> int:
+    return int(np.count_nonzero(captured.margin < 0.1))

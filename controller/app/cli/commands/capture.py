@@ -12,7 +12,11 @@ from snakewalk.controller.app.cli.options import Json, show
 
 def capture(
     recording: Annotated[
-        Path, typer.Argument(help="a video, or a folder of images", metavar="VIDEO|FOLDER")
+        Path,
+        typer.Argument(
+            help="a video, or a folder of images; with --corrections a track captured before",
+            metavar="VIDEO|FOLDER|TRACK.npz",
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="the track")] = Path("track.npz"),
     background: Annotated[
@@ -62,12 +66,30 @@ def capture(
     steps: Annotated[
         Path | None, typer.Option(help="draw the first usable frame step by step (.png, .jpg)")
     ] = None,
+    review: Annotated[
+        Path | None,
+        typer.Option(
+            help="write a page (.html) on which a person flips heads, leaves frames out, drags "
+            "points, and saves the corrections; open it in a browser",
+            metavar="PAGE",
+        ),
+    ] = None,
+    corrections: Annotated[
+        Path | None,
+        typer.Option(
+            help="apply what was saved on the review page of TRACK.npz; write to -o", metavar="JSON"
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="replace files that exist")] = False,
     as_json: Json = False,
 ) -> None:
     """Find the animal in every frame: silhouette, medial axis, 100 equal chords, head and tail."""
     require_extra("capture needs", "cv2", "skimage")
-    from snakewalk.controller.app.recordings.capturing import CaptureOptions, capture_recording  # noqa: PLC0415  heavy
+    from snakewalk.controller.app.recordings.capturing import (  # noqa: PLC0415  heavy
+        CaptureOptions,
+        capture_recording,
+        correct_recording,
+    )
 
     options = CaptureOptions(
         recording=recording,
@@ -84,6 +106,9 @@ def capture(
         overlay=overlay,
         sheet=sheet,
         steps=steps,
+        review=review,
+        corrections=corrections,
         force=force,
     )
-    show(asdict(capture_recording(options)), as_json)
+    facts = (capture_recording if corrections is None else correct_recording)(options)
+    show(asdict(facts), as_json)

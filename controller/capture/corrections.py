@@ -1,0 +1,158 @@
+"""A person's corrections of a captured recording: heads flipped, frames left out or redrawn.
+
+The page of ``snakewalk capture --review`` writes them as JSON, and ``apply_corrections`` makes the
+corrected recording of them. The file names the track that it belongs to by its fingerprint.
+"""
+
+import json
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from pydantic import Field
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.base import Strict
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import checked
+from snakewalk.controller.capture.capture import CaptureFile
+from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.capture.identity import margins
+from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
+from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton, no_skeleton
+
+_LONGEST: Final = 4.0
+"""Of the film's usual length (ours): a line drawn longer is a slip of the hand."""
+
+
+class RedrawnFrame(Strict):
+    """One frame whose points a person has drawn."""
+
+    frame: int = Field(ge=0)
+    points_px: tuple[tuple[float, float], ...] = Field(min_length=4, max_length=10_000)
+    """x, y in the picture, head first, y downwards."""
+
+
+class Corrections(Strict):
+    """What a person has corrected; frames count from 0."""
+
+    track: str
+    """``CaptureFile.fingerprint`` of the track that was looked at."""
+    frames: int = Field(ge=1)
+    """Of that track."""
+    flipped: tuple[int, ...] = ()
+    """Frames whose head is at the other end."""
+    left_out: tuple[int, ...] = ()
+    """Frames that are not to be used."""
+    redrawn: tuple[RedrawnFrame, ...] = ()
+    """Frames with points of their own, head first whether or not they are among ``flipped``."""
+
+
+def read_corrections(path: Path) -> Corrections:
+    """Read a file that the page of a review has saved.
+
+    Raises:
+        InputError: the file is not there, or holds something else.
+
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except (ValueError, RecursionError):
+        raise InputError(f"{path}: is no JSON; corrections are what a review page saves") from None
+    if not isinstance(data, dict):
+        raise InputError(f"{path}: expected a JSON object, as a review page saves it")
+    return checked(Corrections, data, str(path))
+
+
+def apply_corrections(held: CaptureFile, corrections: Corrections, name: str) -> CaptureFile:
+    """The recording with a person's corrections; frames left out beat all others.
+
+    Args:
+        held: as it was captured.
+        corrections: of this recording.
+        name: of the corrections, for faults.
+
+    Raises:
+        InputError: they belong to another track, or were applied already; a frame that is not
+            there; a line that is no body; fewer than two frames stay.
+
+    """
+    captured = held.captured
+    count = len(captured.status)
+    if corrections.track != held.fingerprint or corrections.frames != count:
+        raise InputError(
+            f"{name}: these corrections belong to another track than {held.name}, or were applied "
+            "to it already; give the track of which the page was made"
+        )
+    drawn = {one.frame: one for one in corrections.redrawn}
+    named = [*corrections.flipped, *corrections.left_out, *(r.frame for r in corrections.redrawn)]
+    beyond = sorted({k for k in named if not 0 <= k < count})
+    if beyond:
+        raise InputError(f"{name}: frame {beyond[0]} is not there: the track has {count}, from 0")
+    for key in ("flipped", "left_out"):
+        twice = [k for k, times in Counter(getattr(corrections, key)).items() if times > 1]
+        if twice:
+            raise InputError(f"{name}: {key}: frame {twice[0]} stands there twice")
+    if len(drawn) < len(corrections.redrawn):
+        raise InputError(f"{name}: redrawn: a frame stands there twice")
+    usual_px = float(np.nanmedian(captured.length_px))
+    usual_radius = np.nanmedian(captured.radius_px, axis=0)
+    flipped, left_out = set(corrections.flipped), set(corrections.left_out)
+    expected = captured.expected_px.copy()
+    skeletons: list[Skeleton] = []
+    for k, status in enumerate(captured.status):
+        before = Skeleton(
+            captured.points_px[k], captured.radius_px[k], float(captured.length_px[k]), status
+        )
+        if k in left_out:
+            after = no_skeleton(FrameStatus.LEFT_OUT)
+        elif k in drawn:
+            after = _redrawn(f"{name}: frame {k}", drawn[k], usual_px, usual_radius)
+        else:
+            after = before.reversed() if k in flipped else before
+        if k in left_out or k in drawn:
+            expected[k] = np.nan
+        skeletons.append(after)
+    length = np.array([one.length_px for one in skeletons])
+    if np.isfinite(length).sum() < 2:
+        raise InputError(f"{name}: fewer than 2 frames with points stay; no motion is left")
+    corrected = replace(
+        captured,
+        points_px=np.stack([one.points_px for one in skeletons]),
+        radius_px=np.stack([one.radius_px for one in skeletons]),
+        length_px=length,
+        status=tuple(one.status for one in skeletons),
+        expected_px=expected,
+        margin=margins(skeletons),
+        head_by="given" if flipped else captured.head_by,
+        head_sure=1.0 if flipped else captured.head_sure,
+    )
+    told = (
+        f"; corrected by a person: {len(flipped)} frames flipped, {len(left_out)} left out, "
+        f"{len(drawn)} redrawn"
+    )
+    return replace(held, captured=corrected, source=held.source + told)
+
+
+def _redrawn(where: str, drawn: RedrawnFrame, usual_px: float, radius_px: Floats) -> Skeleton:
+    """The line that a person drew, at equal chords; as thick as the body usually is."""
+    line = np.array(drawn.points_px, dtype=float)
+    length = float(np.hypot(*np.diff(line, axis=0).T).sum()) if np.isfinite(line).all() else 0.0
+    if not 1.0 < length < _LONGEST * usual_px:
+        raise InputError(
+            f"{where}: the line is {length:.1f} px long, the body usually {usual_px:.1f} px: it is "
+            "no body"
+        )
+    try:
+        even = equipartition(line, SEGMENTS)
+    except (NoEquipartitionError, ValueError):
+        raise InputError(
+            f"{where}: the line cannot be divided into {SEGMENTS} equal chords; it is folded upon "
+            "itself"
+        ) from None
+    status = FrameStatus.BY_HAND
+    return Skeleton(even.points, radius_px.copy(), even.chord * SEGMENTS, status)
