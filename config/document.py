@@ -15,6 +15,7 @@ from pydantic_core import PydanticUndefined
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.gait import GaitSetConfig
 from snakewalk.config.loader import Kind, locate, shipped
+from snakewalk.config.playback import ScheduleConfig
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
@@ -30,6 +31,7 @@ SCHEMAS: Final[Mapping[str, type[BaseModel]]] = {
     "gait": GaitSetConfig,
     "recording": RecordingConfig,
     "skin": SkinConfig,
+    "schedule": ScheduleConfig,
     "faults": FaultPlan,
 }
 """Model by the name of its file; a synthesis is also a table of a run."""
@@ -62,11 +64,11 @@ default and its meaning (`--robot`, `--from RUN`: like another one), and `snakew
 mine/run.toml` runs them as they are.
 
 **In an editor.** `snakewalk schema run` (`robot`, `world`, `synthesis`, `gait`, `recording`,
-`skin`, `faults`) prints the JSON Schema of such a file. `init` writes those of its three files
-into `mine/schema/` and names them in each file's first line, `#:schema schema/run.json`: that is
-all that the extension *Even Better TOML* of VS Code needs, and `taplo check run.toml` on a
-command line, to complete keys, show their meaning and mark what is wrong. For files elsewhere a
-`.taplo.toml` says it:
+`skin`, `schedule`, `faults`) prints the JSON Schema of such a file. `init` writes those of its
+three files into `mine/schema/` and names them in each file's first line, `#:schema
+schema/run.json`: that is all that the extension *Even Better TOML* of VS Code needs, and `taplo
+check run.toml` on a command line, to complete keys, show their meaning and mark what is wrong. For
+files elsewhere a `.taplo.toml` says it:
 
 ```
 [[rule]]

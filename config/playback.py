@@ -1,12 +1,15 @@
-"""How a recording is played in time: table ``playback`` of a run; the file is its ``track``."""
+"""How recordings (table ``playback`` of a run) and recorded actions (``repertoire``) are played."""
+
+from typing import Annotated
 
 from pydantic import Field
 
 from snakewalk.config.base import Strict
+from snakewalk.config.synthesis import Curve, Knots
 
 
 class PlaybackConfig(Strict):
-    """A recording in place of a walk."""
+    """A recording in place of a walk; the file is the run's ``track``."""
 
     speed: float | None = Field(
         None, gt=0.0, le=10.0, description="times the animal's own; default: as fast as joints can"
@@ -16,4 +19,27 @@ class PlaybackConfig(Strict):
     )
     clip: bool = Field(
         False, description="joints are held within their limits, where the recording bends further"
+    )
+
+
+class ScheduleConfig(Strict):
+    """Wanted speed and turn; a curve is a number, or [[s, value]...]: linear between, level beyond.
+
+    Below the half of the slowest action's speed the body rests, below nought it goes back.
+    """
+
+    speed_m_s: Annotated[Curve, Knots] = Field(0.4, description="wanted")
+    turn_rad_s: Annotated[Curve, Knots] = Field(0.0, description="wanted, positive to the left")
+    duration_s: float = Field(20.0, gt=0.0, description="then it comes to rest")
+
+
+class RepertoireConfig(ScheduleConfig):
+    """Recorded actions in place of a walk ([YT])."""
+
+    file: str = Field(description="what `snakewalk repertoire record` wrote")
+    patience: int | None = Field(
+        None,
+        ge=1,
+        description="cycles of an action after which another one of its kind follows; "
+        "default: it stays",
     )

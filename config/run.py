@@ -9,7 +9,7 @@ from snakewalk.config.base import Name, Strict
 from snakewalk.config.camera import CameraConfig, PoseName
 from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.gait import GaitConfig
-from snakewalk.config.playback import PlaybackConfig
+from snakewalk.config.playback import PlaybackConfig, RepertoireConfig
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.synthesis import SynthesisConfig
 
@@ -176,6 +176,7 @@ class RunConfig(Strict):
     safety: SafetyConfig = SafetyConfig()
     gait: GaitConfig | None = None
     playback: PlaybackConfig | None = None
+    repertoire: RepertoireConfig | None = None
     compliance: ComplianceConfig | None = Field(
         None, description="joint goals that yield to measured current; default: they do not"
     )
@@ -189,6 +190,7 @@ class RunConfig(Strict):
     def _motion_has_its_table(self) -> Self:
         if self.motion == "gait" and self.gait is None:
             raise ValueError("motion gait needs a table [gait] with its name")
-        if self.motion not in {"gait", "playback", "source"} and not self.waypoints_m:
+        pathless = {"gait", "playback", "source"} | ({"repertoire"} if self.repertoire else set())
+        if self.motion not in pathless and not self.waypoints_m:
             raise ValueError("waypoints_m: at least one is needed")
         return self

@@ -43,9 +43,10 @@ def _some(along: Along) -> Along:
     return along
 
 
-_Knots = AfterValidator(_knots)
+Knots = AfterValidator(_knots)
+"""Of a ``Curve``: its times must increase."""
 _Along = AfterValidator(_some)
-_Share = Annotated[Curve, _Knots, _within(0.0, 1.0)]
+_Share = Annotated[Curve, Knots, _within(0.0, 1.0)]
 
 
 def curve_at(curve: Curve, time_s: ArrayLike) -> Floats:
@@ -106,7 +107,7 @@ class SynthesisConfig(Strict):
     sliding_along: Annotated[Along, _Along] = Field(
         (1.0,), description="factors of w_d, head to tail"
     )
-    pulse_m_s: Annotated[Curve, _Knots, _within(-10.0, 10.0)] = Field(
+    pulse_m_s: Annotated[Curve, Knots, _within(-10.0, 10.0)] = Field(
         0.0, description="g: pulse beside the body's speed"
     )
     pulse_along: Annotated[Along, _Along] = Field((1.0,), description="factors of g, head to tail")
@@ -120,7 +121,7 @@ class SynthesisConfig(Strict):
     waves: WavesConfig = WavesConfig()
     head_held: _Share = Field(0.0, description="how far the head points where the body heads")
     calm_tail: _Share = Field(0.0, description="how far the tail's bends are flattened")
-    tongue_speed: Annotated[Curve, _Knots, _within(0.4, 2.5)] = Field(
+    tongue_speed: Annotated[Curve, Knots, _within(0.4, 2.5)] = Field(
         1.0, description="b_st: how fast the tongue flicks"
     )
 

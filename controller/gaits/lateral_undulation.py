@@ -17,10 +17,11 @@ class LateralUndulationParameters(GaitParameters):
     turn_rad: float = Field(
         0.0, ge=-2.5, le=2.5, description="bend of the axis over the body; positive turns left"
     )
+    backward: bool = Field(False, description="tail first: the wave runs to the head")
 
 
 class LateralUndulation(Gait):
-    """``q_j = A sin(phase - 2 pi k s_j) + turn / n`` on the yaw joints."""
+    """``q_j = A sin(phase - 2 pi k s_j) + turn / n`` on the yaw joints; backward, in -phase."""
 
     name = "lateral-undulation"
     title = "a wave in the plane runs to the tail, the body goes forward along itself"
@@ -33,6 +34,6 @@ class LateralUndulation(Gait):
         p, yaw = self.params, robot.yaw_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         amplitude = joint_amplitude_rad(robot, yaw, p.winding_rad, p.waves)
-        wave = travelling(robot, yaw, phase_rad, p.waves, 0.0)
+        wave = travelling(robot, yaw, -phase_rad if p.backward else phase_rad, p.waves, 0.0)
         joints[:, yaw] = amplitude * wave + p.turn_rad / len(yaw)
         return joints

@@ -18,8 +18,20 @@ class Crowd:
     ``link_m(k)`` of a body that is not ``visible`` is stale: only its body frame goes on.
     """
 
-    def __init__(self, repertoire: Repertoire, bodies: int, *, largest_tip_m: float = 0.02) -> None:
-        """Put all bodies at the origin, at the beginning of the first segment."""
+    def __init__(
+        self,
+        repertoire: Repertoire,
+        bodies: int,
+        *,
+        largest_tip_m: float = 0.02,
+        balance_rad: float = 0.0,
+    ) -> None:
+        """Put all bodies at the origin, at the beginning of the first segment.
+
+        ``balance_rad``: by how much a body that has come to lean rolls upright in a frame, at most
+        ([YT] 4.2); 0 replays exactly what was recorded.
+        """
+        self._balance_rad = balance_rad
         segments = repertoire.segments
         lengths = np.array([segment.frames for segment in segments])
         self._first = np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int32)
@@ -92,7 +104,7 @@ class Crowd:
                 self._turn, self._move, self._shape, self._first, self._last, self._bridge_length,
                 self.rotation, self.origin_m, self.scale, self.visible, self.segment, self.cycles,
                 self._playing, self._next, self._ended, self._bridge_from, self._bridge_frames,
-                self._bridge_remaining, self._points,
+                self._bridge_remaining, self._points, self._balance_rad,
             )  # fmt: skip
 
 
@@ -111,13 +123,26 @@ def _orthonormalise(r):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
+def _balance(r, most):  # type: ignore[no-untyped-def]
+    """Roll about the body's x, by ``most`` at most, towards where its z points up the most."""
+    roll = min(max(np.arctan2(-r[7], r[8]), -most), most)
+    c, s = np.cos(roll), np.sin(roll)
+    for k in range(3):
+        y, z = r[3 * k + 1], r[3 * k + 2]
+        r[3 * k + 1], r[3 * k + 2] = c * y + s * z, c * z - s * y
+
+
+@njit(cache=True, fastmath=True, error_model="numpy")
 def _step(  # type: ignore[no-untyped-def]  # noqa: PLR0915
     turn, move, shape, first, last, bridge, rotation, origin, scale, visible, requested,
     cycles, playing, following, ended, bridge_from, bridge_frames_of, bridge_remaining, points,
+    balance,
 ):  # fmt: skip
     """One frame of every body; plain numbers, for a slice in this loop costs more than its work."""
     lanes = shape.shape[2]
     for b in range(len(following)):
+        if balance > 0.0:
+            _balance(rotation[b], balance)
         if ended[b]:
             ended[b] = False
             cycles[b] += 1

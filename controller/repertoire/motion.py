@@ -20,14 +20,19 @@ Choose = Callable[[BodyView], int | None]
 
 
 class SegmentCycle:
-    """The joint goals of one segment, over and over."""
+    """The joint goals of one segment, over and over; a brake's once, then it holds its end."""
 
     done = False
 
     def __init__(self, segment: Segment, robot: RobotConfig) -> None:
-        goals = np.concatenate([segment.goal_rad, segment.goal_rad[:1]])
+        self._once = segment.kind == "brake"
+        end = segment.goal_rad[-1:] if self._once else segment.goal_rad[:1]
+        goals = np.concatenate([segment.goal_rad, end])
         time_s = segment.frame_s * np.arange(len(goals))
-        self._spline = CubicSpline(time_s, goals, bc_type="periodic")
+        if self._once:
+            self._spline = CubicSpline(time_s, goals, bc_type=("not-a-knot", "clamped"))
+        else:
+            self._spline = CubicSpline(time_s, goals, bc_type="periodic")
         self.duration_s = segment.duration_s
         fine = np.linspace(0.0, self.duration_s, 4 * len(goals))
         self._pace = Pace(
@@ -46,13 +51,19 @@ class SegmentCycle:
         """Gone through so far."""
         return self.gone_s / self.duration_s
 
+    @property
+    def _at_s(self) -> float:
+        if self._once:
+            return min(self.gone_s, self.duration_s)
+        return self.gone_s % self.duration_s
+
     def goal_rad(self) -> Floats:
         """(J,) joint targets now."""
-        return np.asarray(self._spline(self.gone_s % self.duration_s), dtype=float)
+        return np.asarray(self._spline(self._at_s), dtype=float)
 
     def velocity_rad_s(self) -> Floats:
         """(J,) how fast they move now."""
-        return np.asarray(self._spline(self.gone_s % self.duration_s, 1), dtype=float)
+        return np.asarray(self._spline(self._at_s, 1), dtype=float)
 
     def pace(self) -> Pace:
         """Largest over a cycle."""

@@ -28,6 +28,9 @@ class MotionPrimitives:
         """(A, SAMPLES, 3) x, y, heading in the frame at the beginning of the cycle."""
         self.duration_s = np.array([segment.duration_s for segment in repertoire.segments])
         """(A,)"""
+        kinds = [segment.kind for segment in repertoire.segments]
+        self.tried: Ints = np.flatnonzero(np.isin(kinds, ["forward", "left", "right"]))
+        """(B,) actions of which the search makes sequences: it never goes back or rests."""
         end = self.travel[:, -1]
         chord = np.hypot(end[:, 0], end[:, 1])
         best = int(np.argmax(chord / self.duration_s))
@@ -99,8 +102,10 @@ def search(
         candidates += len(ends)
         cost = spent + _remaining_s(primitives, ends, count, goals, after, radius_m)
         order = np.argsort(cost, kind="stable")[:beam]
-        parent, action = np.divmod(order, len(primitives.duration_s))
-        level = _Level(ends[order], count[order], spent[order], level, parent, action)
+        parent, action = np.divmod(order, len(primitives.tried))
+        level = _Level(
+            ends[order], count[order], spent[order], level, parent, primitives.tried[action]
+        )
         done = level.passed >= len(goals)
         if done.any():
             first = int(np.argmin(np.where(done, level.time_s, np.inf)))
@@ -142,19 +147,23 @@ class _Level:
 def _expanded(
     primitives: MotionPrimitives, level: _Level, goals: Floats, radius_m: float
 ) -> tuple[Floats, Ints, Floats]:
-    """Every action after each sequence: (nA, 3) poses, (nA,) waypoints passed, (nA,) time."""
+    """Every action after each sequence: (nB, 3) poses, (nB,) waypoints passed, (nB,) time."""
     c, s = np.cos(level.pose[:, 2]), np.sin(level.pose[:, 2])
-    x, y = primitives.travel[None, :, :, 0], primitives.travel[None, :, :, 1]
+    travel, duration_s = (
+        primitives.travel[primitives.tried],
+        primitives.duration_s[primitives.tried],
+    )
+    x, y = travel[None, :, :, 0], travel[None, :, :, 1]
     at_x = level.pose[:, 0, None, None] + c[:, None, None] * x - s[:, None, None] * y
     at_y = level.pose[:, 1, None, None] + s[:, None, None] * x + c[:, None, None] * y
-    count = np.repeat(level.passed[:, None], len(primitives.duration_s), axis=1)
+    count = np.repeat(level.passed[:, None], len(travel), axis=1)
     for k in range(SAMPLES):  # in time: a cycle may pass two waypoints
         goal = goals[np.minimum(count, len(goals) - 1)]
         gap = np.hypot(at_x[:, :, k] - goal[:, :, 0], at_y[:, :, k] - goal[:, :, 1])
         count += (gap <= radius_m) & (count < len(goals))
-    heading = level.pose[:, 2, None] + primitives.travel[None, :, -1, 2]
+    heading = level.pose[:, 2, None] + travel[None, :, -1, 2]
     ends = np.stack([at_x[:, :, -1], at_y[:, :, -1], heading], axis=2)
-    spent = level.time_s[:, None] + primitives.duration_s
+    spent = level.time_s[:, None] + duration_s
     return ends.reshape(-1, 3), count.ravel(), spent.ravel()
 
 

@@ -1,4 +1,4 @@
-"""One cycle of an action in the body frame, as recorded ([YT] 3.1, Eq. 6-8, corrected)."""
+"""One cycle of an action, or a brake, in the body frame ([YT] 3.1, Eq. 6-8, corrected)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,9 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.frame import Frame
 
-Kind = Literal["forward", "left", "right"]
+Kind = Literal["forward", "left", "right", "reverse", "brake", "rest"]
+"""[YT] 3.2: forward and turns; retreating and braking, which there are made of forward; and rest,
+what a brake ends in. All but a brake are one settled cycle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +67,11 @@ class Segment:
 
     @property
     def speed_m_s(self) -> float:
-        """Distance of a cycle over its time, along the arc."""
+        """Distance of a cycle over its time, along the arc; negative where it goes tail first."""
         x, y, turn = self.flat_travel()[-1]
         half = 0.5 * float(turn)
-        return float(np.hypot(x, y)) / float(np.sinc(half / np.pi)) / self.duration_s
+        distance_m = float(np.copysign(np.hypot(x, y), x))
+        return distance_m / float(np.sinc(half / np.pi)) / self.duration_s
 
     @property
     def turn_rad_s(self) -> float:

@@ -40,7 +40,8 @@ from snakewalk.controller.app.cli.commands.logs.report import report
 from snakewalk.controller.app.cli.commands.logs.view import view
 from snakewalk.controller.app.cli.commands.plan import plan
 from snakewalk.controller.app.cli.commands.play import play
-from snakewalk.controller.app.cli.commands.repertoire import record, run_plan, show_file
+from snakewalk.controller.app.cli.commands.repertoire.playback import play_actions
+from snakewalk.controller.app.cli.commands.repertoire.repertoire import record, run_plan, show_file
 from snakewalk.controller.app.cli.commands.run import run
 from snakewalk.controller.app.cli.commands.sweep import sweep
 from snakewalk.controller.app.cli.commands.synthesise import synthesise as synthesise_walk
@@ -381,6 +382,13 @@ repertoire.command(
 
 repertoire.command("show", epilog=_examples("repertoire show repertoire-yaw16-flat.npz"))(show_file)
 
+repertoire.command(
+    "play",
+    epilog=_examples(
+        "repertoire play --speed 0.6 --turn 0.3",
+        "repertoire play repertoire-yaw16-flat.npz --schedule wanted.toml --picture wanted.png",
+    ),
+)(play_actions)
 repertoire.command(
     "run",
     epilog=_examples("repertoire run plan.json", "repertoire run plan.json --open-loop --json"),

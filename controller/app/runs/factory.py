@@ -19,12 +19,14 @@ from snakewalk.config.loader import (
     shipped,
     with_keys,
 )
+from snakewalk.config.playback import ScheduleConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.runs.gait_run import GaitRun, MakeOperator
 from snakewalk.controller.app.runs.playback_run import PlaybackRun
 from snakewalk.controller.app.runs.prepared_run import PreparedRun
+from snakewalk.controller.app.runs.schedule_run import ScheduleRun
 from snakewalk.controller.app.runs.source_run import MakeSource, SourceRun
 from snakewalk.controller.app.runs.steered_run import SteeredRun
 from snakewalk.controller.app.runs.walk_run import WalkRun
@@ -32,6 +34,7 @@ from snakewalk.controller.capture.readers.load import track_beside
 from snakewalk.controller.gaits.gait import Gait, fitting_robot
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.motion.recorded import Recorded
+from snakewalk.controller.repertoire.repertoire import load_repertoire
 from snakewalk.drivers.bus.budget import chain_budget
 
 C = TypeVar("C", RunConfig, RobotConfig, WorldConfig)
@@ -48,8 +51,9 @@ GAIT_PITCH_SHARE = 0.75
 
 _OWN_MOTION = {"run.robot": "--robot", "run.motion": "the command"}
 _OF_A_GAIT = _OWN_MOTION | {"run.gait": "--param, --seconds, --then, --by, --look-heading-rad"}
+_OF_A_SCHEDULE = _OWN_MOTION | {"run.repertoire": "FILE, --speed, --turn, --schedule, --seconds"}
 _OF_A_RECORDING = _OWN_MOTION | {"run.track": "TRACK", "run.playback": "--speed, --scale, --clip"}
-"""Keys that a gait's or a recording's run takes from its command, by the options that give them."""
+"""Keys that a run of one command takes from that command, by the options that give them."""
 
 
 def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
@@ -64,6 +68,8 @@ def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Prepa
     if run.motion == "playback":
         return PlaybackRun(run, robot, world)
     if run.motion == "repertoire":
+        if run.repertoire is not None:
+            return ScheduleRun(run, robot, world)
         raise InputError(f"run {run.name}: made again by: snakewalk repertoire run PLAN")
     if run.motion == "source":
         raise InputError(
@@ -132,7 +138,10 @@ def prepare_job(
     if run.motion == "playback":
         raise InputError(f"run {run.name}: a recording is played by: snakewalk play TRACK")
     if run.motion == "repertoire":
-        raise InputError(f"run {run.name}: planned by: snakewalk plan --with repertoire")
+        raise InputError(
+            f"run {run.name}: planned by: snakewalk plan --with repertoire; without waypoints "
+            "played by: snakewalk repertoire play"
+        )
     if run.motion == "source":
         raise InputError(f"run {run.name}: a source of your own is run by prepare_source")
     robot = _with_keys_of("robot", load_robot(run.robot, beside), keys)
@@ -343,6 +352,43 @@ def prepare_playback(
         return prepared
     limit = {"time_limit_s": prepared.duration_s + 30.0}
     return replace(prepared, run=run.model_copy(update=limit))
+
+
+def prepare_schedule(
+    file: Path,
+    schedule: ScheduleConfig,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    patience: int | None = None,
+    seed: int = 0,
+    keys: Mapping[str, object] | None = None,
+) -> ScheduleRun:
+    """Prepare to play recorded actions by wanted speed and turn; ``keys`` as of ``prepare_walk``.
+
+    Robot and world are by default those of the recording.
+
+    Raises:
+        InputError: no repertoire, or one of other joints; a ground that is not flat.
+
+    """
+    keys = _checked_keys(keys, _OF_A_SCHEDULE)
+    recorded = load_repertoire(file)
+    body = _with_keys_of("robot", load_robot(robot or recorded.robot), keys)
+    fields = {
+        "name": file.stem,
+        "robot": body.name,
+        "world": world or recorded.world,
+        "motion": "repertoire",
+        "seed": seed,
+        "time_limit_s": schedule.duration_s + 30.0,
+        "repertoire": schedule.model_dump() | {"file": str(file), "patience": patience},
+    }
+    run = _with_keys_of("run", checked(RunConfig, fields, "command line"), keys)
+    _check_servos(run, body)
+    prepared = ScheduleRun(run, body, _with_keys_of("world", load_world(run.world), keys))
+    prepared.check_plan()
+    return prepared
 
 
 def prepare_source(

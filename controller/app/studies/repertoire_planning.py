@@ -237,7 +237,7 @@ def search_cost(
     spent, ran = 0.0, 0
     while ran < candidates:
         count = min(length, candidates - ran)
-        actions = tuple(int(k) for k in random.integers(len(job.primitives.duration_s), size=count))
+        actions = tuple(int(k) for k in random.choice(job.primitives.tried, size=count))
         spent += physics_route(job, actions)[0]
         ran += count
         on_progress(ran)

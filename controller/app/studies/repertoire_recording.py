@@ -12,6 +12,7 @@ from snakewalk.controller.app.studies.repertoire_physics import FRAME_S, Physics
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.gaits.wave import TURN
 from snakewalk.controller.kinematics.frame import body_frame
+from snakewalk.controller.kinematics.smoothstep import cubic_sum
 from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
@@ -23,7 +24,7 @@ SETTLING = 3
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """A lateral undulation with its own numbers."""
+    """A lateral undulation with its own numbers; of a brake or a rest, the one that it ends."""
 
     name: str
     kind: Kind
@@ -40,8 +41,13 @@ ACTIONS = (
     Action("left-sharp", "left", 0.8, 1.5),
     Action("right-gentle", "right", 0.8, -0.6),
     Action("right-sharp", "right", 0.8, -1.5),
+    Action("reverse", "reverse", 0.5),
+    Action("brake", "brake", 0.8),
+    Action("rest", "rest", 0.8),
 )
-"""[YT] 3.3: three speeds, and gradual and sharp turns to either side."""
+"""[YT] 3.3: three speeds, and gradual and sharp turns to either side. There braking and retreating
+are made of a forward action played slower and backwards; here they are recorded, too."""
+REST_S = 0.5
 
 
 def record(
@@ -67,8 +73,15 @@ def record_action(
     action: Action,
     on_progress: Callable[[str, float], None] = lambda name, share: None,
 ) -> Segment:
-    """Run one action from rest, and keep the cycle after ``SETTLING`` others."""
-    parameters: dict[str, Any] = {"turn_rad": action.turn_rad, "frequency_hz": action.frequency_hz}
+    """Run one action from rest, and keep the cycle after ``SETTLING`` others.
+
+    A brake takes two cycles' time for the next one, ever slower; a rest is kept after that.
+    """
+    parameters: dict[str, Any] = {
+        "turn_rad": action.turn_rad,
+        "frequency_hz": action.frequency_hz,
+        "backward": action.kind == "reverse",
+    }
     asked = GaitCycle(make_gait("lateral-undulation", parameters), robot)
     count = int(np.ceil(1.0 / (asked.frequency_hz * FRAME_S) - 1e-9))
     parameters["frequency_hz"] = 1.0 / (count * FRAME_S)
@@ -81,16 +94,28 @@ def record_action(
         # from phase 0 on, so that all actions begin alike
         while min(motion.phase_rad, TURN - motion.phase_rad) > 0.51 * TURN / count:
             body.frame(motion.step(FRAME_S, body.view()))
-        for k in range(count + 1):
+        kept = np.arange(count + 1) / count
+        if action.kind in {"brake", "rest"}:
+            share = np.arange(2 * count + 1) / (2 * count)
+            kept = 2.0 * (share - cubic_sum(share))  # rate 1 - cubic, a cycle in the time of two
+        sent = motion.gait.joints_rad(robot, motion.phase_rad + TURN * kept)
+        if action.kind == "rest":
+            for goal in sent[1:]:
+                body.frame(goal)
+            sent = np.repeat(sent[-1:], round(REST_S / FRAME_S) + 1, axis=0)
+            for _ in range(3):
+                for goal in sent:
+                    body.frame(goal)
+        for k, goal in enumerate(sent):
             view = body.view()
             frames.append(body_frame(view.link_m))
             links.append(view.link_m)
             rotations.append(view.rotation)
             joints.append(body.joint_rad)
-            if k < count:
-                goals.append(motion.goal_rad())
-                body.frame(motion.step(FRAME_S, view))
-                on_progress(action.name, (SETTLING + k / count) / (SETTLING + 1))
+            if k < len(sent) - 1:
+                goals.append(goal)
+                body.frame(sent[k + 1])
+                on_progress(action.name, (SETTLING + k / len(sent)) / (SETTLING + 1))
     return cut(
         action.name,
         action.kind,

@@ -15,7 +15,7 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_help_has_an_example() -> None:
-    for command in ("record", "show", "run"):
+    for command in ("record", "show", "play", "run"):
         done = snakewalk("repertoire", command, "--help")
         assert done.returncode == 0, done.stderr
         assert f"snakewalk repertoire {command}" in done.stdout
@@ -50,6 +50,10 @@ def test_plan_save_and_refuse_to_overwrite(repertoire: Repertoire, tmp_path: Pat
         (("repertoire", "record", "--robot", "nosuch"), "nosuch"),
         (("repertoire", "show", "none.npz"), "no such file"),
         (("repertoire", "run", "none.json"), "no such plan"),
+        (("repertoire", "play", "none.npz"), "no such file"),
+        (("repertoire", "play", "--speed", "1", "--schedule", "a.csv"), "leave out --speed"),
+        (("repertoire", "play", "--schedule", "none.toml"), "none.toml"),
+        (("repertoire", "play", "--seconds", "0"), "must be over 0"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(

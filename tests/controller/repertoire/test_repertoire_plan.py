@@ -55,7 +55,7 @@ def test_a_wide_beam_finds_the_quickest_of_all_sequences(repertoire: Repertoire)
     route = search(primitives, [0.0, 0.0, 0.0], [tuple(goal)], radius, beam=10_000)
     best = np.inf
     for length in (1, 2, 3):
-        for actions in itertools.product(range(len(primitives.duration_s)), repeat=length):
+        for actions in itertools.product(primitives.tried, repeat=length):
             pose, hit = np.zeros(3), False
             for action in actions:
                 c, s = np.cos(pose[2]), np.sin(pose[2])

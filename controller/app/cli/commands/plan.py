@@ -134,7 +134,7 @@ def _plan_with_repertoire(
     as_json: bool,
 ) -> None:
     """Search, show, and where asked save, time on the physics, and run."""
-    from snakewalk.controller.app.cli.commands.repertoire import carry_out  # noqa: PLC0415
+    from snakewalk.controller.app.cli.commands.repertoire.repertoire import carry_out  # noqa: PLC0415
     from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
     from snakewalk.controller.app.studies.repertoire_planning import (  # noqa: PLC0415  heavy; --help stays quick
         plan_facts,

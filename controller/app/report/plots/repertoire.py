@@ -1,11 +1,13 @@
 """Pictures of a repertoire: the actions' displacements, and a planned route beside the real one."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from snakewalk.controller.app.report.figures.style import save_picture
 from snakewalk.controller.app.runs.repertoire_run import RepertoireRun
+from snakewalk.controller.app.runs.schedule_run import PlayedAction, ScheduleRun
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.replay import replay
@@ -70,4 +72,36 @@ def draw_route(job: RepertoireRun, record: RunRecord, path: Path) -> None:
     axis.set_ylabel("y, m")
     axis.grid(alpha=0.25)
     figure.legend(fontsize=8, loc="outside lower center", ncols=3)
+    save_picture(figure, path, dpi=90)
+
+
+def draw_schedule(job: ScheduleRun, played: Sequence[PlayedAction], path: Path) -> None:
+    """Draw wanted speed and turn over time, those of the actions chosen, and the body's own."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  an extra
+
+    figure = Figure(figsize=(8.0, 4.4), layout="constrained")
+    axes = figure.subplots(2, 1, sharex=True)
+    end_s = played[-1].begin_s + job.repertoire.segments[played[-1].action].duration_s
+    fine_s = np.linspace(0.0, end_s, 500)
+    requested = np.array([job.requested(t) for t in fine_s])
+    edges_s = [*(action.begin_s for action in played), end_s]
+    parts = (("recorded", "the action's", SHADES[1]), ("measured", "the body's", SHADES[2]))
+    for axis, which, name in zip(axes, (0, 1), ("speed, m/s", "turn, rad/s"), strict=True):
+        axis.plot(fine_s, requested[:, which], color=SHADES[0], lw=2.5, label="wanted")
+        for key, label, shade in parts:
+            values = [getattr(action, key)[which] for action in played]
+            axis.stairs(values, edges_s, color=shade, lw=1.2, label=label, baseline=None)
+        axis.set_ylabel(name)
+        axis.grid(alpha=0.25)
+    before = None
+    for one in played:
+        if one.action != before:
+            name = job.repertoire.segments[one.action].name
+            axes[0].annotate(
+                name, (one.begin_s, 1.02), xycoords=("data", "axes fraction"), fontsize=7,
+                rotation=35, va="bottom",
+            )  # fmt: skip
+        before = one.action
+    axes[1].set_xlabel("time, s")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     save_picture(figure, path, dpi=90)

@@ -73,7 +73,7 @@ def init(
                 }
             ),
             _RUN,
-            without={"gait", "playback"},
+            without={"gait", "playback", "repertoire"},
         ),
         "robot.toml": template(body.model_copy(update={"name": "my-robot"}), _ROBOT),
         "world.toml": template(

@@ -1,0 +1,106 @@
+"""``repertoire play``: wanted speed and turn become actions, on the simulated bus."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import ConfigError, InputError
+from snakewalk.config.playback import ScheduleConfig
+from snakewalk.controller.app.runs.execute import execute
+from snakewalk.controller.app.runs.factory import prepare_run, prepare_schedule
+from snakewalk.controller.app.runs.schedule_run import ScheduleMotion, read_schedule
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.drivers.types import BodyPose
+
+
+@pytest.fixture(scope="module")
+def file(repertoire: Repertoire, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("schedule") / "r.npz"
+    repertoire.save(path)
+    return path
+
+
+WANTED = ScheduleConfig(
+    speed_m_s=((0.0, 0.6), (2.4, 0.6), (2.5, 0.0), (5.0, 0.0), (5.1, -0.4)),
+    turn_rad_s=((0.0, 0.9), (1.2, 0.9), (1.3, 0.0)),
+    duration_s=10.5,
+)
+
+
+@pytest.mark.parametrize("size", [1.0, 1.4])
+def test_the_body_does_what_the_actions_did_when_recorded_also_at_another_size(
+    file: Path, tmp_path: Path, size: float
+) -> None:
+    keys = {"robot.link_length_m": 0.07 * size}
+    prepared = prepare_schedule(file, WANTED, keys=keys)
+    assert prepared.scale == pytest.approx(size)
+    finished = execute(prepared, tmp_path)
+    assert isinstance(finished.source, ScheduleMotion)
+    names = [segment.name for segment in prepared.repertoire.segments]
+    played = finished.source.played
+    done = [names[one.action] for one in played]
+    assert done[:2] == ["left-sharp", "forward-fast" if size == 1.0 else "forward-medium"]
+    at = done.index("brake")
+    assert set(done[at + 1 :]) <= {"rest", "reverse"}
+    back = played[-1]
+    assert done[-1] == "reverse"
+    assert back.recorded[0] == pytest.approx(-0.377 * size, rel=0.03)
+    assert back.measured[0] == pytest.approx(back.recorded[0], rel=0.1)
+    assert finished.outcome.tripped is None
+    record = finished.record
+    assert prepare_run(record.header.run, prepared.robot, prepared.world) == prepared
+
+
+def test_a_motion_on_paper_follows_its_schedule_and_ends_at_rest(file: Path) -> None:
+    prepared = prepare_schedule(file, WANTED)
+    motion = prepared.make_source(lambda kind, text: None)
+    still = body_in_world(prepared.robot, BodyPose(0.0, np.zeros(3), np.eye(3)), np.zeros(16))
+    goals = [motion.goal_rad()]
+    for _ in range(1400):
+        goals.append(motion.step(0.01, still))
+    assert motion.done
+    np.testing.assert_array_equal(goals[-1], goals[-2])
+    speed = np.diff(goals, axis=0) / 0.01
+    assert np.abs(speed).max() <= 1.03 * prepared.robot.joint_speed_limit_rad_s
+
+
+def test_a_schedule_is_toml_or_csv(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text("speed_m_s = [[0, 0.5], [4, 0.0]]\nduration_s = 9.0\n")
+    assert read_schedule(tmp_path / "a.toml").speed_m_s == ((0.0, 0.5), (4.0, 0.0))
+    (tmp_path / "a.csv").write_text("time_s,speed_m_s,turn_rad_s\n0,0.5,0.1\n4,0.0,-0.1\n")
+    found = read_schedule(tmp_path / "a.csv")
+    assert found.turn_rad_s == ((0.0, 0.1), (4.0, -0.1))
+    assert found.duration_s == 4.0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time_s,speed\n0,1\n", "expected the columns time_s,speed_m_s,turn_rad_s"),
+        ("time_s,speed_m_s,turn_rad_s\n0,fast,0\n", ":2: fast where a number should be"),
+        ("time_s,speed_m_s,turn_rad_s\n0,nan,0\n", ":2: nan where a number should be"),
+        ("time_s,speed_m_s,turn_rad_s\n0,1\n", ":2: nothing where a number should be"),
+        ("time_s,speed_m_s,turn_rad_s\n", "no rows"),
+        ("time_s,speed_m_s,turn_rad_s\n2,1,0\n1,1,0\n", "times that increase"),
+        ("", "expected the columns"),
+    ],
+)
+def test_a_wrong_table_is_told(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said):
+        read_schedule(path)
+
+
+def test_what_cannot_be_played_is_said(file: Path) -> None:
+    for given, said in (
+        ({"robot": "alternating16"}, "joints"),
+        ({"world": "jacksboro-gentle"}, "flat one"),
+        ({"keys": {"run.repertoire.patience": 2}}, "is given by FILE"),
+    ):
+        with pytest.raises(InputError, match=said):
+            prepare_schedule(file, WANTED, **given)
+    with pytest.raises(ConfigError, match="patience"):
+        prepare_schedule(file, WANTED, patience=0)
