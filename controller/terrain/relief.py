@@ -7,8 +7,8 @@ is smaller than itself.
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.fft import irfft2, next_fast_len, rfft2
 from scipy.ndimage import binary_dilation
-from scipy.signal import fftconvolve
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.heightfield import HeightField
@@ -157,5 +157,12 @@ def _disc(ground: HeightField, radius_m: float) -> tuple[Floats, Floats, Floats]
 
 
 def _summed(values: Floats, weight: Floats) -> Floats:
-    """Sum of ``values`` around each sample, weighted by offset; nothing beyond the border."""
-    return np.asarray(fftconvolve(values, weight[::-1, ::-1], mode="same"))
+    """Sum of ``values`` around each sample, weighted by offset; nothing beyond the border.
+
+    As ``scipy.signal.fftconvolve`` does it, whose import takes longer than all of its sums.
+    """
+    sizes = zip(values.shape, weight.shape, strict=True)
+    shape = [next_fast_len(n + m - 1, True) for n, m in sizes]
+    whole = irfft2(rfft2(values, shape) * rfft2(weight[::-1, ::-1], shape), shape)
+    (rows, columns), (up, left) = values.shape, ((m - 1) // 2 for m in weight.shape)
+    return np.asarray(whole[up : up + rows, left : left + columns])

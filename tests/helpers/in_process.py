@@ -1,10 +1,15 @@
-"""The command line without a new process: the same door, code and streams."""
+"""The command line without a new process: the same door, code and streams; a pool without any."""
 
 import io
 import sys
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from typing import Any
 from unittest import mock
+
+import pytest
 
 
 @dataclass(frozen=True)
@@ -26,3 +31,24 @@ def snakewalk(*words: str) -> Done:
         except SystemExit as end:
             code = end.code if isinstance(end.code, int) else int(end.code is not None)
     return Done(code, out.getvalue(), err.getvalue())
+
+
+class _Here(Executor):
+    """Does at once what it is given, where a worker would first import everything."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
+        done: Future[Any] = Future()
+        done.set_result(fn(*args, **kwargs))
+        return done
+
+
+def work_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Studies start no workers; ``test_pool`` shows that those give the same."""
+    from snakewalk.controller.app.studies import pool, tune
+
+    @contextmanager
+    def here(workers: int) -> Iterator[Executor]:
+        yield _Here()
+
+    for module in (pool, tune):
+        monkeypatch.setattr(module, "process_pool", here)

@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_walk
-execute(prepare_walk("jacksboro-traverse", time_limit_s=3.0), Path(sys.argv[1]))
+execute(prepare_walk("jacksboro-traverse", time_limit_s=1.0), Path(sys.argv[1]))
 """
 _AVX512 = "X86_V4 AVX512_ICL AVX512_SPR"
 PROCESSORS = {"Haswell": _AVX512, "Sandybridge": _AVX512, "Prescott": f"X86_V3 {_AVX512}"}
@@ -39,6 +39,6 @@ def test_a_run_over_hills_leaves_the_same_bytes_whatever_kernel_multiplies(tmp_p
     ]
     assert [run.wait() for run in runs] == [0] * len(runs)
     logs = [(tmp_path / kernel / "log.mcap").read_bytes() for kernel in PROCESSORS]
-    assert len(logs[0]) > 100_000
+    assert len(logs[0]) > 50_000
     assert logs[1] == logs[0]
     assert logs[2] == logs[0]

@@ -1,8 +1,8 @@
 """The main job over real packet bytes: simulated servos, MuJoCo body, log and summary."""
 
 import os
-import subprocess
-import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -42,30 +42,28 @@ def test_joints_follow_within_the_honest_lag_of_the_servos(finished) -> None:
     assert np.abs(record.cycle.current_a).max() < 2.3 * 0.5  # half of the stall current
 
 
-ON_A_CORE = """
-import os, sys
-from pathlib import Path
-from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_walk
-if hasattr(os, "sched_setaffinity"):
-    os.sched_setaffinity(0, {int(sys.argv[1])})
-run = prepare_walk("flat-slalom", waypoints_m=((1.2, 0.3),), time_limit_s=30.0, seed=4)
-execute(run, Path(sys.argv[2]))
-"""
+@contextmanager
+def on_core(core: int) -> Iterator[None]:
+    """This process alone on one of its cores, where the system lets it choose."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {core})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
 
 
 def test_same_seed_and_configuration_give_byte_identical_logs_on_every_core(
     finished, tmp_path: Path
 ) -> None:
     cores = sorted(os.sched_getaffinity(0))[:2] if hasattr(os, "sched_getaffinity") else [0, 1]
-    folders = [tmp_path / f"core{core}" for core in cores]
-    runs = [
-        subprocess.Popen([sys.executable, "-c", ON_A_CORE, str(core), str(folder)])
-        for core, folder in zip(cores, folders, strict=True)
-    ]
-    assert [run.wait() for run in runs] == [0] * len(runs)
-    for folder in folders:
-        assert (folder / "log.mcap").read_bytes() == finished.log.read_bytes()
+    for core in cores:
+        with on_core(core):
+            again = execute(short(seed=4), tmp_path / f"core{core}")
+        assert again.log.read_bytes() == finished.log.read_bytes()
 
 
 def test_another_seed_gives_other_commands(finished, tmp_path: Path) -> None:

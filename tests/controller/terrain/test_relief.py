@@ -2,10 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy.signal import fftconvolve
 
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
-from snakewalk.controller.terrain.relief import Relief, elevation_variance_m2, fitted_slope_rad
+from snakewalk.controller.terrain.relief import (
+    Relief,
+    _summed,
+    elevation_variance_m2,
+    fitted_slope_rad,
+)
 
 SPACING = 0.05
 
@@ -107,3 +113,11 @@ def test_ground_that_was_not_measured_is_never_safe() -> None:
     gap = np.hypot(*(points[:, None] - at).transpose(2, 0, 1)).min(axis=1)
     assert relief.safe(*points[gap > 0.16].T).all()
     assert relief.known(*points[gap > 0.16].T).all()
+
+
+@pytest.mark.parametrize("window", [(7, 7), (12, 5), (41, 40)])
+def test_sums_in_windows_are_scipys_to_the_bit(window: tuple[int, int]) -> None:
+    rng = np.random.default_rng(3)
+    values, weight = rng.normal(size=(60, 75)), rng.normal(size=window)
+    expected = fftconvolve(values, weight[::-1, ::-1], mode="same")
+    np.testing.assert_array_equal(_summed(values, weight), expected)

@@ -78,7 +78,7 @@ def test_its_speed_is_that_of_its_goals() -> None:
 
 def test_a_salamander_trots_past_a_waypoint_to_another_and_rests(tmp_path: Path) -> None:
     job = prepare_job("salamander-square", keys={"run.waypoint_radius_m": 0.25})
-    near = job.run.model_copy(update={"waypoints_m": ((0.5, 0.1), (0.9, 0.4))})
+    near = job.run.model_copy(update={"waypoints_m": ((0.4, 0.1), (0.7, 0.35))})
     job = replace(job, run=near)
     finished = execute(job, tmp_path)
     assert finished.outcome.complete(2)

@@ -1,6 +1,7 @@
 """Robots of other servos, written from the pages alone, through every command that runs one."""
 
 import re
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,16 @@ from snakewalk.config.robot import STALL_CURRENT_A, RobotConfig, ServoConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.app.cli.main import main
 from snakewalk.controller.app.runs.factory import prepare_gait, prepare_walk
+from snakewalk.controller.app.studies import tune
+from snakewalk.controller.app.studies.sweep_measure import Measurement, measure
+from snakewalk.controller.app.studies.sweep_points import Point
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.protocol.control_table import load_control_table
 from snakewalk.drivers.protocol.registers import ServoUnits
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.sim.servo.models import MODELS
+from tests.helpers.in_process import work_in_this_process
 
 _DOCS = Path(__file__).resolve().parents[4] / "docs"
 _RUN = """
@@ -61,15 +66,22 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "gait run lateral-undulation --robot xl330.toml --seconds 2 --no-film",
         "gait run lateral-undulation --robot xl430.toml --seconds 2 --no-film",
         "play worm-like --robot xl430.toml --no-film",
-        "sweep lateral-undulation --robot xl430.toml --points 1 --workers 1 -o sweep.csv",
-        "tune lateral-undulation --robot xl430.toml --budget 16 --seconds 4 --seeds 1 --workers 1",
+        "sweep lateral-undulation --robot xl430.toml --points 1 --seconds 4 -o sweep.csv",
+        "tune lateral-undulation --robot xl430.toml --budget 16 --seconds 4 --seeds 1",
         "repertoire record --robot xl330.toml",
-        "trials short.toml --robot xl430.toml --motion serpenoid --seeds 1 --workers 1 -o t.csv",
+        "trials short.toml --robot xl430.toml --motion serpenoid --seeds 1 -o t.csv",
     ],
 )
 def test_a_robot_from_the_pages_goes_through_every_command(
     words: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    @cache
+    def measured_once(robot: str) -> Measurement:
+        return measure(Point("lateral-undulation", robot, "flat", 0, 0, 4.0))
+
+    work_in_this_process(monkeypatch)
+    # the search itself is tested elsewhere: here each of its runs is the same one
+    monkeypatch.setattr(tune, "measure", lambda point, vary=0: measured_once(point.robot))
     monkeypatch.setattr("sys.argv", ["snakewalk", *words.split()])
     with pytest.raises(SystemExit) as end:
         main()

@@ -13,6 +13,7 @@ from snakewalk.controller.app.cli.commands.trials import trials as command
 from snakewalk.controller.app.studies import trials as study
 from snakewalk.controller.app.studies.trials import Case, Trial, plan_trials, prepare_case, wilson
 from snakewalk.controller.app.studies.trials_table import TrialsTable
+from tests.helpers.in_process import work_in_this_process
 
 FLAT, HILLS = Case("flat-square", "serpenoid"), Case("jacksboro-traverse", "walk")
 
@@ -80,9 +81,10 @@ def test_a_row_counts_passes_misses_and_causes() -> None:
 
 
 def test_the_command_runs_each_case_and_a_fixed_one_once(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")
+    work_in_this_process(monkeypatch)
     run = tmp_path / "near.toml"
     run.write_text('name = "near"\nwaypoints_m = [[0.4, 0.0]]\ntime_limit_s = 20.0\n')
     command(
@@ -105,9 +107,7 @@ def test_where_every_run_is_refused_the_command_is(
         return Trial(case, seed, cause="refused", why="refused: too steep")
 
     monkeypatch.setattr(study, "run_trial", refused)
-    monkeypatch.setattr(
-        study, "each", lambda work, items, **_: zip(items, map(work, items), strict=True)
-    )
+    work_in_this_process(monkeypatch)
     with pytest.raises(InputError, match="no run was possible: 2 refused: too steep"):
         command(["flat-slalom"], seeds=2, motion=["walk"], workers=1)
     assert "0 of 2" in capsys.readouterr().out
@@ -207,6 +207,7 @@ def test_a_kept_table_is_not_run_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")
+    work_in_this_process(monkeypatch)
     run, out, picture = tmp_path / "near.toml", tmp_path / "t.csv", tmp_path / "t.png"
     run.write_text('name = "near"\nwaypoints_m = [[0.4, 0.0]]\ntime_limit_s = 0.5\n')
     over = ["world.friction.across=0.3,0.7", "world.friction.along=0.1"]
