@@ -12,12 +12,15 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks.rows import Row, cpu_s
+from snakewalk.config.ground import build_ground
 from snakewalk.config.loader import load_robot, load_world
+from snakewalk.controller.app.report.crowd_film import SIZE_PX, CrowdScene
 from snakewalk.controller.app.studies.repertoire_physics import FRAME_S, PhysicsBody
 from snakewalk.controller.app.studies.repertoire_planning import plan_route, search_cost
 from snakewalk.controller.app.studies.repertoire_recording import ACTIONS, record
 from snakewalk.controller.repertoire.crowd import Crowd
 from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.sim.rendering.crowd_film import CrowdView
 
 TITLE = "Repertoire: 17 links, 60 frames a second, one core"
 
@@ -26,6 +29,11 @@ BODIES = 10_000
 FRAMES = 60
 TRIES = 5
 CANDIDATES = 8
+HILLS = "jacksboro-basin"
+HERD = 2_000
+"""Bodies on the hills, whose share in view is that of the film."""
+DRAWN = 100
+SHOTS = 20
 
 
 def run() -> list[Row]:
@@ -36,6 +44,8 @@ def run() -> list[Row]:
     seen_s, hidden_s = (crowd_second_s(repertoire, visible) for visible in (True, False))
     frame_s = seen_s / (BODIES * FRAMES)
     fits = physics_s / frame_s
+    herd_s = herd_frame_s(repertoire)
+    plain_s, detailed_s = (drawing_s(repertoire, detail=detail) for detail in (False, True))
     with TemporaryDirectory() as folder:
         file = Path(folder) / "repertoire.npz"
         repertoire.save(file)
@@ -47,6 +57,10 @@ def run() -> list[Row]:
         Row("body-frames in a physics frame", fits, ""),
         Row("a second of 10,000 bodies, seen", seen_s * 1e3, "ms", "1 s", seen_s, 1.0),
         Row("the same, none in view", hidden_s * 1e3, "ms", "1 s", hidden_s),
+        Row("on hills, behaviour and culling: a body-frame", herd_s * 1e6, "us"),
+        Row("bodies at 60 frames a second there", FRAME_S / herd_s, "", "100", 6e3 * herd_s),
+        Row("drawing 100 bodies on hills, all in full", plain_s * 1e3, "ms"),
+        Row("the same with levels of detail and culling", detailed_s * 1e3, "ms"),
         Row("search: a candidate", cost.candidate_s * 1e6, "us"),
         Row("a candidate run on the physics", cost.physics_candidate_s * 1e3, "ms"),
         Row(
@@ -71,6 +85,38 @@ def physics_frame_s(repertoire: Repertoire) -> float:
                 body.frame(goal)
             best = min(best, (time.process_time() - begun) / segment.frames)
     return best
+
+
+def herd_frame_s(repertoire: Repertoire) -> float:
+    """CPU time of a body-frame of a herd on hills before a camera, bodies laid on the ground."""
+    ground = build_ground(load_world(HILLS))
+    assert ground is not None, "a world with hills"
+    scene = CrowdScene(repertoire, load_robot(repertoire.robot), ground, HERD)
+    best = float("inf")
+    for _ in range(TRIES):
+        scene.costs.motion_s = scene.costs.laying_s = 0.0
+        for _ in scene.shots(SHOTS, 1):
+            pass
+        best = min(best, (scene.costs.motion_s + scene.costs.laying_s) / (SHOTS * HERD))
+    return best
+
+
+def drawing_s(repertoire: Repertoire, *, detail: bool) -> float:
+    """CPU time in which a frame of ``DRAWN`` bodies is drawn, without their motion."""
+    world, robot = load_world(HILLS), load_robot(repertoire.robot)
+    ground = build_ground(world)
+    assert ground is not None, "a world with hills"
+    view = CrowdView(robot, world, ground, DRAWN, SIZE_PX)
+    try:
+        shots = list(CrowdScene(repertoire, robot, ground, DRAWN, detail=detail).shots(SHOTS, 3))
+
+        def draw() -> None:
+            for shot in shots:
+                view.draw(shot)
+
+        return cpu_s(draw, 1, TRIES) / SHOTS
+    finally:
+        view.close()
 
 
 def crowd_second_s(repertoire: Repertoire, visible: bool) -> float:

@@ -78,6 +78,11 @@ class Crowd:
         """(N,) segment of each body now."""
         return self._playing
 
+    @property
+    def ended(self) -> Bools:
+        """(N,) whether the last frame was the end of a cycle."""
+        return self._ended
+
     def place(self, body: int, frame: Frame, *, segment: int = 0, scale: float = 1.0) -> None:
         """Place a body so that its next frame is the first of ``segment``."""
         self.rotation[body] = frame.rotation.ravel()

@@ -99,7 +99,7 @@ def render_film(
     scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
     view, option = mujoco.MjvCamera(), mujoco.MjvOption()
     reached = 0
-    with Offscreen(model, *size) as screen, _Film(path, fps, size) as film:
+    with Offscreen(model, *size) as screen, MovieFile(path, fps, size) as film:
         for k, shot in enumerate(shots):
             now = float(times[0]) + k * speed_up / fps
             while reached < len(reached_s) and reached_s[reached] <= now:
@@ -164,7 +164,7 @@ def _camera(
     return np.column_stack([smooth, azimuth, distance])
 
 
-class _Film:
+class MovieFile:
     """An MP4 file that takes frames."""
 
     def __init__(self, path: Path, fps: int, size: tuple[int, int]) -> None:
@@ -187,7 +187,7 @@ class _Film:
         frame = self._frame(np.ascontiguousarray(pixels), format="rgb24")
         self._file.mux(self._stream.encode(frame))
 
-    def __enter__(self) -> "_Film":
+    def __enter__(self) -> "MovieFile":
         return self
 
     def __exit__(self, *_: object) -> None:

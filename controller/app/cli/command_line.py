@@ -40,6 +40,7 @@ from snakewalk.controller.app.cli.commands.logs.report import report
 from snakewalk.controller.app.cli.commands.logs.view import view
 from snakewalk.controller.app.cli.commands.plan import plan
 from snakewalk.controller.app.cli.commands.play import play
+from snakewalk.controller.app.cli.commands.repertoire.crowd import crowd
 from snakewalk.controller.app.cli.commands.repertoire.playback import play_actions
 from snakewalk.controller.app.cli.commands.repertoire.repertoire import record, run_plan, show_file
 from snakewalk.controller.app.cli.commands.run import run
@@ -389,6 +390,9 @@ repertoire.command(
         "repertoire play repertoire-yaw16-flat.npz --schedule wanted.toml --picture wanted.png",
     ),
 )(play_actions)
+repertoire.command(
+    "crowd", epilog=_examples("repertoire crowd", "repertoire crowd --bodies 300 -o herd.mp4")
+)(crowd)
 repertoire.command(
     "run",
     epilog=_examples("repertoire run plan.json", "repertoire run plan.json --open-loop --json"),

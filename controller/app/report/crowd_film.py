@@ -1,0 +1,148 @@
+"""Film of a crowd on a ground: what bodies do, what the camera sees of them, and its cost."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.extras import require_extra
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.repertoire.behaviour import Wandering
+from snakewalk.controller.repertoire.detail import NEAR, DetailedCrowd, ViewFrustum
+from snakewalk.controller.repertoire.repertoire import Repertoire
+
+if TYPE_CHECKING:
+    from snakewalk.sim.rendering.crowd_film import CrowdShot
+
+FPS: Final = 20
+SIZE_PX: Final = (960, 540)
+SIZES: Final = (0.22, 0.42)
+"""Lengths of the animals over the recorded robot's (ours): the world is a model of 9 m."""
+FLIGHT_S: Final = 40.0
+"""Of the camera around the field."""
+
+
+@dataclass
+class CrowdCosts:
+    """CPU time and levels of detail, summed over frames."""
+
+    frames: int = 0
+    motion_s: float = 0.0
+    """Behaviour, actions, body frames and links of those in view."""
+    laying_s: float = 0.0
+    """Culling, and bodies onto the ground."""
+    levels: Ints = field(default_factory=lambda: np.zeros(4, dtype=np.int64))
+    """(4,) body-frames hidden, far, middle, near."""
+
+
+class CrowdScene:
+    """A crowd that wanders on a ground before a camera that flies around."""
+
+    def __init__(
+        self,
+        repertoire: Repertoire,
+        robot: RobotConfig,
+        ground: HeightField,
+        bodies: int,
+        *,
+        seed: int = 0,
+        fovy_deg: float = 45.0,
+        detail: bool = True,
+    ) -> None:
+        """``detail``: with culling and levels; else every body is drawn in full."""
+        sizes = np.random.default_rng(seed).uniform(*SIZES, bodies)
+        self._wandering = Wandering(repertoire, ground, sizes, seed=seed)
+        self._ground, self._fovy_deg, self._detail = ground, fovy_deg, detail
+        links = repertoire.segments[0].link_m.shape[1]
+        radii = np.array(robot.radii_m(2 * links + 1))[1::2]
+        along = np.arange(links) / (links - 1)
+        thin = 0.85 + 0.15 * np.sin(np.pi * np.minimum(along / 0.5, 1.0) / 2)
+        thin *= 1.0 - 0.7 * np.maximum(0.0, (along - 0.55) / 0.45) ** 1.5
+        self._chains = DetailedCrowd(ground, radii * thin)
+        self.costs = CrowdCosts()
+
+    def shots(self, frames: int, steps: int) -> Iterator["CrowdShot"]:
+        """Yield ``frames`` shots, ``steps`` frames of the repertoire apart."""
+        from snakewalk.sim.rendering.crowd_film import BodyChain, CrowdShot  # noqa: PLC0415  an extra
+
+        wandering, costs = self._wandering, self.costs
+        crowd = wandering.crowd
+        for k in range(frames):
+            begun = time.process_time()
+            lookat, distance, azimuth, elevation = self._camera(k / FPS)
+            frustum = ViewFrustum.orbit(
+                lookat, distance, azimuth, elevation, fovy_deg=self._fovy_deg, size_px=SIZE_PX
+            )
+            levels = np.full(len(crowd.scale), NEAR)
+            if self._detail:
+                ground_m = self._ground.elevation_m(*crowd.origin_m[:, :2].T)
+                centre = np.column_stack([crowd.origin_m[:, :2], ground_m])
+                levels = frustum.levels(centre, wandering.length_m)
+            crowd.visible[:] = levels > 0
+            culled = time.process_time()
+            wandering.step(steps)
+            moved = time.process_time()
+            chains = self._chains.chains(crowd, levels)
+            costs.frames += 1
+            costs.motion_s += moved - culled
+            costs.laying_s += time.process_time() - moved + culled - begun
+            costs.levels += np.bincount(levels, minlength=4)
+            near = int((levels == NEAR).sum())
+            yield CrowdShot(
+                lookat,
+                distance,
+                azimuth,
+                elevation,
+                [
+                    BodyChain(chain.points_m, chain.radius_m, chain.body, chain.level == NEAR)
+                    for chain in chains
+                ],
+                f"{len(chains)} of {len(levels)} bodies in view, {near} near",
+            )
+
+    def _camera(self, time_s: float) -> tuple[Floats, float, float, float]:
+        """Where the camera looks, from how far, and its two angles in degrees."""
+        turn = 2.0 * np.pi * time_s / FLIGHT_S
+        wide = 0.5 * min(self._ground.size_m)
+        middle = np.array([self._ground.x0_m, self._ground.y0_m]) + 0.5 * np.array(
+            self._ground.size_m
+        )
+        at = middle + 0.3 * wide * np.array([np.cos(turn), np.sin(turn)])
+        lookat = np.array([*at, float(self._ground.elevation_m(*at))])
+        distance = wide * (0.42 + 0.14 * np.cos(1.7 * turn))
+        return lookat, distance, float(np.degrees(turn)) + 55.0, -26.0
+
+
+def film_crowd(
+    scene: CrowdScene,
+    robot: RobotConfig,
+    world: WorldConfig,
+    ground: HeightField,
+    bodies: int,
+    seconds: float,
+    path: Path,
+    *,
+    frame_s: float,
+    on_frame: Callable[[int], None] = lambda done: None,
+) -> int:
+    """Draw the film into ``path`` (.mp4); the number of its frames.
+
+    Raises:
+        InputError: the simulator or PyAV is not installed, or nothing draws here without a screen.
+
+    """
+    require_extra("films need", "mujoco", "av")
+    from snakewalk.sim.rendering.crowd_film import CrowdView, render_crowd  # noqa: PLC0415  an extra
+
+    view = CrowdView(robot, world, ground, bodies, SIZE_PX)
+    try:
+        shots = scene.shots(round(seconds * FPS), round(1.0 / (FPS * frame_s)))
+        return render_crowd(view, shots, path, fps=FPS, size_px=SIZE_PX, on_frame=on_frame)
+    finally:
+        view.close()
