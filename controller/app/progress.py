@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Self, TypeVar
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
+from snakewalk.controller.app.messages import LOGGER, stderr_console
 from snakewalk.controller.runtime.drive import Progress as RunProgress
 from snakewalk.drivers.clock import WallClock
 
@@ -27,7 +27,7 @@ class ProgressBar:
             TaskProgressColumn(),
             TextColumn("{task.fields[note]}"),
             TimeElapsedColumn(),
-            console=Console(stderr=True),
+            console=stderr_console(),
             transient=transient,
         )
         self._task = self._progress.add_task(description, total=total, note="")
@@ -64,12 +64,14 @@ class ProgressBar:
         self._progress.advance(self._task)
 
     def hide(self) -> None:
-        """Take the bar away: what it stood for failed."""
+        """Take the bar away, and its line: what it stood for failed."""
+        self._progress.live.transient = True
+        self._progress.console.quiet = not self._progress.console.is_interactive
         self._progress.update(self._task, visible=False)
 
     def on_event(self, kind: str, text: str) -> None:
-        """Print a line above the bar."""
-        self._progress.console.print(text)
+        """Say above the bar what a run decided by itself."""
+        LOGGER.info("%s", text)
 
 
 class RunBar(ProgressBar):

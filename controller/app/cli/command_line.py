@@ -1,11 +1,14 @@
 """The command line: ``snakewalk COMMAND --help``. One line registers a command."""
 
+import inspect
 import sys
+from collections.abc import Callable
+from functools import wraps
 from typing import Annotated, Any
 
 import typer
 from typer import rich_utils
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperGroup
 
 from snakewalk.controller.app.cli.commands.analyse import analyse
 from snakewalk.controller.app.cli.commands.bench.calibrate import calibrate
@@ -50,7 +53,8 @@ from snakewalk.controller.app.cli.commands.track import track
 from snakewalk.controller.app.cli.commands.trials import trials
 from snakewalk.controller.app.cli.commands.tune import tune
 from snakewalk.controller.app.cli.commands.walk import walk
-from snakewalk.controller.app.cli.options import check_files
+from snakewalk.controller.app.cli.options import LogFile, LogLevel, Quiet, Verbose, check_files
+from snakewalk.controller.app.messages import messages
 
 _JOB, _MOTION, _RECORDINGS, _BUS = "The job", "Motion", "Recordings", "The bus"
 """Groups of the commands in ``--help``."""
@@ -69,22 +73,46 @@ class _Commands(TyperGroup):
             raise SystemExit(130) from None
 
 
-class _Command(TyperCommand):
-    """A command; faults in the files that it names are told before anything heavy is imported."""
+def _with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options of what it says, and check the files that it names first.
 
-    def invoke(self, ctx: Any) -> Any:
-        """Check the files of run, robot and world, then run the command."""
-        named = {key: value for key, value in ctx.params.items() if isinstance(value, str)}
-        check_files(named.get("run"), named.get("robot"), named.get("world"))
-        return super().invoke(ctx)
+    Faults in these files are told before anything heavy is imported.
+    """
+    signature = inspect.signature(function)
+
+    @wraps(function)
+    def command(
+        *, verbose: Verbose, quiet: Quiet, log_level: LogLevel, log_file: LogFile, **options: Any
+    ) -> Any:
+        level = log_level or ("debug" if verbose else "warning" if quiet else "info")
+        with messages(level, log_file):
+            named = {key: value for key, value in options.items() if isinstance(value, str)}
+            check_files(named.get("run"), named.get("robot"), named.get("world"))
+            return function(**options)
+
+    own = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+        for name, kind, default in (
+            ("verbose", Verbose, False),
+            ("quiet", Quiet, False),
+            ("log_level", LogLevel, None),
+            ("log_file", LogFile, None),
+        )
+    ]
+    command.__annotations__ = function.__annotations__ | {one.name: one.annotation for one in own}
+    command.__signature__ = signature.replace(  # type: ignore[attr-defined]
+        parameters=[*signature.parameters.values(), *own]
+    )
+    return command
 
 
 class _App(typer.Typer):
-    """Commands with this check."""
+    """Commands that say how they get on."""
 
     def command(self, *args: Any, **options: Any) -> Any:
         """Register a command."""
-        return super().command(*args, cls=_Command, **options)
+        register = super().command(*args, **options)
+        return lambda function: register(_with_messages(function))
 
 
 app = _App(

@@ -1,17 +1,13 @@
 """``snakewalk``: runs the command line and says in a line, with an exit code, how it ended."""
 
 import os
-import re
 import sys
 from pathlib import Path
-from typing import Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
+from snakewalk.controller.app.messages import plain
 from snakewalk.drivers.errors import DriverError
-
-_CONTROL: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
-"""Characters with which a name or a file's content would steer a terminal."""
 
 
 def main() -> None:
@@ -67,4 +63,4 @@ def _end(code: int, *lines: str) -> None:
 
 
 def _print_line(line: str) -> None:
-    print(f"snakewalk: {_CONTROL.sub('?', line)}", file=sys.stderr)
+    print(f"snakewalk: {plain(line)}", file=sys.stderr)

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 from rich.console import Console
@@ -15,6 +15,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli import completion
+from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import LOG
 
 if TYPE_CHECKING:
@@ -119,6 +120,27 @@ Set = Annotated[
         autocompletion=completion.keys,
     ),
 ]
+_TOLD: Final = "What it says"
+"""Group of options in ``--help``."""
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="every step", rich_help_panel=_TOLD)]
+Quiet = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="warnings and faults only", rich_help_panel=_TOLD),
+]
+LogLevel = Annotated[
+    Literal["debug", "info", "warning", "error"] | None,
+    typer.Option(
+        help="from which on it says something; default: info",
+        rich_help_panel=_TOLD,
+        show_default=False,
+    ),
+]
+LogFile = Annotated[
+    Path | None,
+    typer.Option(
+        dir_okay=False, help="write all of it to the end of this file", rich_help_panel=_TOLD
+    ),
+]
 
 
 def check_files(run: str | None, robot: str | None, world: str | None) -> None:
@@ -212,5 +234,5 @@ def write_artifacts(
             stop.add_note(f"the run is whole: {log}; its film: snakewalk report {log}")
         raise
     for line in made.notes:
-        print(f"snakewalk: {line}", file=sys.stderr)
+        LOGGER.warning("%s", line)
     return made

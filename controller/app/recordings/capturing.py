@@ -8,10 +8,10 @@ from itertools import islice
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.messages import stderr_console
 from snakewalk.controller.app.progress import ProgressBar
 from snakewalk.controller.app.report.plots.capture import contact_sheet, overlay_film, step_picture
 from snakewalk.controller.app.report.review import picture_scale, review_page
@@ -148,7 +148,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     _check(options)
     footage = open_footage(options.recording, options.rate_hz)
     head_px = None if options.head is None else _place(options.head)
-    console = Console(stderr=True)
+    console = stderr_console()
     with console.status("learning the background ..."):
         whole = footage.spread(_SAMPLE)
         if (options.roi or options.mask) and len({frame.shape for frame in whole}) > 1:

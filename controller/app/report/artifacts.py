@@ -6,6 +6,7 @@ from pathlib import Path
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.progress import ProgressBar
 from snakewalk.controller.app.recordings.body_look import SERVOS, skin_look
 from snakewalk.controller.app.report.film import film_run, film_times
@@ -131,6 +132,7 @@ def _write_page(
     path = out_dir / REPORT
     with atomic_write(path) as part:
         part.write_text(html, encoding="utf-8")
+    LOGGER.debug("page: %s", path)
     return path
 
 
@@ -153,4 +155,5 @@ def _film(record: RunRecord, path: Path, fine: bool, look: str, notes: list[str]
             bar.hide()
             notes += [f"no film: {line}" for line in error.faults]
             return False
+    LOGGER.debug("film: %s", path)
     return True

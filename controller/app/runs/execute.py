@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
+from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.report.artifacts import write_summary
 from snakewalk.controller.app.result_files import LOG, clear_run, refuse_another_run
 from snakewalk.controller.app.runs.backend import metal, simulated
@@ -85,6 +86,9 @@ def execute(
         backend = metal(prepared.run, prepared.robot, port or "")
     log_path = folder / LOG
     clear_run(folder)
+    LOGGER.debug(
+        "%s on %s; the plan keeps the limits; log: %s", prepared.robot.name, backend.name, log_path
+    )
     torque_constant_n_m_a, winding = _motor(prepared.robot)
     made = StopButton(prepared.run.name, port, folder) if stoppable else nullcontext()
     with made as button, RunLog(log_path, None if view is None else view.on_row) as log:
@@ -107,10 +111,13 @@ def execute(
             policy=safety.recovery,
             patience_s=safety.recovery_time_s,
             confirm=confirm,
-            on_event=lambda text: log.event(clock.now_s(), "recovery", text, "warning"),
+            on_event=lambda text: warn("recovery", text),
         )
+        backend.chain.on_event = lambda text: warn("bus", text)
 
-        backend.chain.on_event = lambda text: log.event(clock.now_s(), "bus", text, "warning")
+        def warn(kind: str, text: str) -> None:
+            log.event(clock.now_s(), kind, text, "warning")
+            LOGGER.warning("%s", text)
 
         def log_event(kind: str, text: str) -> None:
             log.event(clock.now_s(), kind, text)
@@ -147,6 +154,7 @@ def execute(
                 stop.add_note(torque if not failed else "torque may be on: switch the supply off")
                 stop.add_note(f"log: {log_path}; its page: snakewalk report {log_path}")
                 raise
+    LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
     record = read_log(log_path)
     numbers = write_summary(summary(record), folder)
     return Finished(outcome, log_path, record, numbers, pose, source)

@@ -21,7 +21,7 @@ def test_a_run_that_fails_before_its_first_cycle_leaves_no_bar(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     _run(0, OSError("no port"))
-    assert capsys.readouterr().err.strip() == ""
+    assert capsys.readouterr().err == ""
 
 
 def _run(cycles: int, error: OSError | None) -> None:

@@ -1,7 +1,6 @@
 """``snakewalk sweep``: gaits on the physics over many parameters."""
 
 import json
-import sys
 from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
@@ -13,6 +12,7 @@ from rich.table import Table
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force, Json, console
+from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
 _HEADS = {
@@ -85,10 +85,11 @@ def sweep(
             transient=False,
         ):
             table.add(point, row)
+            LOGGER.debug("%s", row)
             if row.ended.startswith("refused"):
                 refused[row.ended] += 1
     for why, times in refused.items():
-        print(f"snakewalk: {times} of {len(missing)} points {why}", file=sys.stderr)
+        LOGGER.warning("%d of %d points %s", times, len(missing), why)
     rows = [asdict(one) for one in digest(read_table(out))]
     if picture is not None:
         from snakewalk.controller.app.report.plots.sweep import draw_sweep  # noqa: PLC0415

@@ -14,6 +14,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, TrackFile, World, console
+from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import check_picture
 
 _HEADS = {
@@ -139,6 +140,7 @@ def trials(
             some, str(out or "trials"), len(planned), done=len(found), transient=False
         ):
             found.append(trial)
+            LOGGER.debug("%s", trial)
             if table:
                 table.add(trial)
     summaries = study.table(found, cases)

@@ -4,12 +4,12 @@ import json
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, Port, Robot, console
+from snakewalk.controller.app.messages import stderr_console
 
 _COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 
@@ -44,7 +44,7 @@ def doctor(
     if findings[0].grade != "fail":
         with (
             SerialPort(device, described.servo.baud) as line,
-            Console(stderr=True).status("") as status,
+            stderr_console().status("") as status,
         ):
             findings += examine(
                 line,

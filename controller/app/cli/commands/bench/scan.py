@@ -4,10 +4,10 @@ import json
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from snakewalk.controller.app.cli.options import Json, Port, console
+from snakewalk.controller.app.messages import stderr_console
 
 
 def scan(
@@ -25,7 +25,7 @@ def scan(
     device = scanning.pick_port(port)
     with (
         SerialPort(device, baud[0] if baud else 1_000_000) as line,
-        Console(stderr=True).status("") as status,
+        stderr_console().status("") as status,
     ):
         results = scanning.scan(line, baud or (), lambda step: status.update(f"{device}: {step}"))
     if as_json:

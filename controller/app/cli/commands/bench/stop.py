@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.options import Json, console
+from snakewalk.controller.app.messages import stderr_console
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.service.emergency_stop import StopOutcome
@@ -74,5 +74,5 @@ def _torque_off(devices: Sequence[str], bauds: Sequence[int]) -> "list[StopOutco
     from snakewalk.controller.app.service.torque_off import torque_off  # noqa: PLC0415
 
     check_bauds(bauds)
-    with Console(stderr=True).status("") as status:
+    with stderr_console().status("") as status:
         return [torque_off(device, bauds, status.update) for device in devices]

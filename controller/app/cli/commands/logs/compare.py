@@ -1,7 +1,6 @@
 """``snakewalk compare``: several runs side by side, from their logs."""
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +9,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.options import Force, Json, console
+from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def compare(
     for log, name in zip(logs, log_names(logs), strict=True):
         record = read_log(log)
         if record.note:
-            print(f"snakewalk: {log}: {record.note}", file=sys.stderr)
+            LOGGER.warning("%s: %s", log, record.note)
         runs.append(compared_run(record, name))
     if picture is not None:
         from snakewalk.controller.app.report.plots.run_comparison import (  # noqa: PLC0415  an extra

@@ -1,7 +1,6 @@
 """``snakewalk export``: a run's log for other programs."""
 
 import json
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -12,6 +11,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.options import Force, Json, console
+from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
 
@@ -46,7 +46,7 @@ def export(
     _check_names(log, csv, parquet, ros2, foxglove)
     record = read_log(log)
     if record.note:
-        print(f"snakewalk: {log}: {record.note}", file=sys.stderr)
+        LOGGER.warning("%s: %s", log, record.note)
     tables = flat_tables(record)
     writers: dict[Path, Callable[[Path], int | dict[str, int]]] = {}
     for folder, ending, write in ((csv, "csv", write_csv), (parquet, "parquet", write_parquet)):

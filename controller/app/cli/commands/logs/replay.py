@@ -1,7 +1,6 @@
 """``snakewalk replay``: a log run again on the simulator, and where it differs."""
 
 import json
-import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -10,6 +9,7 @@ import typer
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.options import Json, console
+from snakewalk.controller.app.messages import LOGGER
 
 
 def replay(
@@ -31,7 +31,7 @@ def replay(
     require_extra("a replay needs", "mujoco")
     record = read_log(log)
     if record.note:
-        print(f"snakewalk: {log}: {record.note}", file=sys.stderr)
+        LOGGER.warning("%s: %s", log, record.note)
     with TemporaryDirectory() as folder, ProgressBar("replay") as bar:
         file = Path(folder) / "replay.mcap" if out is None else out
         again = read_log(replaying.replay(record, file, on_progress=bar.update))

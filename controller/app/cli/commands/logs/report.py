@@ -1,12 +1,12 @@
 """``snakewalk report``: the page and the film of a run, from its log alone."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from snakewalk.controller.app.cli.options import Force, Json, Look, show, write_artifacts
+from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import refuse_mixture
 
 
@@ -28,7 +28,7 @@ def report(
     check_look(look)
     record = read_log(log)
     if record.note:
-        print(f"snakewalk: {log}: {record.note}", file=sys.stderr)
+        LOGGER.warning("%s: %s", log, record.note)
     folder = log.parent if out is None else out
     refuse_mixture(log, folder, force)
     artifacts = write_artifacts(record, folder, film=film, fine=fine, look=look)

@@ -1,6 +1,5 @@
 """``snakewalk view``: a log in the browser, in 3-D, with a time slider."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +8,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli.options import VIEW_AT, ViewAt
+from snakewalk.controller.app.messages import LOGGER
 
 
 def view(
@@ -28,7 +28,7 @@ def view(
     host, port = host_and_port(view_at)
     record = read_log(log)
     if record.note:
-        print(f"snakewalk: {log}: {record.note}", file=sys.stderr)
+        LOGGER.warning("%s: %s", log, record.note)
     try:
         page = LogPage(record, host, port)
     except InputError as fault:

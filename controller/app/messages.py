@@ -1,0 +1,127 @@
+"""What a command says beside its result: on standard error by its level, and in a log file.
+
+Everything goes through the logger ``snakewalk`` of Python's logging: ``debug`` is what a step did,
+``info`` what a run decided by itself, ``warning`` what a user should know, ``error`` a fault. What
+libraries warn of is ``debug``. Without :func:`messages` nothing is shown, as for any library.
+"""
+
+import logging
+import re
+import shlex
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, TextIO
+
+from snakewalk.config.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+LOGGER: Final = logging.getLogger("snakewalk")
+LOGGER.addHandler(logging.NullHandler())
+FAULT: Final = "fault"
+"""Attribute of a record whose text is printed by whoever ends the command."""
+_CONTROL: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
+def plain(text: str) -> str:
+    """Return a text without the characters with which a name or a file would steer a terminal."""
+    return _CONTROL.sub("?", text)
+
+
+class _Screen(logging.Handler):
+    """Standard error as it is at that moment: a bar takes it over while it is shown."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a line; a warning says who warns."""
+        if not getattr(record, FAULT, False):
+            start = "snakewalk: " if record.levelno >= logging.WARNING else ""
+            print(f"{start}{plain(record.getMessage())}", file=sys.stderr, flush=True)
+
+
+class _OneLine(logging.Formatter):
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  the name that logging calls
+        """The line of a record, without control characters; a traceback follows it."""
+        return plain(super().formatMessage(record))
+
+
+def stderr_console() -> "Console":
+    """Standard error for bars and what changes in place; silent where no ``info`` is shown."""
+    from rich.console import Console  # noqa: PLC0415  a program starts without it
+
+    screens = [one for one in LOGGER.handlers if isinstance(one, _Screen)]
+    return Console(stderr=True, quiet=any(one.level > logging.INFO for one in screens))
+
+
+@contextmanager
+def messages(level: str, file: Path | None = None) -> Iterator[None]:
+    """Show messages from ``level`` on, and write all of them to the end of ``file``.
+
+    Raises:
+        InputError: the file cannot be written.
+
+    """
+    handlers: list[logging.Handler] = [_Screen(level.upper())]
+    if file is not None:
+        try:
+            kept = logging.FileHandler(file, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"--log-file {file}: {error.strerror or error}") from None
+        kept.setFormatter(_OneLine("%(asctime)s %(levelname)-7s %(message)s"))
+        handlers.append(kept)
+    LOGGER.setLevel(logging.DEBUG)
+    LOGGER.propagate = False
+    for handler in handlers:
+        LOGGER.addHandler(handler)
+    shown = warnings.showwarning
+    warnings.showwarning = _library_warning
+    try:
+        import platform  # noqa: PLC0415  a program starts without these
+        from importlib.metadata import version  # noqa: PLC0415
+
+        words = shlex.join(["snakewalk", *sys.argv[1:]])
+        LOGGER.debug(
+            "%s; version %s, Python %s, %s",
+            *(words, version("snakewalk"), platform.python_version(), platform.platform()),
+        )
+        yield
+        LOGGER.debug("done")
+    except BaseException as error:
+        _tell_end(error)
+        raise
+    finally:
+        warnings.showwarning = shown
+        for handler in handlers:
+            LOGGER.removeHandler(handler)
+            handler.close()
+        LOGGER.propagate = True
+
+
+def _tell_end(error: BaseException) -> None:
+    """Write how a command ended; whoever catches the error prints it."""
+    told = {FAULT: True}
+    if isinstance(error, InputError):
+        for line in error.faults:
+            LOGGER.error("%s", line, extra=told)
+    elif isinstance(error, SystemExit):
+        LOGGER.debug("ended with exit code %s", error.code)
+    elif isinstance(error, KeyboardInterrupt):
+        LOGGER.error("; ".join(["interrupted", *getattr(error, "__notes__", [])]), extra=told)
+    else:
+        LOGGER.error("%s", error, extra=told, exc_info=error)
+
+
+def _library_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Take a library's warning: it is for whoever writes programs, and shown to those who ask."""
+    del file, line
+    LOGGER.debug("%s:%d: %s: %s", Path(filename).name, lineno, category.__name__, message)
