@@ -102,16 +102,16 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
 
 def _tell_end(error: BaseException) -> None:
     """Write how a command ended; whoever catches the error prints it."""
-    told = {FAULT: True}
+    elsewhere = {FAULT: True}
     if isinstance(error, InputError):
         for line in error.faults:
-            LOGGER.error("%s", line, extra=told)
+            LOGGER.error("%s", line, extra=elsewhere)
     elif isinstance(error, SystemExit):
         LOGGER.debug("ended with exit code %s", error.code)
     elif isinstance(error, KeyboardInterrupt):
-        LOGGER.error("; ".join(["interrupted", *getattr(error, "__notes__", [])]), extra=told)
+        LOGGER.error("; ".join(["interrupted", *getattr(error, "__notes__", [])]), extra=elsewhere)
     else:
-        LOGGER.error("%s", error, extra=told, exc_info=error)
+        LOGGER.error("%s", error, extra=elsewhere, exc_info=error)
 
 
 def _library_warning(

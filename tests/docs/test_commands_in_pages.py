@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 from snakewalk.controller.app.cli.command_line import app
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 COMMAND = re.compile(r"^(?:    |\$ )?(snakewalk (?:.*\\\n)*.*)$", re.MULTILINE)
 
 

@@ -78,7 +78,7 @@ def _with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
 
     Faults in these files are told before anything heavy is imported.
     """
-    signature = inspect.signature(function)
+    signature = inspect.signature(function, eval_str=True)
 
     @wraps(function)
     def command(

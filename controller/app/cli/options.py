@@ -120,25 +120,27 @@ Set = Annotated[
         autocompletion=completion.keys,
     ),
 ]
-_TOLD: Final = "What it says"
+_MESSAGES: Final = "Messages"
 """Group of options in ``--help``."""
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="every step", rich_help_panel=_TOLD)]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="every step", rich_help_panel=_MESSAGES)
+]
 Quiet = Annotated[
     bool,
-    typer.Option("--quiet", "-q", help="warnings and faults only", rich_help_panel=_TOLD),
+    typer.Option("--quiet", "-q", help="warnings and faults only", rich_help_panel=_MESSAGES),
 ]
 LogLevel = Annotated[
     Literal["debug", "info", "warning", "error"] | None,
     typer.Option(
         help="from which on it says something; default: info",
-        rich_help_panel=_TOLD,
+        rich_help_panel=_MESSAGES,
         show_default=False,
     ),
 ]
 LogFile = Annotated[
     Path | None,
     typer.Option(
-        dir_okay=False, help="write all of it to the end of this file", rich_help_panel=_TOLD
+        dir_okay=False, help="write all of it to the end of this file", rich_help_panel=_MESSAGES
     ),
 ]
 

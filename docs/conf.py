@@ -1,0 +1,63 @@
+"""The site: ``make docs`` builds it of these pages by Sphinx, with warnings as errors."""
+
+import re
+from importlib.metadata import version as installed
+from pathlib import Path
+
+from pydantic import BaseModel
+from sphinx.application import Sphinx
+
+project = "snakewalk"
+author = "the authors of snakewalk"
+copyright = "Apache-2.0"
+version = release = installed("snakewalk")
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+source_suffix = {".md": "markdown"}
+exclude_patterns = ["tables"]
+nitpicky = True
+nitpick_ignore_regex = [("py:.*", ".*")]  # types of numpy and pydantic, which are no pages here
+
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 3
+
+autodoc_typehints = "description"
+autodoc_member_order = "bysource"
+autodoc_default_options = {"exclude-members": "model_config, model_post_init"}
+napoleon_numpy_docstring = False
+
+html_theme = "furo"
+html_title = "snakewalk"
+html_show_sphinx = False
+
+PAGES = Path(__file__).parent
+
+
+def link_pages(app: Sphinx, name: str, source: list[str]) -> None:
+    """Make a link of each page that stands in backticks, as one reads it in the repository."""
+    folder = (PAGES / f"{name}.md").parent
+
+    def link(found: re.Match[str]) -> str:
+        page = PAGES / found[1]
+        if not page.is_file():
+            return found[0]
+        up = "../" * len(folder.relative_to(PAGES).parts)
+        return f"[`{found[1]}`]({up}{found[1]})"
+
+    outside = re.split(r"(^```.*?^```|^    .*?$)", source[0], flags=re.MULTILINE | re.DOTALL)
+    source[0] = "".join(
+        part if number % 2 else re.sub(r"(?<!\[)`(?:docs/)?([\w/-]+\.md)`", link, part)
+        for number, part in enumerate(outside)
+    )
+
+
+def hide_fields(app: Sphinx, kind: str, name: str, what: object, *rest: object) -> object:
+    """Leave out the signature of a configuration: its keys are described one by one."""
+    if isinstance(what, type) and issubclass(what, BaseModel):
+        return "", None
+    return None
+
+
+def setup(app: Sphinx) -> None:
+    """Take part in the reading of each page."""
+    app.connect("source-read", link_pages)
+    app.connect("autodoc-process-signature", hide_fields)

@@ -1,0 +1,44 @@
+"""The site holds every page, and the reference every name; ``make docs`` builds it."""
+
+import re
+from pathlib import Path
+
+import snakewalk
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+TREE = re.compile(r"```\{toctree\}\n(.*?)```", re.DOTALL)
+
+
+def held(page: Path) -> set[Path]:
+    """Pages that the tables of contents of ``page`` name, and all that those name."""
+    found: set[Path] = set()
+    for tree in TREE.findall(page.read_text(encoding="utf-8")):
+        options, _, names = tree.partition("\n\n")
+        for name in names.split():
+            named = page.parent.glob(f"{name}.md") if ":glob:" in options else None
+            for child in named or [page.parent / f"{name}.md"]:
+                found |= {child} | (held(child) if child.is_file() else set())
+    return found
+
+
+def test_the_tables_of_contents_hold_every_page_and_no_other() -> None:
+    pages = set(DOCS.rglob("*.md")) - {DOCS / "index.md"}
+    assert held(DOCS / "index.md") == pages
+
+
+def test_no_page_stands_in_two_places() -> None:
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    names = [name for tree in TREE.findall(index) for name in tree.partition("\n\n")[2].split()]
+    assert len(names) == len(set(names))
+
+
+def test_the_reference_has_every_public_name() -> None:
+    text = (DOCS / "reference.md").read_text(encoding="utf-8")
+    named = re.findall(r"^\.\. (?:autoclass|autofunction|data):: (\w+)", text, re.MULTILINE)
+    assert sorted(named) == sorted(snakewalk.__all__)
+
+
+def test_the_readme_is_a_screen_and_leads_to_pages_that_exist() -> None:
+    readme = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    assert len(readme.splitlines()) <= 60
+    assert len(re.findall(r"`docs/start/\w+\.md`", readme)) == 4
