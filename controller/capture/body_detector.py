@@ -65,10 +65,8 @@ class BodyDetector:
             InputError: the frame is not as large as the background.
 
         """
-        background = self.background
-        if background is None:
-            background = self._ground_of(image)
-        elif background.shape != image.shape:
+        background = self.ground_of(image)
+        if background.shape != image.shape:
             raise InputError(
                 f"a frame is {_size(image)}, the background {_size(background)}: they must be alike"
             )
@@ -88,7 +86,10 @@ class BodyDetector:
                 skeleton = no_skeleton(status)
         return Detection(body, skeleton, background)
 
-    def _ground_of(self, image: Image) -> Image:
+    def ground_of(self, image: Image) -> Image:
+        """(H, W[, 3]) what a frame is compared with."""
+        if self.background is not None:
+            return self.background
         if self.surroundings_px:
             return surrounding_ground(image, self.polarity, self.surroundings_px)
         return smooth_background(image)
@@ -154,6 +155,11 @@ def make_detector(
     if painted is not None:
         fixed.insert(1, painted)
     return _best([*(_Candidate.of(detector, frames) for detector in fixed), *alone])
+
+
+def whole_share(detector: BodyDetector, frames: Sequence[Image]) -> float:
+    """Share of the frames that show a whole body of about the usual length."""
+    return _Candidate.of(detector, frames).share
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,8 +25,10 @@ class MatchFacts:
     rate_hz: float
     largest_angles_deg: list[float]
     length_px: float | None = None
-    """Of a film; None of midlines, and so are the next three."""
+    """Of a film; None of midlines, and so are the next four."""
     rate_assumed: bool | None = None
+    background: str | None = None
+    """What the film's frames were compared with, in words."""
     left_out: dict[str, int] | None = None
     """Frames without a posture, by reason."""
     value_v: float | None = None
@@ -105,6 +107,7 @@ def match_footage(
         largest_angles_deg=_largest_angles_deg(postures),
         length_px=round(film.model.length_px, 1),
         rate_assumed=above.footage.rate_assumed,
+        background=above.detector.background_source,
         left_out=film.lost,
         value_v=value,
     )

@@ -35,7 +35,8 @@ from snakewalk.controller.kinematics.retarget import Retarget
 class SynthesisOptions:
     """The options of a synthesis; angles in degrees, as on the command line."""
 
-    through: list[tuple[float, float]]
+    through: list[tuple[float, ...]]
+    """X, Y or X, Y, Z; all alike."""
     seconds: float = 20.0
     seed: int = 0
     radius: float = 0.5
@@ -64,6 +65,9 @@ class SynthesisFacts:
     join_step_deg: float | None = None
     """Largest joint step where one piece ends and the next begins; None with one piece."""
     join_step_blended_deg: float | None = None
+    height_range: list[float] | None = None
+    """From where it starts, body lengths or m; None of a film without a side view."""
+    pitch_range_deg: list[float] | None = None
 
     def to_dict(self) -> dict[str, object]:
         """Return the facts that are known, for JSON."""
@@ -123,6 +127,12 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
         reached_s=[round(at, 2) for at in sequence.reached_s],
         robot=robot.name,
     )
+    if motion.height is not None and motion.pitch_rad is not None:
+        facts = replace(
+            facts, height_range=_range(motion.height), pitch_range_deg=_range(
+                np.degrees(motion.pitch_rad)
+            ),
+        )  # fmt: skip
     steps = _steps(joint_pieces(pieces, sequence, retarget))
     if len(steps):
         after = np.abs(np.diff(joints, axis=0))[junctions(pieces, sequence)]
@@ -153,3 +163,7 @@ def _segments(source: Postures, options: SynthesisOptions) -> list[MotionSegment
 def _steps(parts: list[Floats]) -> Floats:
     """(joins,) largest joint step where one piece ends and the next begins, unblended."""
     return np.array([np.abs(b[0] - a[-1]).max() for a, b in pairwise(parts)])
+
+
+def _range(values: Floats) -> list[float]:
+    return [round(float(end), 3) for end in (values.min(), values.max())]

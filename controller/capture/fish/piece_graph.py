@@ -34,6 +34,8 @@ class Piece:
     end_speed: float
     origin: str
     """Frames that it was cut from."""
+    rise: Floats | None = None
+    """(n, 2) height from 0, and pitch; None of a film without a side view."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,8 @@ def piece_graph(
     """
     if not segments:
         raise InputError(f"{postures.name}: no segment to put together")
-    pieces = [_piece(postures, segment) for segment in segments]
+    rise = _rise(postures)
+    pieces = [_piece(postures, segment, rise) for segment in segments]
     if mirror:
         pieces += [_mirrored(piece) for piece in pieces]
     return PieceGraph(tuple(pieces), postures.joints_at, postures.rate_hz, postures.length_m)
@@ -119,7 +122,19 @@ def placed(base: Floats, origin: Floats, head_rad: float) -> Floats:
     return np.asarray(base @ np.array([[c, s], [-s, c]]) + origin)
 
 
-def _piece(postures: Postures, segment: MotionSegment) -> Piece:
+def _rise(postures: Postures) -> Floats | None:
+    """(T, 2) height and pitch, linear over moments at which the side view lost the fish."""
+    if postures.height is None or postures.pitch_rad is None:
+        return None
+    rise = np.column_stack([postures.height, postures.pitch_rad])
+    known = np.flatnonzero(np.isfinite(rise).all(axis=1))
+    if len(known) < 2:
+        return None
+    every = np.arange(len(rise))
+    return np.column_stack([np.interp(every, known, rise[known, k]) for k in (0, 1)])
+
+
+def _piece(postures: Postures, segment: MotionSegment, rise: Floats | None) -> Piece:
     part = slice(segment.start, segment.stop + 1)
     head = np.unwrap(postures.head_rad[part])
     base = postures.base[part] - postures.base[segment.start]
@@ -128,6 +143,7 @@ def _piece(postures: Postures, segment: MotionSegment) -> Piece:
         base=placed(base, np.zeros(2), -float(head[0])),
         head_rad=head - head[0],
         angles_rad=postures.angles_rad[part],
+        rise=None if rise is None else rise[part] - [rise[segment.start, 0], 0.0],
         begin_speed=segment.begin_speed,
         end_speed=segment.end_speed,
         origin=f"{segment.start}-{segment.stop}",
@@ -141,6 +157,7 @@ def _mirrored(piece: Piece) -> Piece:
         base=piece.base * [1.0, -1.0],
         head_rad=-piece.head_rad,
         angles_rad=-piece.angles_rad,
+        rise=piece.rise,
         begin_speed=piece.begin_speed,
         end_speed=piece.end_speed,
         origin=f"{piece.origin} mirrored",

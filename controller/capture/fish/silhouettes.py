@@ -9,24 +9,28 @@ import numpy as np
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.body_detector import BodyDetector, make_detector, whole_share
 from snakewalk.controller.capture.fish.matching import SilhouetteFrame
 from snakewalk.controller.capture.frame_status import FrameStatus
-from snakewalk.controller.capture.image.background import contrast_polarity, median_background
 from snakewalk.controller.capture.image.silhouette import Polarity, contrast, silhouette_of
 from snakewalk.controller.capture.image.video import Footage, open_footage, read_image
 
-_FOR_BACKGROUND = 31
+_FOR_BACKGROUND = 25
+_LEAST_WHOLE = 0.5
+"""Share of those frames that must show a whole body on the ground that was found (ours)."""
 _THIN = 0.5  # of the silhouette's threshold: what is connected to the body down to it belongs to it
 _SURE = 12.0  # grey values above the ground at least
 
 
 @dataclass(frozen=True, slots=True)
 class FishFilm:
-    """One camera's film, its empty scene, and how the fish stands out from it."""
+    """One camera's film, its ground, and how the fish stands out from it."""
 
     footage: Footage
-    background: Image
-    polarity: Polarity
+    detector: BodyDetector
+    """Of the ground, or of the way to find it in each frame."""
+    size_px: tuple[int, int]
+    """Rows and columns of a frame."""
 
     def frames(self) -> Iterator[SilhouetteFrame]:
         """Every frame, from the start each time.
@@ -35,38 +39,51 @@ class FishFilm:
             InputError: a frame of another size than the background, or that cannot be read.
 
         """
+        rows, columns = self.size_px
         for image in self.footage.read():
-            if image.shape[:2] != self.background.shape[:2]:
+            if image.shape[:2] != self.size_px:
                 raise InputError(
                     f"{self.footage.path}: a frame of {image.shape[1]} x {image.shape[0]} pixels "
-                    f"over a background of {self.background.shape[1]} x {self.background.shape[0]}"
+                    f"over a background of {columns} x {rows}"
                 )
-            yield silhouette_frame(image, self.background, self.polarity)
+            ground = self.detector.ground_of(grey(image))
+            yield silhouette_frame(image, ground, self.detector.polarity)
 
 
 def open_film(path: Path, background: Path | None = None, rate_hz: float | None = None) -> FishFilm:
     """Open a video or a folder of images.
 
+    Without a background the ground is found as of any animal (``make_detector``): the median of
+    frames where the fish swims about, and where it holds station that of frames in which it is
+    painted out, or what each frame shows around it.
+
     Args:
         path: of the film.
-        background: picture of the empty scene; the median of the film's frames without it.
+        background: picture of the empty scene.
         rate_hz: frames a second, instead of what the file says.
 
     Raises:
-        InputError: nothing that can be read.
+        InputError: nothing that can be read, or no ground on which a whole body is seen.
 
     """
     footage = open_footage(path, rate_hz)
     some = [grey(image) for image in footage.spread(_FOR_BACKGROUND)]
     if len({image.shape for image in some}) > 1:
         raise InputError(f"{path}: its frames differ in size")
-    empty = grey(read_image(background)) if background is not None else median_background(some)
-    if empty.shape != some[0].shape:
+    empty = None if background is None else grey(read_image(background))
+    if empty is not None and empty.shape != some[0].shape:
         raise InputError(
             f"{background}: {empty.shape[1]} x {empty.shape[0]} pixels; the film has "
             f"{some[0].shape[1]} x {some[0].shape[0]}"
         )
-    return FishFilm(footage, empty, contrast_polarity(some[len(some) // 2], empty))
+    detector = make_detector(some, empty)
+    if empty is None and whole_share(detector, some) < _LEAST_WHOLE:
+        raise InputError(
+            f"{path}: no ground was found on which a fish is seen whole in half of the frames; if "
+            "it holds station over a pattern, give --background (of the side --side-background), a "
+            "picture of the empty scene"
+        )
+    return FishFilm(footage, detector, some[0].shape)
 
 
 def silhouette_frame(

@@ -40,6 +40,7 @@ class _Node:
 
     order: tuple[int, ...]
     base: Floats
+    """(2,) or with the height (3,)."""
     head_rad: float
     samples: int
     forced: int
@@ -80,23 +81,30 @@ def sequence_through(
 
     Args:
         pieces: what can be done.
-        points: (n, 2) in the recording's unit, from where the motion starts, x along the head.
+        points: (n, 2), or with heights (n, 3), in the recording's unit, from where the motion
+            starts, x along the head.
         radius: how near is near enough.
         limit_s: for all points together.
         depth: pieces to look ahead; 1 is the printed rule.
 
     Raises:
-        InputError: a point was not reached in time.
+        InputError: a point was not reached in time, or heights of a film that has none.
 
     """
-    begin = _Node((), np.zeros(2), 0.0, 0, 0, ())
+    dimensions = points.shape[1]
+    if dimensions == 3 and any(piece.rise is None for piece in pieces.pieces):
+        raise InputError(
+            "a control point has a height, but these postures have none: they are matched from "
+            "above alone; give X,Y, or match the film with --side"
+        )
+    begin = _Node((), np.zeros(dimensions), 0.0, 0, 0, ())
     here = begin
     while len(here.reached_at) < len(points):
         if here.samples / pieces.rate_hz > limit_s:
-            x, y = points[len(here.reached_at)]
+            point = ",".join(f"{value:g}" for value in points[len(here.reached_at)])
             turns = [np.degrees(piece.head_rad[-1]) for piece in pieces.pieces]
             raise InputError(
-                f"control point {len(here.reached_at) + 1} at {x:g},{y:g} is not reached within "
+                f"control point {len(here.reached_at) + 1} at {point} is not reached within "
                 f"{limit_s:g} s: the segments turn from {min(turns):.0f} to {max(turns):.0f} "
                 "degrees; give a larger --radius, other points, or --mirror"
             )
@@ -106,7 +114,10 @@ def sequence_through(
 
 
 def compose(pieces: PieceGraph, sequence: PieceSequence, blend_s: float = BLEND_S) -> Postures:
-    """Put the pieces end to end; angles, direction and path are blended at every junction."""
+    """Put the pieces end to end; angles, direction and path are blended at every junction.
+
+    Of a film with a side view so are height, which goes on from piece to piece, and pitch.
+    """
     parts = [pieces.pieces[k] for k in sequence.order]
     base, head = [], []
     origin, direction = np.zeros(2), 0.0
@@ -115,6 +126,12 @@ def compose(pieces: PieceGraph, sequence: PieceSequence, blend_s: float = BLEND_
         head.append(part.head_rad + direction)
         origin, direction = base[-1][-1], float(head[-1][-1])
     samples = max(1, round(blend_s * pieces.rate_hz))
+    rise, up = [], 0.0
+    for part in parts:
+        if part.rise is not None:
+            rise.append(part.rise + np.array([up, 0.0]))
+            up = float(rise[-1][-1, 0])
+    lifted = join(rise, samples) if len(rise) == len(parts) else None
     return Postures(
         base=join(base, samples),
         head_rad=join([one[:, None] for one in head], samples)[:, 0],
@@ -122,6 +139,8 @@ def compose(pieces: PieceGraph, sequence: PieceSequence, blend_s: float = BLEND_
         joints_at=pieces.joints_at,
         rate_hz=pieces.rate_hz,
         length_m=pieces.length_m,
+        height=None if lifted is None else lifted[:, 0],
+        pitch_rad=None if lifted is None else lifted[:, 1],
     )
 
 
@@ -174,10 +193,12 @@ def _take(
     pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, points: Floats, radius: float
 ) -> _Node:
     part = pieces.pieces[piece]
-    path = placed(part.base, node.base, node.head_rad)
+    path = placed(part.base, node.base[:2], node.head_rad)
+    if len(node.base) == 3 and part.rise is not None:
+        path = np.column_stack([path, node.base[2] + part.rise[:, 0]])
     reached, at = node.reached_at, 1
     while len(reached) < len(points):
-        near = np.flatnonzero(np.hypot(*(path[at:] - points[len(reached)]).T) <= radius)
+        near = np.flatnonzero(np.linalg.norm(path[at:] - points[len(reached)], axis=1) <= radius)
         if not len(near):
             break
         at += int(near[0])
@@ -198,7 +219,7 @@ def _cost(node: _Node, points: Floats) -> tuple[int, float]:
     if len(node.reached_at) == len(points):
         return -len(points), float(node.reached_at[-1])
     away = points[len(node.reached_at)] - node.base
-    far = float(np.hypot(*away))
+    far = float(np.linalg.norm(away))
     off = float(np.abs(np.angle(np.exp(1j * (np.arctan2(away[1], away[0]) - node.head_rad)))))
     return -len(node.reached_at), far + 0.2 * far * off + 1e-3 * node.samples
 
@@ -286,6 +307,11 @@ def save_motion(
             joints_rad=joints_rad,
             robot=robot,
             segments=np.array(sequence.order),
+            **{
+                key: values
+                for key in ("height", "pitch_rad")
+                if (values := getattr(postures, key)) is not None
+            },
             name=postures.name,
             source=postures.source,
             licence=postures.licence,

@@ -1,5 +1,6 @@
 """``snakewalk fish``: postures from film, new motion from segments, and films to try it on."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -130,7 +131,9 @@ def synthesise(
     postures: Annotated[Path, typer.Argument(help="postures.npz of snakewalk fish match")],
     through: Annotated[
         list[str] | None,
-        typer.Option(help="control point X,Y from the start, x along the head; give several"),
+        typer.Option(
+            help="control point X,Y or X,Y,Z from the start, x along the head; give several"
+        ),
     ] = None,
     seconds: Annotated[float, typer.Option(min=0.1, help="at least so long, at random")] = 20.0,
     seed: Annotated[int, typer.Option(min=0, help="of the random order")] = 0,
@@ -186,12 +189,18 @@ def _check_npz(path: Path) -> None:
         raise InputError(f"{path}: what is written is an .npz")
 
 
-def _points(words: list[str]) -> list[tuple[float, float]]:
-    found = []
+def _points(words: list[str]) -> list[tuple[float, ...]]:
+    found: list[tuple[float, ...]] = []
     for word in words:
         try:
-            x, y = (float(part) for part in word.split(","))
+            point = tuple(float(part) for part in word.split(","))
         except ValueError:
-            raise InputError(f"--through {word}: a control point is X,Y, as in 3,-1.5") from None
-        found.append((x, y))
+            point = ()
+        if len(point) not in {2, 3} or not all(map(math.isfinite, point)):
+            raise InputError(
+                f"--through {word}: a control point is X,Y, as in 3,-1.5, or X,Y,Z with its height"
+            )
+        found.append(point)
+    if len({len(point) for point in found}) > 1:
+        raise InputError("--through: give the height of all control points, or of none")
     return found

@@ -92,7 +92,7 @@ def _path(axes: Axes, made: SynthesisedMotion, options: SynthesisOptions) -> Non
     axes.add_collection(bodies)
     joins = motion.base[junctions(made.pieces, made.sequence)]
     axes.plot(joins[:, 0], joins[:, 1], "o", color=INK, markersize=2.5)
-    for k, (x, y) in enumerate(options.through):
+    for k, (x, y, *_) in enumerate(options.through):
         radius = options.radius * made.source.length
         axes.add_patch(Circle((x, y), radius, fill=False, edgecolor=RED, linewidth=1.4))
         axes.text(x, y, str(k + 1), color=RED, ha="center", va="center", weight="bold")

@@ -161,6 +161,54 @@ def test_control_points_are_passed_in_order() -> None:
         assert np.hypot(*(way[k] - point)) < 0.7  # the blend moves the way a little
 
 
+def test_height_goes_on_from_piece_to_piece_and_pitch_is_blended() -> None:
+    stock = piece_graph(TRUTH, segment_motion(TRUTH), mirror=True)
+    made = random_sequence(stock, 30.0, np.random.default_rng(3))
+    motion = compose(stock, made)
+    assert TRUTH.height is not None
+    assert TRUTH.pitch_rad is not None
+    assert motion.height is not None
+    assert motion.pitch_rad is not None
+    first = segment_motion(TRUTH)[made.order[0] % (len(stock.pieces) // 2)]
+    part = slice(first.start, first.stop + 1)
+    np.testing.assert_allclose(
+        motion.height[: first.stop - first.start + 1],
+        TRUTH.height[part] - TRUTH.height[first.start],
+        atol=1e-12,
+    )
+    fastest = np.abs(np.diff(TRUTH.height)).max()
+    assert np.abs(np.diff(motion.height)).max() < 2.0 * fastest
+    assert np.abs(np.diff(motion.pitch_rad)).max() < 0.1
+    assert np.ptp(motion.pitch_rad) > 0.5 * np.ptp(TRUTH.pitch_rad)
+
+
+def test_moments_lost_by_the_side_view_are_bridged_and_without_one_there_is_no_height() -> None:
+    assert TRUTH.height is not None
+    gaps = TRUTH.height.copy()
+    gaps[::7] = np.nan
+    stock = piece_graph(replace(TRUTH, height=gaps), segment_motion(TRUTH))
+    assert all(np.isfinite(piece.rise).all() for piece in stock.pieces if piece.rise is not None)
+    assert stock.pieces[0].rise is not None
+    flat = piece_graph(replace(TRUTH, height=None, pitch_rad=None), segment_motion(TRUTH))
+    made = random_sequence(flat, 5.0, np.random.default_rng(0))
+    assert compose(flat, made).height is None
+    with pytest.raises(InputError, match="with --side"):
+        sequence_through(flat, np.array([[3.0, 0.0, 0.2]]), radius=0.5)
+
+
+def test_control_points_in_space_are_passed_at_their_height() -> None:
+    stock = piece_graph(TRUTH, segment_motion(TRUTH), mirror=True)
+    for height in (0.4, -0.4):
+        points = np.array([[3.0, 1.0, height], [5.0, 3.0, 0.0]])
+        made = sequence_through(stock, points, radius=0.4)
+        motion = compose(stock, made)
+        assert motion.height is not None
+        at = round(made.reached_s[0] * TRUTH.rate_hz)
+        there = np.array([*motion.base[at], motion.height[at]])
+        assert np.linalg.norm(there - points[0]) < 0.6  # the blend moves the way a little
+        assert motion.height[at] * height > 0.0
+
+
 def test_the_printed_choice_circles_a_point_that_looking_ahead_reaches() -> None:
     """[TH] 5 takes the segment that ends nearest, one at a time."""
     stock = pieces(piece(1, 1, 1.0, 1.0), piece(1, 1, 1.0, -1.0), piece(1, 1, 1.7, 0.0))
