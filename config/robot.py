@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Mapping
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Literal, NamedTuple, Self, TypeVar
 
 from pydantic import Field, model_validator
@@ -126,6 +126,36 @@ class BellyConfig(Strict):
         return self
 
 
+LinkShape = Literal["ball", "capsule", "rails", "none"]
+
+
+class LinkConfig(Strict):
+    """What one link has of its own, `[[links]]` from the head; the rest is the chain's."""
+
+    length_m: float | None = Field(
+        None,
+        ge=0.0,
+        le=1.0,
+        description="joint axis to joint axis, 0 between the two axes of a two-axis module; of the "
+        "head and the tail, to the tip; default: link_length_m",
+    )
+    mass_kg: float | None = Field(None, gt=0.0001, le=20.0, description="default: link_mass_kg")
+    radius_m: float | None = Field(None, gt=0.002, le=0.5, description="default: body_radius_m")
+    shape: LinkShape | None = Field(
+        None,
+        description="what of it meets the ground; default: belly.shape, of a link of no length "
+        "none",
+    )
+
+    @model_validator(mode="after")
+    def _is_as_long_as_its_shape(self) -> Self:
+        if self.length_m is not None and 0.0 < self.length_m <= 0.005:
+            raise ValueError("length_m: 0, or over 0.005")
+        if self.length_m == 0.0 and self.shape in ("capsule", "rails"):
+            raise ValueError(f"shape: a {self.shape} needs a length; ball or none")
+        return self
+
+
 class JointConfig(Strict):
     """What one joint has of its own, `[[joints]]` from the head; the rest is the chain's."""
 
@@ -236,6 +266,9 @@ class RobotConfig(Strict):
     joints: tuple[JointConfig, ...] = Field(
         (), description="one for each joint, or none: then all are alike"
     )
+    links: tuple[LinkConfig, ...] = Field(
+        (), description="one for each link of the spine, or none: then all are alike"
+    )
     link_length_m: float = Field(0.07, gt=0.005, le=1.0, description="joint axis to joint axis")
     body_radius_m: float = Field(0.03, gt=0.002, le=0.5)
     body_profile: tuple[float, ...] | None = Field(
@@ -290,6 +323,36 @@ class RobotConfig(Strict):
                 raise ValueError(
                     f"joints: current_limit_a of joint {number}: only pitch joints have one"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _links_make_a_spine(self) -> Self:
+        if not self.links:
+            return self
+        if len(self.links) != self.link_count:
+            raise ValueError(
+                f"links: {len(self.links)} of them, but a spine of {self.link_count - 1} joints "
+                f"has {self.link_count}"
+            )
+        lengths_m, radii_m = self.link_lengths_m, self.link_radii_m
+        if lengths_m[0] == 0.0 or lengths_m[-1] == 0.0:
+            raise ValueError("links: length_m of the head and of the tail must be over 0")
+        for k in range(1, self.link_count - 1):
+            if lengths_m[k] == 0.0 and self.joint_axes[k - 1] == self.joint_axes[k]:
+                raise ValueError(
+                    f"links: length_m of link {k} is 0: the axes of the joints before and behind "
+                    f"it must differ, both are {self.joint_axes[k]}"
+                )
+            if lengths_m[k] == 0.0 == lengths_m[k + 1]:
+                raise ValueError(
+                    f"links: length_m of links {k} and {k + 1} is 0: a module has two axes at most"
+                )
+        if self.body_profile is not None and len(set(radii_m)) > 1:
+            raise ValueError("links: radius_m and body_profile: one of them says the radii")
+        if self.body_radius_m != max(radii_m):
+            raise ValueError(
+                f"body_radius_m = {self.body_radius_m:g}: is the thickest link's, {max(radii_m):g}"
+            )
         return self
 
     @model_validator(mode="after")
@@ -371,6 +434,8 @@ class RobotConfig(Strict):
     @model_validator(mode="after")
     def _rails_hold_the_body(self) -> Self:
         width_m = self.belly.width_m
+        if width_m is None and "rails" in self.link_shapes:
+            raise ValueError('links: shape rails needs belly.shape = "rails" and its width_m')
         if width_m is not None and width_m <= 2.0 * self.body_radius_m:
             raise ValueError("belly.width_m must be over twice body_radius_m")
         return self
@@ -419,23 +484,104 @@ class RobotConfig(Strict):
     def mass_kg(self) -> float:
         """Of all links."""
         legs = sum(2 * len(pair.joint_axes) * pair.segment_mass_kg for pair in self.limbs)
-        return self.link_mass_kg * self.link_count + legs
+        masses_kg = self.link_masses_kg
+        if len(set(masses_kg)) > 1:
+            return math.fsum(masses_kg) + legs
+        return masses_kg[0] * self.link_count + legs
 
     @property
     def length_m(self) -> float:
         """Body length: the links of the spine."""
-        return self.link_length_m * self.link_count
+        lengths_m = self.link_lengths_m
+        if len(set(lengths_m)) > 1:
+            return math.fsum(lengths_m)
+        return lengths_m[0] * self.link_count
+
+    @property
+    def mean_link_length_m(self) -> float:
+        """Body length over the number of links."""
+        lengths_m = self.link_lengths_m
+        if len(set(lengths_m)) > 1:
+            return self.length_m / self.link_count
+        return lengths_m[0]
+
+    @property
+    def mean_link_mass_kg(self) -> float:
+        """Mass of the spine over the number of its links."""
+        masses_kg = self.link_masses_kg
+        if len(set(masses_kg)) > 1:
+            return math.fsum(masses_kg) / self.link_count
+        return masses_kg[0]
+
+    @property
+    def link_lengths_m(self) -> tuple[float, ...]:
+        """Length of each link of the spine, head first."""
+        return self._of_links("length_m", self.link_length_m)
+
+    @property
+    def link_masses_kg(self) -> tuple[float, ...]:
+        """Mass of each link of the spine, head first."""
+        return self._of_links("mass_kg", self.link_mass_kg)
+
+    @property
+    def link_radii_m(self) -> tuple[float, ...]:
+        """Radius of each link of the spine, head first; ``body_profile`` is left out."""
+        return self._of_links("radius_m", self.body_radius_m)
+
+    @property
+    def link_shapes(self) -> tuple[LinkShape, ...]:
+        """What of each link of the spine meets the ground, head first."""
+        if not self.links:
+            return (self.belly.shape,) * self.link_count
+        return tuple(
+            link.shape or ("none" if link.length_m == 0.0 else self.belly.shape)
+            for link in self.links
+        )
+
+    @property
+    def link_ends(self) -> tuple[float, ...]:
+        """(L + 1,) the head's tip, the spine's joints and the tail's end along the body.
+
+        Counted in mean link lengths from the head: 0, 1, 2 ... of links that are all alike.
+        """
+        lengths_m, mean_m = self.link_lengths_m, self.mean_link_length_m
+        if len(set(lengths_m)) == 1:
+            return tuple(float(k) for k in range(self.link_count + 1))
+        inner = (run_m / mean_m for run_m in accumulate(lengths_m[:-1]))
+        return (0.0, *inner, float(self.link_count))
+
+    def _of_links(self, key: str, usual: float) -> tuple[float, ...]:
+        """Values of a key of the links, ``usual`` where a link has none of its own."""
+        if not self.links:
+            return (usual,) * self.link_count
+        own = (getattr(link, key) for link in self.links)
+        return tuple(usual if o is None else o for o in own)
 
     def radii_m(self, stations: int) -> tuple[float, ...]:
         """Body radius at ``stations`` (1 or more) equal places from head tip to tail tip."""
+        return self.radii_at_m(tuple(k / max(stations - 1, 1) for k in range(stations)))
+
+    def radii_at_m(self, shares: tuple[float, ...]) -> tuple[float, ...]:
+        """Body radius at places along the body: 0 is the head's tip, 1 the tail's."""
+        if len(set(self.link_radii_m)) > 1:
+            return tuple(self._radius_at_m(share * self.link_count) for share in shares)
         profile = self.body_profile or (1.0,)
         radii = []
-        for k in range(stations):
-            at = k / max(stations - 1, 1) * (len(profile) - 1)
+        for share in shares:
+            at = share * (len(profile) - 1)
             low = min(int(at), max(len(profile) - 2, 0))
             high = min(low + 1, len(profile) - 1)
             radii.append(profile[low] + (at - low) * (profile[high] - profile[low]))
         return tuple(self.body_radius_m * radius for radius in radii)
+
+    def _radius_at_m(self, place: float) -> float:
+        """Radius where links differ, of the thicker one at a joint; place as ``link_ends``."""
+        ends = self.link_ends
+        return max(
+            radius_m
+            for radius_m, front, back in zip(self.link_radii_m, ends, ends[1:], strict=False)
+            if front <= place <= back
+        )
 
     @property
     def servo_ids(self) -> tuple[int, ...]:

@@ -26,12 +26,13 @@ from snakewalk.controller.kinematics.links import (
     chain_axes,
     chain_jacobian,
     chain_points_m,
+    half_lengths_m,
 )
 from snakewalk.controller.kinematics.rotations import rotation_by
 from snakewalk.drivers.types import BodyPose
 
 SAMPLES_A_LINK = 24
-"""Of the curve, over the length of a link."""
+"""Of the curve, over the length of a mean link."""
 ROUNDS = 40
 STEP_RAD = 0.3
 """The most that an angle moves in a round."""
@@ -59,7 +60,7 @@ class SpaceCurve:
             raise InputError(
                 f"the curve is {run[-1]:.3f} m long; robot {robot.name} has {robot.length_m:.3f} m"
             )
-        count = int(np.ceil(run[-1] / robot.link_length_m * SAMPLES_A_LINK)) + 1
+        count = int(np.ceil(run[-1] / robot.mean_link_length_m * SAMPLES_A_LINK)) + 1
         self.run_m = np.linspace(0.0, run[-1], count)
         at = np.interp(self.run_m, run, fine)
         self.points_m: Floats = np.asarray(spline(at))
@@ -91,7 +92,7 @@ class BackboneFit:
     head_rotation: Floats
     """(3, 3) columns: the head's forward, left and up."""
     points_m: Floats
-    """(J + 2, 3) head's tip, joints, tail's end: exactly a link apart."""
+    """(J + 2, 3) head's tip, joints, tail's end: exactly their links apart."""
     distance_m: Floats
     """(J + 2,) of each from the curve: the residual."""
 
@@ -157,7 +158,7 @@ def fit_backbone(
 
 def _body(robot: RobotConfig, joint_rad: Floats, tip_m: Floats, rotation: Floats) -> BodyView:
     """Forward kinematics from the head's tip (3,) and axes (3, 3)."""
-    head_m = tip_m - 0.5 * robot.link_length_m * rotation[:, 0]
+    head_m = tip_m - half_lengths_m(robot)[0] * rotation[:, 0]
     return body_in_world(robot, BodyPose(0.0, head_m, rotation), joint_rad)
 
 
@@ -180,15 +181,16 @@ def _seed(robot: RobotConfig, curve: SpaceCurve, roll_rad: float) -> tuple[Float
         if k == 1:
             first = up
     joints = np.zeros(robot.joint_count)
+    joint_ends = np.array(robot.link_ends)
     for column, own in ((0, robot.yaw_joints), (1, robot.pitch_joints)):
         if not own:
             continue
-        at = np.array(own) + 1.0
+        at = joint_ends[np.array(own) + 1]
         apart = float(at[-1] - at[0]) / max(len(own) - 1, 1) or 1.0
         reach = at[:, None] + 0.5 * apart * np.array([-1.0, 1.0])
-        ends = np.interp(reach * robot.link_length_m, curve.run_m, bend[:, column])
+        ends = np.interp(reach * robot.mean_link_length_m, curve.run_m, bend[:, column])
         joints[list(own)] = ends[:, 1] - ends[:, 0]
-    start = forward[: SAMPLES_A_LINK + 1].mean(axis=0)
+    start = forward[: round(SAMPLES_A_LINK * joint_ends[1]) + 1].mean(axis=0)
     start /= np.linalg.norm(start)
     top = first - (first @ start) * start
     top /= np.linalg.norm(top)

@@ -47,8 +47,9 @@ def helix_joints_rad(
     for own, lead in ((robot.yaw_joints, 0.0), (robot.pitch_joints, -0.5 * np.pi)):
         if not own:
             continue
-        apart = (own[-1] - own[0]) / max(len(own) - 1, 1)
-        stretch_m = robot.link_length_m * max(apart, 1.0)
+        ends = robot.link_ends
+        apart = (ends[own[-1] + 1] - ends[own[0] + 1]) / max(len(own) - 1, 1)
+        stretch_m = robot.mean_link_length_m * (apart or 1.0)
         bend = curvature * stretch_m * np.sinc(0.5 * torsion * stretch_m / np.pi)
         angle = lead - torsion * robot.length_m * places(robot, own)
         joints[:, own] = bend * np.cos(phase_rad[:, None] + angle)

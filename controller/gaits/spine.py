@@ -14,7 +14,7 @@ from pydantic import Field
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Frequency, Gait, GaitParameters, Needs
-from snakewalk.controller.gaits.wave import TURN
+from snakewalk.controller.gaits.wave import TURN, places
 
 SAMPLES = 257
 """Of the spine, before it is divided into equal links."""
@@ -85,7 +85,7 @@ class SpineGait(Gait):
     def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
         p = self.params
         own = robot.pitch_joints if self.vertical else robot.yaw_joints
-        edges = np.concatenate([[0.0], (np.array(own) + 1.0) / robot.link_count, [1.0]])
+        edges = np.concatenate([[0.0], places(robot, own), [1.0]])
         joints = np.zeros((len(phase_rad), robot.joint_count))
         joints[:, own] = spine_bends_rad(phase_rad, len(own), p, edges)
         if robot.yaw_joints:

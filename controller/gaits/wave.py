@@ -14,7 +14,8 @@ TURN = 2.0 * np.pi
 
 def places(robot: RobotConfig, joints: tuple[int, ...]) -> Floats:
     """(n,) where joints are on the body: 0 at the head's tip, 1 at the tail's end."""
-    return (np.array(joints, dtype=float) + 1.0) / robot.link_count
+    ends = np.array(robot.link_ends)
+    return np.asarray(ends[np.array(joints, dtype=int) + 1] / robot.link_count)
 
 
 def joint_amplitude_rad(
@@ -25,7 +26,9 @@ def joint_amplitude_rad(
     A joint makes the difference of the headings half a spacing before and behind it:
     ``2 winding sin(pi waves d)`` for joints that are a share d of the body apart.
     """
-    apart = (joints[-1] - joints[0]) / max(len(joints) - 1, 1) / robot.link_count
+    ends = robot.link_ends
+    reach = ends[joints[-1] + 1] - ends[joints[0] + 1]
+    apart = reach / max(len(joints) - 1, 1) / robot.link_count
     return 2.0 * winding_rad * float(np.sin(np.pi * min(waves * apart, 0.5)))
 
 

@@ -19,7 +19,7 @@ class BodyView(NamedTuple):
     rotation: Floats
     """(L, 3, 3) axes of the links; columns: forward (in the direction of travel), left and up."""
     centre_m: Floats
-    """(3,) centre of mass of equal links, without legs; [PT] 2.6.2 calls it S_k."""
+    """(3,) centre of mass of the spine, without legs; [PT] 2.6.2 calls it S_k."""
 
     @property
     def forward(self) -> Floats:
@@ -50,18 +50,29 @@ def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> Body
     """
     links = robot.link_count
     rotation, centres = np.empty((links, 3, 3)), np.empty((links + 1, 3))
-    yaws = _yaws(robot.joint_axes)
-    link_m = robot.link_length_m
+    half_m, weight = _spine(robot.link_lengths_m, robot.link_masses_kg)
     _forward(
-        yaws, pose.rotation, pose.head_in_world_m, joint_rad[: links - 1], link_m, rotation, centres
+        *(_yaws(robot.joint_axes), pose.rotation, pose.head_in_world_m, joint_rad[: links - 1]),
+        *(half_m, weight, rotation, centres),
     )
     return BodyView(centres[:-1], rotation, centres[-1])
 
 
 def chain_points_m(robot: RobotConfig, body: BodyView) -> Floats:
     """(J + 2, 3) the head's tip, the joints and the tail's end."""
-    half = 0.5 * robot.link_length_m * body.forward
+    half = half_lengths_m(robot)[:, None] * body.forward
     return np.concatenate([body.link_m[:1] + half[:1], body.link_m - half])
+
+
+def half_lengths_m(robot: RobotConfig) -> Floats:
+    """(L,) half the length of each link of the spine."""
+    return _spine(robot.link_lengths_m, robot.link_masses_kg)[0]
+
+
+def link_weights(robot: RobotConfig) -> Floats:
+    """(L,) mass of each link of the spine over that of a mean link; ones if all are alike."""
+    weight = _spine(robot.link_lengths_m, robot.link_masses_kg)[1]
+    return np.asarray(weight * (len(weight) / weight.sum()))
 
 
 def chain_axes(robot: RobotConfig, body: BodyView) -> Floats:
@@ -94,34 +105,44 @@ def _yaws(joint_axes: str) -> Bools:
     return np.array([axis == "y" for axis in joint_axes])
 
 
+@cache
+def _spine(lengths_m: tuple[float, ...], masses_kg: tuple[float, ...]) -> tuple[Floats, Floats]:
+    """(L,) half lengths of links, and their masses over the head's: exactly 1 if all are alike."""
+    half_m, weight = 0.5 * np.array(lengths_m), np.array(masses_kg) / masses_kg[0]
+    half_m.flags.writeable = weight.flags.writeable = False
+    return half_m, weight
+
+
 @compiled(
     f"void(boolean[::1], {readonly_array(dimensions=2)}, {readonly_array()}, {readonly_array()},"
-    " float64, float64[:, :, ::1], float64[:, ::1])"
+    f" {readonly_array()}, {readonly_array()}, float64[:, :, ::1], float64[:, ::1])"
 )
 def _forward(
     yaws: Bools,
     head_rotation: Floats,
     head_m: Floats,
     joint_rad: Floats,
-    link_m: float,
+    half_m: Floats,
+    weight: Floats,
     rotation: Floats,
     centres: Floats,
 ) -> None:
     """Carry the head's axes along the joints into ``rotation`` (L, 3, 3), ``centres`` (L + 1, 3).
 
-    ``centres`` holds the centres of the links and, last, their mean.
+    ``centres`` holds the centres of the links and, last, that of their mass.
     """
     links = len(rotation)
     rotation[0] = head_rotation
     x, y, z = head_m[0], head_m[1], head_m[2]
-    sum_x, sum_y, sum_z = x, y, z
+    whole = weight[0]
+    sum_x, sum_y, sum_z = whole * x, whole * y, whole * z
     centres[0, 0], centres[0, 1], centres[0, 2] = x, y, z
-    half_m = 0.5 * link_m
     for k in range(1, links):
         before, here = rotation[k - 1], rotation[k]
-        x -= half_m * before[0, 0]
-        y -= half_m * before[1, 0]
-        z -= half_m * before[2, 0]
+        half = half_m[k - 1]
+        x -= half * before[0, 0]
+        y -= half * before[1, 0]
+        z -= half * before[2, 0]
         c, s = np.cos(joint_rad[k - 1]), np.sin(joint_rad[k - 1])
         turned, kept = (1, 2) if yaws[k - 1] else (2, 1)
         for i in range(3):
@@ -129,13 +150,16 @@ def _forward(
             here[i, 0] = c * forward - s * side
             here[i, turned] = s * forward + c * side
             here[i, kept] = before[i, kept]
-        x -= half_m * here[0, 0]
-        y -= half_m * here[1, 0]
-        z -= half_m * here[2, 0]
+        half = half_m[k]
+        x -= half * here[0, 0]
+        y -= half * here[1, 0]
+        z -= half * here[2, 0]
         centres[k, 0], centres[k, 1], centres[k, 2] = x, y, z
-        sum_x, sum_y, sum_z = sum_x + x, sum_y + y, sum_z + z
-    centres[links, 0], centres[links, 1] = sum_x / links, sum_y / links
-    centres[links, 2] = sum_z / links
+        own = weight[k]
+        sum_x, sum_y, sum_z = sum_x + own * x, sum_y + own * y, sum_z + own * z
+        whole += own
+    centres[links, 0], centres[links, 1] = sum_x / whole, sum_y / whole
+    centres[links, 2] = sum_z / whole
 
 
 def pose_at(position_m: Floats, heading_rad: float, time_s: float = 0.0) -> BodyPose:

@@ -22,15 +22,19 @@ class Retarget:
                 "recording; gaits that need pitch joints only run on it (snakewalk gait list)"
             )
         links = robot.link_count
-        edges = np.concatenate([[0], yaw + 1, [links]])
+        ends = np.array(robot.link_ends)
+        edges = ends[[0, *(yaw + 1), links]]
         self.edges = edges * points / links
         """(G + 1,) ends of the rigid groups, in points from the head."""
         self._yaw = yaw
         self._joints = robot.joint_count
-        self.group_of_link = np.repeat(np.arange(len(yaw) + 1), np.diff(edges))
+        self.group_of_link = np.repeat(
+            np.arange(len(yaw) + 1), np.diff(np.concatenate([[0], yaw + 1, [links]]))
+        )
         """(L,) the rigid group of each link."""
         self._points = points
-        self._link_length_m = robot.link_length_m
+        self._link_lengths_m = np.array(robot.link_lengths_m)
+        self._at = ends * points / links
         self._length_m = robot.length_m
 
     def group_headings_rad(self, skeleton_rad: Floats) -> Floats:
@@ -53,19 +57,19 @@ class Retarget:
         """(...) largest distance between link ends and the skeleton, both centred on their mean."""
         skeleton = np.asarray(skeleton_rad, dtype=float)
         links = self.group_headings_rad(skeleton)[..., self.group_of_link]
-        robot = _ends(links, self._link_length_m)
+        robot = _ends(links, self._link_lengths_m)
         fine = _ends(skeleton, self._length_m / self._points)
-        at = np.linspace(0.0, self._points, links.shape[-1] + 1)
-        low = np.minimum(at.astype(int), self._points - 1)
-        part = (at - low)[:, None]
+        low = np.minimum(self._at.astype(int), self._points - 1)
+        part = (self._at - low)[:, None]
         curve = fine[..., low, :] * (1.0 - part) + fine[..., low + 1, :] * part
         gap = robot - curve
         gap = gap - gap.mean(axis=-2, keepdims=True)
         return np.asarray(np.hypot(gap[..., 0], gap[..., 1]).max(axis=-1))
 
 
-def _ends(angles_rad: Floats, step_m: float) -> Floats:
-    """(..., n + 1, 2) ends of n segments behind a head at the origin."""
-    steps = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1) * -step_m
+def _ends(angles_rad: Floats, step_m: Floats | float) -> Floats:
+    """(..., n + 1, 2) ends of n segments of length ``step_m`` (n,) behind a head at the origin."""
+    ahead = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1)
+    steps = ahead * -np.reshape(step_m, (-1, 1))
     zero = np.zeros((*steps.shape[:-2], 1, 2))
     return np.concatenate([zero, np.cumsum(steps, axis=-2)], axis=-2)

@@ -99,7 +99,7 @@ class CameraPose:
             return
         then = self._at(detection.time_s)
         fit = self._head_end(fit_both_ends(self._robot, detection.line_m, then.joint_rad), then)
-        if fit.error_m > MISFIT * self._robot.link_length_m:
+        if fit.error_m > MISFIT * self._robot.mean_link_length_m:
             self._reason = f"what is seen lies {fit.error_m * 1e3:.0f} mm off the measured joints"
             return
         self.used += 1
@@ -110,7 +110,7 @@ class CameraPose:
     def _head_end(self, fits: tuple[PoseFit, PoseFit], then: _Moment) -> PoseFit:
         """Which end is the head: by the joints' shape; where both fit, by the last estimate."""
         better, worse = sorted(fits, key=lambda fit: fit.error_m)
-        apart = worse.error_m > MISFIT * self._robot.link_length_m
+        apart = worse.error_m > MISFIT * self._robot.mean_link_length_m
         if apart and better.error_m < DECISIVE * worse.error_m:
             return better
         believed = _in_world(self._offset, then.place)

@@ -9,7 +9,12 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.kinematics.links import body_in_world, mean_heading_rad, pose_at
+from snakewalk.controller.kinematics.links import (
+    body_in_world,
+    link_weights,
+    mean_heading_rad,
+    pose_at,
+)
 from snakewalk.controller.mechanics.rigid_motion import rigid_velocity
 from snakewalk.drivers.types import BodyPose, JointState
 
@@ -53,6 +58,7 @@ class DeadReckoning:
             shape_m_s,
             self._friction,
             self._velocity,
+            normal=link_weights(self._robot),
         )
         c, s = np.cos(self._heading_rad), np.sin(self._heading_rad)
         u, v = self._velocity[:2]

@@ -52,8 +52,9 @@ def fit_both_ends(robot: RobotConfig, line_m: Floats, joint_rad: Floats) -> tupl
 
 def _fit(robot: RobotConfig, line_m: Floats, links: Floats) -> PoseFit:
     arc = np.concatenate([[0.0], np.hypot(*np.diff(line_m, axis=0).T).cumsum()])
-    number = np.arange(len(links)) - 0.5 * (len(links) - 1)
-    middle_m = 0.5 * arc[-1] + number * robot.link_length_m
+    ends = np.array(robot.link_ends)
+    number = 0.5 * (ends[:-1] + ends[1:]) - 0.5 * len(links)
+    middle_m = 0.5 * arc[-1] + number * robot.mean_link_length_m
     weight = np.ones(len(links))
     shift_along_m = 0.0
     for _ in range(_ROUNDS):

@@ -79,7 +79,7 @@ class GroundStep:
         self,
         angles_rad: Floats,
         known_m: ArrayLike,
-        segment_m: float,
+        segment_m: ArrayLike,
         half_height_m: ArrayLike,
         known: Known = "tail",
     ) -> GroundedSkeleton:
@@ -88,7 +88,7 @@ class GroundStep:
         Args:
             angles_rad: (N,) or (T, N) tangent angles, head first.
             known_m: (2,) or (T, 2) where the tail end (or the head) is in plan.
-            segment_m: r.
+            segment_m: r, (N,) or the same of all; 0 keeps a point where the one before it is.
             half_height_m: (N + 1,) or scalar, half the body's height at each point.
             known: which end ``known_m`` is.
 
@@ -97,10 +97,11 @@ class GroundStep:
         frames, segments = angles.shape
         half = np.broadcast_to(np.asarray(half_height_m, float), (segments + 1,))
         start = np.broadcast_to(np.asarray(known_m, float), (frames, 2))
+        each_m = np.broadcast_to(np.asarray(segment_m, float), (segments,))
         points = np.empty((frames, segments + 1, 3))
         pitch, gap = np.empty((frames, segments)), np.empty((frames, segments + 1))
         _place(
-            *self._field, np.cos(angles), np.sin(angles), start, segment_m, half,
+            *self._field, np.cos(angles), np.sin(angles), start, each_m, half,
             known == "tail", points, pitch, gap,
         )  # fmt: skip
         if np.ndim(angles_rad) == 1:
@@ -126,8 +127,9 @@ def plane(
 
 
 @compiled(
-    f"void({FIELD}, float64[:, ::1], float64[:, ::1], {readonly_array(dimensions=2)}, float64,"
-    f" {readonly_array()}, boolean, float64[:, :, ::1], float64[:, ::1], float64[:, ::1])"
+    f"void({FIELD}, float64[:, ::1], float64[:, ::1], {readonly_array(dimensions=2)},"
+    f" {readonly_array()}, {readonly_array()}, boolean, float64[:, :, ::1], float64[:, ::1],"
+    " float64[:, ::1])"
 )
 def _place(
     z_m: Floats,
@@ -137,7 +139,7 @@ def _place(
     cosines: Floats,
     sines: Floats,
     known_m: Floats,
-    r: float,
+    segment_m: Floats,
     half_m: Floats,
     from_tail: bool,
     points: Floats,
@@ -157,11 +159,17 @@ def _place(
         ground, gx, gy = plane(z_m, x0, y0, spacing, x, y)
         z = ground + half_m[here]
         points[t, here, 0], points[t, here, 1], points[t, here, 2] = x, y, z
-        miss = 0.0
+        miss = last = 0.0
         gap[t, here] = 0.0
         for _ in range(segments):
             there = here + step
             segment = min(here, there)
+            r = segment_m[segment]
+            if r == 0.0:  # two axes at one place
+                points[t, there], gap[t, there] = points[t, here], gap[t, here]
+                pitch[t, segment] = sign * last
+                here = there
+                continue
             dx, dy = sign * r * cosines[t, segment], sign * r * sines[t, segment]
             level, over = z - half_m[there], miss + half_m[here] - half_m[there]
             low, high = -0.5 * pi, 0.5 * pi
@@ -186,5 +194,6 @@ def _place(
             x, y, z = x + dx * cos(tilt), y + dy * cos(tilt), z + r * sin(tilt)
             points[t, there, 0], points[t, there, 1], points[t, there, 2] = x, y, z
             pitch[t, segment] = sign * tilt
+            last = tilt
             gap[t, there] = miss
             here = there

@@ -29,7 +29,7 @@ def friction_n(
 
 
 def yaw_load_n_m(
-    centres_m: Floats, headings_rad: Floats, link_length_m: float, force_n: Floats
+    centres_m: Floats, headings_rad: Floats, link_lengths_m: Floats, force_n: Floats
 ) -> Floats:
     """Moment (J,) about the vertical that each joint must hold, if nothing is accelerated.
 
@@ -39,11 +39,12 @@ def yaw_load_n_m(
     Args:
         centres_m: (L, 2) link centres, head first.
         headings_rad: (L,)
-        link_length_m: axis to axis; joint j is at the back end of link j.
+        link_lengths_m: (L,) axis to axis; joint j is at the back end of link j.
         force_n: (L, 2) of the ground on each link.
 
     """
-    back = np.stack([np.cos(headings_rad), np.sin(headings_rad)], axis=1) * (-0.5 * link_length_m)
+    ahead = np.stack([np.cos(headings_rad), np.sin(headings_rad)], axis=1)
+    back = ahead * (-0.5 * link_lengths_m[:, None])
     joints_m = (centres_m + back)[:-1]
     behind = _tail_sums(force_n)[1:]
     about_origin = _tail_sums(_cross(centres_m, force_n))[1:]

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.mechanics.ground_step import GroundStep, half_heights_m
+from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.drivers.least_squares import least_squares
 
 _REGULAR = 0.05  # of a link length: a straight body's roll changes no height; goals stay small
@@ -41,8 +41,10 @@ class PitchFitter:
 
     def __init__(self, robot: RobotConfig, ground: HeightField | None) -> None:
         self._step = GroundStep(ground)
-        self._link_m = robot.link_length_m
-        self._half_m = half_heights_m(robot, robot.joint_count + 1)
+        self._lengths_m = np.array(robot.link_lengths_m)
+        self._link_m = robot.mean_link_length_m
+        ends = (end / robot.link_count for end in robot.link_ends)
+        self._half_m = np.array(robot.radii_at_m(tuple(ends)))
         self._pitch = np.array(robot.pitch_joints, dtype=np.intp)
         self._limit_rad = robot.pitch_limit_rad
         self._joints = robot.joint_count
@@ -62,12 +64,12 @@ class PitchFitter:
 
         """
         forward = np.column_stack([np.cos(heading_rad), np.sin(heading_rad)])
-        tip = np.asarray(head_in_world_m, float)[:2] + 0.5 * self._link_m * forward[0]
-        skeleton = self._step.place(heading_rad, tip, self._link_m, self._half_m, known="head")
+        tip = np.asarray(head_in_world_m, float)[:2] + 0.5 * self._lengths_m[0] * forward[0]
+        skeleton = self._step.place(heading_rad, tip, self._lengths_m, self._half_m, known="head")
         height = 0.5 * (skeleton.points_m[1:, 2] + skeleton.points_m[:-1, 2])
 
         ends = np.zeros((self._joints + 2, 2))
-        ends[1:] = -self._link_m * np.cumsum(forward, axis=0)
+        ends[1:] = -np.cumsum(self._lengths_m[:, None] * forward, axis=0)
         centres = 0.5 * (ends[1:] + ends[:-1])
         at, along = ends[self._pitch + 1], forward[self._pitch]
         ahead = (at - centres[:, None]) * along

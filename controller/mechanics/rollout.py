@@ -14,6 +14,7 @@ from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.kinematics.links import half_lengths_m, link_weights
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.mechanics.ground_step import FIELD, plane
 from snakewalk.controller.mechanics.rigid_motion import add_inertia, balance
@@ -105,9 +106,9 @@ class Rollout:
         self._edges, self._group = retarget.edges, retarget.group_of_link
         self.segment_m = robot.length_m / points
         """Length of a segment."""
+        self._half_m, self._weight = half_lengths_m(robot), link_weights(robot)
         self._body = np.array(
             [
-                robot.link_length_m,
                 friction.along,
                 friction.across,
                 robot.joint_speed_limit_rad_s,
@@ -147,7 +148,7 @@ class Rollout:
         _roll(
             samples_rad, np.ascontiguousarray(pieces_rad), head, steps, pulse / steps,
             np.array([*start.centre_m, start.offset_rad]), *self._field, self._edges, self._group,
-            self._body, path.points_m, path_at, cruise_segments_s,
+            self._half_m, self._weight, self._body, path.points_m, path_at, cruise_segments_s,
             np.array([drift.ahead_m, drift.left_m, drift.turn_rad]), out,
         )  # fmt: skip
         return Rolled(out[:, :2], *out.T[2:])
@@ -161,8 +162,8 @@ def _area(total: Floats, track: Floats, at: float) -> float:
 
 
 @compiled(
-    "void(float64[::1], float64[::1], float64, float64[::1], int64[::1], float64, float64[::1],"
-    " float64[:, ::1], float64[::1])"
+    f"void(float64[::1], float64[::1], float64, float64[::1], int64[::1], {readonly_array()},"
+    f" {readonly_array()}, float64[::1], float64[:, ::1], float64[::1])"
 )
 def _lay(
     total: Floats,
@@ -170,29 +171,31 @@ def _lay(
     head: float,
     edges: Floats,
     group: Ints,
-    link_m: float,
+    half_m: Floats,
+    weight: Floats,
     headings: Floats,
     points: Floats,
     groups: Floats,
 ) -> None:
-    """Write headings of the links and their centres about their mean, in the track's frame."""
+    """Write headings of the links and their centres about that of mass, in the track's frame."""
     for g in range(len(groups)):
         width = edges[g + 1] - edges[g]
         ahead = _area(total, track, head - edges[g])
         groups[g] = (ahead - _area(total, track, head - edges[g + 1])) / width
-    x = y = sum_x = sum_y = 0.0
+    x = y = sum_x = sum_y = whole = 0.0
     links = len(headings)
     for i in range(links):
         angle = groups[group[i]]
         headings[i] = angle
-        c, s = 0.5 * link_m * np.cos(angle), 0.5 * link_m * np.sin(angle)
+        c, s = half_m[i] * np.cos(angle), half_m[i] * np.sin(angle)
         x, y = x - c, y - s
         points[i, 0], points[i, 1] = x, y
         x, y = x - c, y - s
-        sum_x, sum_y = sum_x + points[i, 0], sum_y + points[i, 1]
+        sum_x, sum_y = sum_x + weight[i] * points[i, 0], sum_y + weight[i] * points[i, 1]
+        whole += weight[i]
     for i in range(links):
-        points[i, 0] -= sum_x / links
-        points[i, 1] -= sum_y / links
+        points[i, 0] -= sum_x / whole
+        points[i, 1] -= sum_y / whole
 
 
 @compiled("UniTuple(float64, 2)(float64[:, ::1], int64, float64, float64)")
@@ -252,7 +255,10 @@ def _pulse_rate(
     return rate
 
 
-@compiled(f"void({FIELD}, float64, float64, float64[:, ::1], float64[::1], float64[::1])")
+@compiled(
+    f"void({FIELD}, float64, float64, float64[:, ::1], {readonly_array()}, float64[::1],"
+    " float64[::1])"
+)
 def _pull(
     z_m: Floats,
     x0: float,
@@ -261,13 +267,14 @@ def _pull(
     x: float,
     y: float,
     points: Floats,
+    weight: Floats,
     normal: Floats,
     linear: Floats,
 ) -> None:
-    """Write each link's load, and add the slope's force and moment on all, in weights of a link."""
+    """Write each link's load, and add the slope's force and moment on all, in mean link weights."""
     for i in range(len(points)):
         _, gx, gy = plane(z_m, x0, y0, spacing, x + points[i, 0], y + points[i, 1])
-        normal[i] = 1.0 / np.sqrt(1.0 + gx * gx + gy * gy)
+        normal[i] = weight[i] / np.sqrt(1.0 + gx * gx + gy * gy)
         fx, fy = -gx * normal[i], -gy * normal[i]
         linear[0] += fx
         linear[1] += fy
@@ -276,8 +283,8 @@ def _pull(
 
 @compiled(
     f"void({readonly_array(layout='C')}, float64[:, ::1], float64, int64, float64, float64[::1],"
-    f" {FIELD}, float64[::1], int64[::1], float64[::1], float64[:, ::1], int64, float64,"
-    " float64[::1], float64[:, ::1])"
+    f" {FIELD}, float64[::1], int64[::1], {readonly_array()}, {readonly_array()}, float64[::1],"
+    " float64[:, ::1], int64, float64, float64[::1], float64[:, ::1])"
 )
 def _roll(
     samples: Floats,
@@ -292,6 +299,8 @@ def _roll(
     spacing: float,
     edges: Floats,
     group: Ints,
+    half_m: Floats,
+    weight: Floats,
     body: Floats,
     path: Floats,
     path_at: int,
@@ -300,13 +309,13 @@ def _roll(
     out: Floats,
 ) -> None:
     """Roll out pieces (C, n); ``out`` (C, 9) are the columns of ``Rolled``."""
-    link_m, along, across, limit = body[0], body[1], body[2], body[3]
+    along, across, limit = body[0], body[1], body[2]
     known, new, links = len(samples), pieces.shape[1], len(group)
     track, total = np.empty(known + new), np.zeros(known + new + 1)
     here_g, next_g = np.empty(len(edges) - 1), np.empty(len(edges) - 1)
     here_h, next_h, heading = np.empty(links), np.empty(links), np.empty(links)
     here_p, next_p, points = np.empty((links, 2)), np.empty((links, 2)), np.empty((links, 2))
-    shape, moving, normal = np.empty((links, 2)), np.empty((links, 2)), np.ones(links)
+    shape, moving, normal = np.empty((links, 2)), np.empty((links, 2)), weight.copy()
     linear, velocity = np.empty(3), np.empty(3)
     inertia, none = np.empty((3, 3)), np.zeros((3, 3))
     level = z_m.min() == z_m.max()
@@ -317,15 +326,15 @@ def _roll(
         x, y, phi = start[0], start[1], start[2]
         at, place, off, square, time = head, float(path_at), 0.0, 0.0, 0.0
         velocity[:], moving[:] = 0.0, 0.0
-        _lay(total, track, at, edges, group, link_m, here_h, here_p, here_g)
+        _lay(total, track, at, edges, group, half_m, weight, here_h, here_p, here_g)
         for _ in range(steps):
             at += step
-            _lay(total, track, at, edges, group, link_m, next_h, next_p, next_g)
+            _lay(total, track, at, edges, group, half_m, weight, next_h, next_p, next_g)
             dt = step / _pulse_rate(here_g, next_g, step, cruise, limit)
             mean = _turned(here_h, here_p, next_h, next_p, phi, dt, heading, points, shape)
             linear[:] = 0.0
             if not level:
-                _pull(z_m, x0, y0, spacing, x, y, points, normal, linear)
+                _pull(z_m, x0, y0, spacing, x, y, points, weight, normal, linear)
             if not balance(points, heading, shape, along, across, normal, linear, none, velocity):
                 add_inertia(points, shape, moving, dt, linear, inertia)
                 balance(points, heading, shape, along, across, normal, linear, inertia, velocity)

@@ -13,7 +13,12 @@ from scipy.optimize import nnls
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.kinematics.links import BodyView, chain_axes, chain_points_m
+from snakewalk.controller.kinematics.links import (
+    BodyView,
+    chain_axes,
+    chain_points_m,
+    link_weights,
+)
 
 TORQUE_NOISE_N_M = 0.005
 """Error of a torque against which an even load weighs: two units of Present Current (ours)."""
@@ -31,7 +36,7 @@ def support_n(robot: RobotConfig, body: BodyView, torque_n_m: Floats) -> Floats:
 
     """
     links = robot.joint_count + 1
-    weight_n = robot.link_mass_kg * GRAVITY_M_S2
+    weight_n, share = robot.mean_link_mass_kg * GRAVITY_M_S2, link_weights(robot)
     joints_m, axes = chain_points_m(robot, body)[1:-1], chain_axes(robot, body)
     pitch = np.array(robot.pitch_joints, dtype=int)
     # lever (P, L): moment about a joint's axis of an upward unit force on a link behind it
@@ -39,14 +44,15 @@ def support_n(robot: RobotConfig, body: BodyView, torque_n_m: Floats) -> Floats:
     lever_m = axes[pitch, None, 0] * arm_m[..., 1] - axes[pitch, None, 1] * arm_m[..., 0]
     lever_m = np.where(np.arange(links) > pitch[:, None], lever_m, 0.0)
     middle_m = body.link_m - body.centre_m
-    whole = np.stack([np.full(links, robot.link_length_m), middle_m[:, 0], middle_m[:, 1]])
+    whole = np.stack([np.full(links, robot.mean_link_length_m), middle_m[:, 0], middle_m[:, 1]])
     even = np.eye(links) * (TORQUE_NOISE_N_M / weight_n)
     rows = np.concatenate([lever_m, whole, even])
-    target = rows.sum(axis=1) * weight_n
+    target = (rows * share).sum(axis=1) * weight_n
     target[: len(pitch)] -= torque_n_m[pitch]
     return np.asarray(nnls(rows, target)[0])
 
 
 def lifted(robot: RobotConfig, bears_n: Floats) -> Bools:
     """Whether each link is lifted, by what the ground bears of it; any shape."""
-    return np.asarray(bears_n < LIFTED_SHARE * robot.link_mass_kg * GRAVITY_M_S2)
+    weight_n = robot.mean_link_mass_kg * link_weights(robot) * GRAVITY_M_S2
+    return np.asarray(bears_n < LIFTED_SHARE * weight_n)

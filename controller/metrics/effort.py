@@ -139,12 +139,14 @@ def _slip(record: RunRecord, steady: NDArray[np.bool_]) -> float:
     turned = frames[1:] @ np.swapaxes(frames[:-1], -1, -2)
     skew = 0.5 * (turned - np.swapaxes(turned, -1, -2))
     turn = np.stack([skew[..., 2, 1], skew[..., 0, 2]], axis=-1)
-    radius_m = header.robot.body_radius_m
+    radius_m = np.array(header.robot.link_radii_m)
     # v + w x (-r z): the point under the centre
-    move = np.diff(links[..., :2], axis=0) + radius_m * np.stack([-turn[..., 1], turn[..., 0]], -1)
+    rolled = np.stack([-turn[..., 1], turn[..., 0]], -1)
+    move = np.diff(links[..., :2], axis=0) + radius_m[:, None] * rolled
     forward = frames[:-1, :, :2, 0]
     across = np.abs(forward[..., 0] * move[..., 1] - forward[..., 1] * move[..., 0])
-    touches = links[:-1, :, 2] < radius_m + CLEAR_M
+    bears = np.array([shape != "none" for shape in header.robot.link_shapes])
+    touches = bears & (links[:-1, :, 2] < radius_m + CLEAR_M)
     slid_m = float((across * touches).sum()) / links.shape[1]
     gone_m = float(np.linalg.norm((centre[-1] - centre[0])[:2]))
     return slid_m / gone_m if gone_m > 1e-3 else float("nan")

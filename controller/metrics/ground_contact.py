@@ -33,13 +33,14 @@ def ground_contact(record: RunRecord, ground: HeightField | None) -> GroundConta
     if len(pose.time_s) == 0 or not np.isfinite(pose.links_m).all():
         return GroundContact(float("nan"), float("nan"))
     x, y, z = np.moveaxis(pose.links_m, -1, 0)
-    rest = np.zeros_like(z)
+    robot = record.header.robot
+    rest, radius_m = np.zeros_like(z), np.array(robot.link_radii_m)
     if ground is not None:
         gx, gy = ground.gradient(x, y)
         # a ball on a slope touches uphill of its centre
-        lean = record.header.robot.body_radius_m * (np.sqrt(1.0 + gx**2 + gy**2) - 1.0)
+        lean = radius_m * (np.sqrt(1.0 + gx**2 + gy**2) - 1.0)
         rest = ground.elevation_m(x, y) + lean
-    gap = z - rest - record.header.robot.body_radius_m
+    gap = (z - rest - radius_m)[:, [shape != "none" for shape in robot.link_shapes]]
     roll = np.abs(roll_rad(pose.rotation))
     return GroundContact(float(roll.max()), float((gap > CLEAR_M).mean()))
 

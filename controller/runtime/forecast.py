@@ -15,7 +15,13 @@ from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.kinematics.links import BodyView, body_in_world, mean_heading_rad, pose_at
+from snakewalk.controller.kinematics.links import (
+    BodyView,
+    body_in_world,
+    link_weights,
+    mean_heading_rad,
+    pose_at,
+)
 from snakewalk.controller.mechanics.load import friction_n, yaw_load_n_m
 from snakewalk.controller.mechanics.rigid_motion import (
     NoBalanceError,
@@ -113,7 +119,8 @@ def forecast(
     times, angles, centres, pulse_m = [0.0], [joints], [], 0.0
     torques = [np.zeros(robot.joint_count)]
     yaw = np.array([axis == "y" for axis in robot.joint_axes])
-    weight_n = robot.link_mass_kg * GRAVITY_M_S2
+    weight_n = robot.mean_link_mass_kg * GRAVITY_M_S2
+    share, lengths_m = link_weights(robot)[:, None], np.array(robot.link_lengths_m)
     while True:
         view = body_in_world(robot, pose_at(head_m, head_rad), joints)
         centres.append(view.centre_m[:2])
@@ -126,7 +133,7 @@ def forecast(
         c, s = np.cos(head_rad), np.sin(head_rad)
         turn = np.array([[c, -s], [s, c]])
         tangential, normal = slope_load(ground, view.link_m)
-        tangential = tangential @ turn
+        tangential, normal = share * (tangential @ turn), share[:, 0] * normal
         was_m_s = moving_m_s @ turn
         try:
             velocity = rigid_velocity(
@@ -153,9 +160,9 @@ def forecast(
         )
         if not held:
             slide = _worse(slide, points, headings, friction, tangential, normal, step_s)
-            force_n -= robot.link_mass_kg * (moving - was_m_s) / step_s
+            force_n -= robot.mean_link_mass_kg * share * (moving - was_m_s) / step_s
         moving_m_s = moving @ turn.T
-        torques.append(yaw * yaw_load_n_m(points, headings, robot.link_length_m, force_n))
+        torques.append(yaw * yaw_load_n_m(points, headings, lengths_m, force_n))
         head_m = head_m + step_s * turn @ velocity[:2]
         head_rad += step_s * velocity[2]
         joints = goal

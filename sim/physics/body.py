@@ -72,42 +72,54 @@ def _add_planes(spec: mujoco.MjSpec) -> None:
             )
 
 
-def straight_part_m(robot: RobotConfig) -> float:
-    """Length of the straight part of a capsule belly.
+def straight_part_m(length_m: float, radius_m: float) -> float:
+    """Length of the straight part of a link's capsule belly.
 
     On a plane a capsule has two contacts, at the ends of this part. At ``length / sqrt(3)`` they
     are the Gauss points of a load that is even along the link: forces and yaw torques of sliding
     are those of the whole line. A slender link's is longer, so that the notches stay shallow.
     """
-    return max(
-        robot.link_length_m / math.sqrt(3.0),
-        robot.link_length_m - 2.0 * NOTCH * robot.body_radius_m,
-    )
+    return max(length_m / math.sqrt(3.0), length_m - 2.0 * NOTCH * radius_m)
 
 
-def belly_points_m(robot: RobotConfig) -> Floats:
+def belly_points_m(robot: RobotConfig, link: int) -> Floats:
     """(C, P, 3) centres, about a link's, of P balls in a row in each of its C capsules.
 
     The first and the last are the ends of the straight part; between them there are more only if
-    the notches would be deeper than three tenths of the radius.
+    the notches would be deeper than three tenths of the radius. C is 0 for a link without a belly.
     """
-    if robot.belly.shape == "ball":
-        return np.zeros((1, 1, 3))
-    straight_m = straight_part_m(robot)
-    count = 1 + max(1, math.ceil(straight_m / (1.4 * robot.body_radius_m)))
+    shape, radius_m = robot.link_shapes[link], robot.link_radii_m[link]
+    if shape in ("ball", "none"):
+        return np.zeros((int(shape == "ball"), 1, 3))
+    straight_m = straight_part_m(robot.link_lengths_m[link], radius_m)
+    count = 1 + max(1, math.ceil(straight_m / (1.4 * radius_m)))
     row = np.zeros((count, 3))
     row[:, 0] = np.linspace(-0.5, 0.5, count) * straight_m
-    if robot.belly.width_m is None:
+    if shape == "capsule" or robot.belly.width_m is None:
         return row[None]
-    side = np.array([0.0, 0.5 * robot.belly.width_m - robot.body_radius_m, 0.0])
+    side = np.array([0.0, 0.5 * robot.belly.width_m - radius_m, 0.0])
     return np.stack([row - side, row + side])
 
 
-def links_apart(robot: RobotConfig) -> int:
-    """Least number of joints between two links that may touch: nearer ones overlap as they lie."""
-    straight_m = 0.0 if robot.belly.shape == "ball" else straight_part_m(robot)
-    long_m = straight_m + 2.0 * robot.body_radius_m
-    return max(2, math.floor(long_m / robot.link_length_m) + 1)
+def overlapping_links(robot: RobotConfig) -> list[tuple[int, int]]:
+    """Pairs of links, not neighbours, that overlap as the body lies straight.
+
+    So do those with only links of no length between them: they are neighbours at two axes.
+    """
+    ends, mean_m = robot.link_ends, robot.mean_link_length_m
+    lengths_m, radii_m, shapes = robot.link_lengths_m, robot.link_radii_m, robot.link_shapes
+    reach_m = [
+        radius + (0.0 if shape in ("ball", "none") else 0.5 * straight_part_m(length, radius))
+        for length, radius, shape in zip(lengths_m, radii_m, shapes, strict=True)
+    ]
+    pairs = []
+    for i in range(robot.link_count):
+        for j in range(i + 2, robot.link_count):
+            apart_m = 0.5 * (ends[j] + ends[j + 1] - ends[i] - ends[i + 1]) * mean_m
+            if apart_m > reach_m[i] + reach_m[j] and any(lengths_m[i + 1 : j]):
+                continue
+            pairs.append((i, j))
+    return pairs
 
 
 def finish(model: mujoco.MjModel, ground: HeightField | None) -> mujoco.MjModel:
@@ -117,12 +129,20 @@ def finish(model: mujoco.MjModel, ground: HeightField | None) -> mujoco.MjModel:
     would carry half and the middle one and a half times their weight. That alone moves the speed
     under isotropic friction by 14 %.
     """
-    model.body_invweight0[1:] = model.body_invweight0[1:].mean(axis=0)
+    borne = [k for k in range(1, model.nbody) if not _is_between_axes(model, k)]
+    model.body_invweight0[1:] = model.body_invweight0[borne].mean(axis=0)
     model.geom_sameframe[model.geom_bodyid == 0] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     if ground is not None:
         low, span = _levels(ground)
         model.hfield_data[:] = ((ground.z_m - low) / span).astype(np.float32).ravel()
     return model
+
+
+def _is_between_axes(model: mujoco.MjModel, body: int) -> bool:
+    """Whether a body's joint and that of the body behind it are at one place: no length."""
+    behind = np.flatnonzero(model.body_parentid == body)
+    first = body > 1 and bool(model.body_jntnum[body])
+    return first and any(not model.body_pos[k].any() for k in behind)
 
 
 def mjcf(
@@ -137,11 +157,8 @@ def mjcf(
     options, obstacle = obstacle_mjcf(world)
     if robot.limbs:
         options = ' cone="elliptic" impratio="10"'  # as an obstacle's: for friction that holds
-    links, apart = robot.link_count, links_apart(robot)
     overlapping = "".join(
-        f'<exclude body1="link{i}" body2="link{j}"/>'
-        for i in range(links)
-        for j in range(i + 2, min(i + apart, links))
+        f'<exclude body1="link{i}" body2="link{j}"/>' for i, j in overlapping_links(robot)
     )
     return f"""<mujoco model="{robot.name}">
   <compiler angle="radian" autolimits="true"/>
@@ -186,7 +203,8 @@ def _levels(ground: HeightField) -> tuple[float, float]:
 
 def _link(robot: RobotConfig, index: int, *, balls: bool) -> str:
     """Inertia of a cylinder; the frame of the head is its centre, of others their front joint."""
-    m, r, length = robot.link_mass_kg, robot.body_radius_m, robot.link_length_m
+    m, r = robot.link_masses_kg[index], robot.link_radii_m[index]
+    length = robot.link_lengths_m[index]
     centre = f"{0.0 if index == 0 else -length / 2!r} 0 0"
     across = m * (3 * r**2 + length**2) / 12
     return (
@@ -197,10 +215,10 @@ def _link(robot: RobotConfig, index: int, *, balls: bool) -> str:
 
 def _belly(robot: RobotConfig, index: int, balls: bool) -> str:
     """Write a link's capsules, or the balls in them."""
-    common = f'size="{robot.body_radius_m!r}" contype="2" conaffinity="3"'
+    common = f'size="{robot.link_radii_m[index]!r}" contype="2" conaffinity="3"'
     text = ""
-    for c, row in enumerate(belly_points_m(robot)):
-        row[:, 0] -= 0.0 if index == 0 else robot.link_length_m / 2
+    for c, row in enumerate(belly_points_m(robot, index)):
+        row[:, 0] -= 0.0 if index == 0 else robot.link_lengths_m[index] / 2
         at = [" ".join(repr(float(v)) for v in point) for point in row]
         if balls or len(at) == 1:
             for k, place in enumerate(at):
@@ -216,7 +234,7 @@ def _links_behind(robot: RobotConfig, *, balls: bool) -> str:
     for j in reversed(range(robot.link_count - 1)):
         axis = "0 0 -1" if robot.joint_axes[j] == "y" else "0 1 0"
         stop = robot.limit_rad[j] + STOP_MARGIN_RAD
-        back = robot.link_length_m / (2.0 if j == 0 else 1.0)
+        back = robot.link_lengths_m[j] / (2.0 if j == 0 else 1.0)
         text = (
             f'<body name="link{j + 1}" pos="{-back!r} 0 0">'
             f'<joint name="joint{j}" axis="{axis}" range="{-stop!r} {stop!r}" '
@@ -246,7 +264,7 @@ def _limb(robot: RobotConfig, pair: LimbsConfig, first: int, side: float) -> str
     for k in reversed(range(len(pair.joint_axes))):
         axis = f"0 0 {-side!r}" if pair.joint_axes[k] == "y" else f"{side!r} 0 0"
         stop = limits[first + k - 1] + STOP_MARGIN_RAD
-        along = -0.5 * robot.link_length_m if pair.link > 0 else 0.0
+        along = -0.5 * robot.link_lengths_m[pair.link] if pair.link > 0 else 0.0
         at = (along, side * pair.hip_m) if k == 0 else (0.0, side * pair.segments_m[k - 1])
         length, mass, r = pair.segments_m[k], pair.segment_mass_kg, pair.foot_radius_m
         across = mass * (3.0 * r**2 + length**2) / 12.0

@@ -19,8 +19,10 @@ BENT_STOP_SHARE = 1.4
 """The same of a link's, where it cannot roll: less is safer, more tells no difference any more."""
 
 
-def stop_drag(centre_m: Floats, mass_kg: float, radius_m: float, step_s: float) -> float:
-    """Drag that stops a link within a step, N s/m; ``centre_m`` (L, 3) are the links' centres.
+def stop_share(centre_m: Floats, radius_m: float) -> float:
+    """Share of a link's momentum that friction may take in a step, by their centres (L, 3).
+
+    Times its mass over the step this is the drag that stops the link, N s/m.
 
     A body that lies straight can also roll, which makes each contact three times lighter than its
     link (``1 + r^2 / (r^2 / 2)``, solid cylinder); a bent one cannot, as the links beside its axis
@@ -39,7 +41,7 @@ def stop_drag(centre_m: Floats, mass_kg: float, radius_m: float, step_s: float) 
     off_axis = 0.5 * (xx + yy) - math.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
     square = radius_m * radius_m
     lightness = 1.0 + square / (0.5 * square + max(off_axis, 0.0))
-    return min(STOP_SHARE / lightness, BENT_STOP_SHARE) * mass_kg / step_s
+    return min(STOP_SHARE / lightness, BENT_STOP_SHARE)
 
 
 def ellipse_force(
@@ -53,7 +55,7 @@ def ellipse_force(
     """Force along and across a link at one contact, N.
 
     ``mu`` are the coefficients of sliding forward, across and back;
-    ``still_n_s_m`` is the drag that stops a link, see ``stop_drag``;
+    ``still_n_s_m`` is the drag that stops a link, see ``stop_share``;
     ``link_normal_n`` the sum of the normal forces of the link's contacts, which share it.
     """
     mu_forward, mu_across, mu_back = mu

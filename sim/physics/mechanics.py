@@ -38,8 +38,10 @@ class Mechanics:
     mu: tuple[float, float, float]
     """Coefficients of friction: sliding forward, across and back."""
     spine_links: int
-    link_mass_kg: float
+    link_mass_kg: Floats
+    """(L,) of each link; a leg's counts as a plain one of the spine."""
     radius_m: float
+    """Of the body."""
     gear_drag_n_m_s: Floats
     """(J,) viscous loss of each gearbox, powered or not."""
     planes: TangentPlanes
@@ -51,7 +53,7 @@ class Mechanics:
     before_m: Floats
     """(L, 3) centres of the links at the start of the last step."""
     water: Floats
-    """(6,) ``sim.physics.water.water_constants``."""
+    """(L, 6) ``sim.physics.water.water_constants``."""
     totals: Floats = field(default_factory=lambda: np.zeros(3))
     """Energy lost to ground friction and water, J; mean distance slipped across the links, m;
     energy lost to the drag of the gears, J."""
@@ -68,15 +70,17 @@ class Mechanics:
         mu = world.friction
         load, before = np.zeros(robot.joint_count + 1), np.zeros((robot.joint_count + 1, 3))
         data = mujoco.MjData(model)
-        mass, radius = robot.link_mass_kg, robot.body_radius_m
+        legs = len(robot.limb_joints)
+        mass = np.array([*robot.link_masses_kg, *(robot.link_mass_kg,) * legs])
         water = water_constants(world, robot)
         grip = mu.along, mu.across, mu.backward
-        planes = TangentPlanes.of(model, ground, radius)
+        planes = TangentPlanes.of(model, ground)
         role = np.zeros(model.ngeom, dtype=np.int32)
         role[model.geom("ground").id] = GROUND
         role[planes.planes] = GROUND
         role[foot_geoms(model, robot)] = FOOT
-        about = robot.link_count, mass, radius, np.array(robot.gear_drags_n_m_s)
+        gear_drag = np.array(robot.gear_drags_n_m_s)
+        about = robot.link_count, mass, robot.body_radius_m, gear_drag
         return cls(model, data, grip, *about, planes, role, load, before, water)
 
     @property

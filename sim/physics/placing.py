@@ -103,7 +103,8 @@ def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField) -> None:
     stiff[0] = 0.0
 
     def above_m() -> Floats:
-        return _clearance_m(m, robot, ground)
+        clear = _clearance_m(m, robot, ground)
+        return clear[np.isfinite(clear)]
 
     for _ in range(DRAPE_ROUNDS):
         here, qpos = above_m(), data.qpos.copy()
@@ -140,34 +141,39 @@ def _settle(m: Mechanics) -> None:
 def _clearance_m(m: Mechanics, robot: RobotConfig, ground: HeightField | None) -> Floats:
     """(L,) height by which each link's belly or foot clears the ground, negative below it.
 
-    Infinite for the segments of a leg that end in no foot.
+    Infinite for what bears nothing: the segments of a leg that end in no foot, links of no length.
     """
     mujoco.mj_kinematics(m.model, m.data)
     spine = robot.link_count
     axes = np.asarray(m.data.xmat[1 : 1 + spine]).reshape(-1, 3, 3)
-    along, aside, _ = belly_points_m(robot).reshape(-1, 3).T[..., None]
+    rows = [belly_points_m(robot, k).reshape(-1, 3) for k in range(spine)]
+    link = np.repeat(np.arange(spine), [len(row) for row in rows])
+    along, aside, _ = np.concatenate(rows).T[..., None]
     # products by hand: BLAS adds in another order on another processor
-    centres = m.data.xipos[1 : 1 + spine, None]
-    places = centres + along * axes[:, None, :, 0] + aside * axes[:, None, :, 1]
-    points = places.reshape(-1, 3)
-    above = points[:, 2] - _rest_height_m(ground, points, robot.body_radius_m)
+    centres = m.data.xipos[1 : 1 + spine][link]
+    points = centres + along * axes[link, :, 0] + aside * axes[link, :, 1]
+    radius_m = np.array(robot.link_radii_m)[link]
     clear = np.full(m.joint_count + 1, np.inf)
-    clear[:spine] = above.reshape(len(axes), -1).min(axis=1)
+    np.minimum.at(clear, link, points[:, 2] - _rest_height_m(ground, points, radius_m))
     for foot in foot_geoms(m.model, robot):
-        radius_m = float(m.model.geom_size[foot, 0])
+        foot_m = m.model.geom_size[foot, :1]
         low = m.data.geom_xpos[foot : foot + 1]
-        clear[m.model.geom_bodyid[foot] - 1] = low[0, 2] - _rest_height_m(ground, low, radius_m)[0]
+        clear[m.model.geom_bodyid[foot] - 1] = low[0, 2] - _rest_height_m(ground, low, foot_m)[0]
     return clear
 
 
-def _rest_height_m(ground: HeightField | None, centre: Floats, radius_m: float) -> Floats:
-    """Least height (P,) at which balls of ``radius_m`` at ``centre`` (P, 3) clear the ground."""
+def _rest_height_m(ground: HeightField | None, centre: Floats, radius_m: Floats) -> Floats:
+    """Least height (P,) at which balls at ``centre`` (P, 3) clear the ground."""
     if ground is None:
-        return np.full(len(centre), radius_m)
-    offsets = np.linspace(-1.0, 1.0, 9) * radius_m
-    dx, dy = (each.ravel() for each in np.meshgrid(offsets, offsets))
-    inside = dx**2 + dy**2 <= radius_m**2
-    dx, dy = dx[inside], dy[inside]
-    cap = np.sqrt(radius_m**2 - dx**2 - dy**2)
-    z = ground.elevation_m(centre[:, :1] + dx, centre[:, 1:2] + dy)
-    return np.asarray((z + cap).max(axis=1))
+        return radius_m
+    rest_m = np.empty(len(centre))
+    for radius in np.unique(radius_m):
+        offsets = np.linspace(-1.0, 1.0, 9) * radius
+        dx, dy = (each.ravel() for each in np.meshgrid(offsets, offsets))
+        inside = dx**2 + dy**2 <= radius**2
+        dx, dy = dx[inside], dy[inside]
+        cap = np.sqrt(radius**2 - dx**2 - dy**2)
+        own = radius_m == radius
+        z = ground.elevation_m(centre[own, :1] + dx, centre[own, 1:2] + dy)
+        rest_m[own] = (z + cap).max(axis=1)
+    return rest_m

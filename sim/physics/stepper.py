@@ -19,7 +19,7 @@ from numba.extending import intrinsic, register_jitable
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
-from snakewalk.sim.physics.friction import ellipse_force, stop_drag
+from snakewalk.sim.physics.friction import ellipse_force, stop_share
 from snakewalk.sim.physics.layout import step_layout
 from snakewalk.sim.physics.mechanics import (
     FOOT,
@@ -34,7 +34,7 @@ from snakewalk.sim.plant import ServoDrive, shaft_torque
 
 register_jitable(ellipse_force)
 
-register_jitable(stop_drag)
+register_jitable(stop_share)
 
 register_jitable(shaft_torque)
 
@@ -139,6 +139,7 @@ def _add_friction(
     law: tuple[float, ...],
     load: Floats,
     totals: Floats,
+    mass_kg: Floats,
     water: Floats,
     spine: int,
 ) -> None:
@@ -147,9 +148,9 @@ def _add_friction(
     size, at_dist, at_place, at_up, at_geom, _ = at
     geom_body, role, parents = geoms
     v, w, wrench, depth, before = work
-    mu, mass_kg, radius_m, step_s = (law[0], law[1], law[2]), law[3], law[4], law[5]
+    mu, radius_m, step_s = (law[0], law[1], law[2]), law[3], law[4]
     centre, rotation = chain[0], chain[1]
-    still = stop_drag(centre[1 : spine + 1], mass_kg, radius_m, step_s)
+    stop = stop_share(centre[1 : spine + 1], radius_m)
     depth[:] = 0.0
     for c in range(count):
         i = _sliding_link(integers, 2 * size * c + at_geom, geom_body, role)
@@ -177,6 +178,7 @@ def _add_friction(
         g0, g1, g2 = n[1] * e2 - n[2] * e1, n[2] * e0 - n[0] * e2, n[0] * e1 - n[1] * e0
         v_along = s0 * e0 + s1 * e1 + s2 * e2
         v_across = s0 * g0 + s1 * g1 + s2 * g2
+        still = stop * mass_kg[i] / step_s
         f_along, f_across = ellipse_force(share * load[i], v_along, v_across, mu, still, load[i])
         totals[0] -= (f_along * v_along + f_across * v_across) * step_s
         totals[1] += abs(v_across) * share * step_s / len(v)
@@ -189,7 +191,7 @@ def _add_friction(
         wrench[i, 3] += p[1] * f2 - p[2] * f1
         wrench[i, 4] += p[2] * f0 - p[0] * f2
         wrench[i, 5] += p[0] * f1 - p[1] * f0
-    if water[3] > 0.0:
+    if water[0, 3] > 0.0:
         totals[0] += add_water(wrench, centre[1:], rotation[1:], v, w, water, step_s)
     _collect(wrench, qfrc, chain, parents)
 
@@ -222,6 +224,7 @@ def _steps(
     drive: tuple[Floats, ...],
     load: Floats,
     totals: Floats,
+    mass_kg: Floats,
     water: Floats,
     spine: int,
 ) -> None:
@@ -229,10 +232,10 @@ def _steps(
     qpos, qvel, qfrc = state
     on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit = drive[:9]
     current, torque, pwm, drawn_j, returned_j, heat_j, work_j = drive[9:]
-    places, balls, z_m, corner, planes, plane_m, plane_quat = ground
+    places, balls, ball_m, z_m, corner, planes, plane_m, plane_quat = ground
     joints = len(goal)
     speed = np.empty(joints)
-    step_s = law[5]
+    step_s = law[4]
     step1, step2, model, data = where[0], where[1], where[2], where[3]
     at = (
         where[7] // 8,
@@ -248,7 +251,7 @@ def _steps(
     for _ in range(steps):
         if len(balls) > 0:
             call(where[13], model, data)
-            lay_planes(places, balls, law[4], z_m, corner, planes, plane_m, plane_quat)
+            lay_planes(places, balls, ball_m, z_m, corner, planes, plane_m, plane_quat)
         call(step1, model, data)
         qfrc[:] = 0.0
         for j in range(joints):
@@ -275,7 +278,9 @@ def _steps(
             count,
             at,
         )
-        _add_friction(contacts, qfrc, qvel, chain, work, geoms, law, load, totals, water, spine)
+        _add_friction(
+            *(contacts, qfrc, qvel, chain, work, geoms, law, load, totals, mass_kg, water, spine)
+        )
         call(step2, model, data)
         for j in range(joints):
             # a force does its work at the mean of the speeds before and after Euler's step
@@ -328,8 +333,9 @@ def _run(
     ground = (
         carray(pointer(arrays[16]), (geom_count, 3), np.float64),
         carray(pointer(arrays[17]), (ball_count,), np.int32),
+        carray(pointer(arrays[40]), (ball_count,), np.float64),
         carray(pointer(arrays[18]), (sizes[4], sizes[5]), np.float64),
-        (constants[12], constants[13], constants[14]),
+        (constants[5], constants[6], constants[7]),
         carray(pointer(arrays[19]), (ball_count, PLANES), np.int32),
         carray(pointer(arrays[20]), (geom_count, 3), np.float64),
         carray(pointer(arrays[21]), (geom_count, 4), np.float64),
@@ -353,12 +359,13 @@ def _run(
         carray(pointer(arrays[37]), (joints,), np.float64),
     )
     gear_drag = carray(pointer(arrays[38]), (joints,), np.float64)
-    law = (constants[0], constants[1], constants[2], constants[3], constants[4], constants[5])
+    mass_kg = carray(pointer(arrays[41]), (links,), np.float64)
+    water = carray(pointer(arrays[42]), (links, 6), np.float64)
+    law = (constants[0], constants[1], constants[2], constants[3], constants[4])
     state = (at, rate, force)
     _steps(
         *(steps, where, state, chain, work, geoms, ground, law, gear_drag, drive, load, totals),
-        constants[6:12],
-        sizes[6],
+        *(mass_kg, water, sizes[6]),
     )
 
 
@@ -431,12 +438,7 @@ class CompiledSteps:
             m.spine_links,
         )
         self._sizes = np.array(sizes, dtype=np.int64)
-        self._constants = np.array(
-            [
-                *(*m.mu, m.link_mass_kg, m.radius_m, m.step_s),
-                *(*m.water, *m.planes.corner_m),
-            ]
-        )
+        self._constants = np.array([*m.mu, m.radius_m, m.step_s, *m.planes.corner_m])
         self._drive: ServoDrive | None = None
         self._addresses = np.zeros(0, dtype=np.int64)
 
@@ -444,7 +446,9 @@ class CompiledSteps:
         """Advance ``steps`` steps."""
         if drive is not self._drive:
             self._drive = drive
-            motors = (*drive.columns(), self._m.gear_drag_n_m_s)
-            arrays = (*self._arrays, *motors, self._m.model.body_parentid)
+            m = self._m
+            motors = (*drive.columns(), m.gear_drag_n_m_s)
+            links = m.model.body_parentid, m.planes.radius_m, m.link_mass_kg, m.water
+            arrays = (*self._arrays, *motors, *links)
             self._addresses = np.array([each.ctypes.data for each in arrays], dtype=np.int64)
         run_steps(steps, self._where, self._addresses, self._sizes, self._constants)

@@ -215,13 +215,13 @@ def touch(
 
 
 @compiled(
-    f"void(float64[:, ::1], int32[::1], float64, {_FIELD}, int32[:, ::1], "
+    f"void(float64[:, ::1], int32[::1], float64[::1], {_FIELD}, int32[:, ::1], "
     "float64[:, ::1], float64[:, ::1])"
 )
 def lay_planes(
     places_m: Floats,
     balls: NDArray[np.int32],
-    radius_m: float,
+    ball_m: Floats,
     z_m: Floats,
     corner_m: tuple[float, float, float],
     planes: NDArray[np.int32],
@@ -233,7 +233,7 @@ def lay_planes(
     Args:
         places_m: (geoms, 3) centres in the world.
         balls: (B,) indices of the balls.
-        radius_m: of the balls.
+        ball_m: (B,) their radii.
         z_m: (rows, columns) elevations, m.
         corner_m: x and y of the first sample, and the spacing.
         planes: (B, PLANES) indices of their planes.
@@ -243,7 +243,7 @@ def lay_planes(
     """
     found = np.empty((PLANES, 4))
     for b in range(len(balls)):
-        centre = places_m[balls[b]]
+        centre, radius_m = places_m[balls[b]], ball_m[b]
         touch(centre[0], centre[1], centre[2], radius_m, z_m, corner_m, found)
         for k in range(PLANES):
             plane = planes[b, k]
@@ -278,21 +278,22 @@ class TangentPlanes:
     """(B,) geoms of the bellies; none on a level floor."""
     planes: NDArray[np.int32]
     """(B, PLANES) their planes."""
-    radius_m: float
+    radius_m: Floats
+    """(B,) of the balls."""
     z_m: Floats
     corner_m: tuple[float, float, float]
 
     @classmethod
-    def of(
-        cls, model: mujoco.MjModel, ground: HeightField | None, radius_m: float
-    ) -> "TangentPlanes":
+    def of(cls, model: mujoco.MjModel, ground: HeightField | None) -> "TangentPlanes":
         """Find the planes that ``sim.physics.body`` made."""
         if ground is None:
             none = np.zeros(0, dtype=np.int32)
-            return cls(model, none, none.reshape(0, PLANES), radius_m, np.zeros((2, 2)), (0, 0, 1))
+            flat, corner = np.zeros((2, 2)), (0.0, 0.0, 1.0)
+            return cls(model, none, none.reshape(0, PLANES), np.zeros(0), flat, corner)
         first = model.pair_geom1.reshape(-1, PLANES).astype(np.int32)
         balls = model.pair_geom2.reshape(-1, PLANES)[:, 0].astype(np.int32)
         corner = ground.x0_m, ground.y0_m, ground.spacing_m
+        radius_m = np.ascontiguousarray(model.geom_size[balls, 0])
         return cls(model, balls, first, radius_m, np.ascontiguousarray(ground.z_m), corner)
 
     def lay(self, data: mujoco.MjData) -> None:

@@ -25,24 +25,30 @@ GAUSS = 0.5 / math.sqrt(3.0)
 
 
 def water_constants(world: WorldConfig, robot: RobotConfig) -> Floats:
-    """Drag across and along of half a link, kg/m; a Gauss point's arm, radius and surface, m; lift.
+    """(J + 1, 6) of each link, all zero where the world is dry; a leg's counts as a plain link.
 
-    The lift is that of a link under water, N. All zero where the world is dry.
+    Columns: drag across and along of half the link, kg/m; a Gauss point's arm, radius and surface,
+    m; lift of the link under water, N.
     """
-    water = world.ground
+    water, links = world.ground, robot.joint_count + 1
+    rows = np.zeros((links, 6))
     if not isinstance(water, WaterGround):
-        return np.zeros(6)
-    r, half = robot.body_radius_m, 0.5 * robot.link_length_m
-    return np.array(
-        [
+        return rows
+    legs = links - robot.link_count
+    lengths_m = (*robot.link_lengths_m, *(robot.link_length_m,) * legs)
+    radii_m = (*robot.link_radii_m, *(robot.body_radius_m,) * legs)
+    masses_kg = (*robot.link_masses_kg, *(robot.link_mass_kg,) * legs)
+    for k, (length_m, r, mass_kg) in enumerate(zip(lengths_m, radii_m, masses_kg, strict=True)):
+        half = 0.5 * length_m
+        rows[k] = (
             0.5 * water.density_kg_m3 * water.drag_across * 2.0 * r * half,
             0.5 * water.density_kg_m3 * water.drag_along * math.pi * r * half,
-            GAUSS * robot.link_length_m,
+            GAUSS * length_m,
             r,
             water.depth_m,
-            water.buoyancy * robot.link_mass_kg * GRAVITY_M_S2,
-        ]
-    )
+            water.buoyancy * mass_kg * GRAVITY_M_S2,
+        )
+    return rows
 
 
 def immersed(height_m: float, radius_m: float, surface_m: float) -> float:
@@ -87,14 +93,14 @@ def add_water(
         rotation: (L, 9) rows of their rotations.
         v: (L, 3) velocity of the centres, world.
         w: (L, 3) spins, world.
-        water: ``water_constants``.
+        water: (L, 6) ``water_constants``.
         step_s: length of the step.
 
     """
-    across, along, arm = water[0], water[1], water[2]
-    radius, surface, lift = water[3], water[4], water[5]
     lost = 0.0
     for i in range(len(wrench)):
+        across, along, arm = water[i, 0], water[i, 1], water[i, 2]
+        radius, surface, lift = water[i, 3], water[i, 4], water[i, 5]
         wet = immersed(centre[i, 2], radius, surface)
         wrench[i, 2] += wet * lift
         wrench[i, 3] += centre[i, 1] * wet * lift

@@ -228,18 +228,19 @@ def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
 
 def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
     """A capsule a link; a broad head with eyes and a forked tongue."""
-    r, length = robot.body_radius_m, robot.link_length_m
-    links = robot.link_count
+    links, lengths_m, radii_m = robot.link_count, robot.link_lengths_m, robot.link_radii_m
     thickness = _thickness_m(robot)
     for i in range(1, links):
+        if lengths_m[i] == 0.0:
+            continue
         body = spec.body(f"link{i}")
         thick = thickness[i]
-        low = thick - r  # the belly stays on the ground
-        ends = (0.0, 0.0, low, -length, 0.0, low)
+        low = thick - radii_m[i]  # the belly stays on the ground
+        ends = (0.0, 0.0, low, -lengths_m[i], 0.0, low)
         _add(body, _CAPSULE, (thick, 0, 0), (), BACK[i % 2], ends)
     _legs(spec, robot)
     head = spec.body("link0")
-    half = length / 2
+    r, half = radii_m[0], lengths_m[0] / 2
     _add(head, _ELLIPSOID, (half * 1.25, r * 1.02, r * 0.78), (half * 0.2, 0, -0.2 * r), HEAD)
     neck = (-0.6 * half, 0, -0.2 * r, -half, 0, -0.2 * r)
     _add(head, _CAPSULE, (r * 0.8, 0, 0), (), HEAD, neck)
@@ -305,4 +306,4 @@ def _thickness_m(robot: RobotConfig) -> Floats:
     along = np.arange(links) / (links - 1)
     thick = 0.80 + 0.20 * np.sin(np.pi * np.minimum(along / 0.55, 1.0) / 2)
     thick *= 1.0 - 0.55 * np.maximum(0.0, (along - 0.55) / 0.45) ** 1.5
-    return np.asarray(robot.body_radius_m * thick)
+    return np.asarray(np.array(robot.link_radii_m) * thick)

@@ -1,12 +1,16 @@
 """A robot's joints: what they have of their own, and what cannot be."""
 
+import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.loader import checked, load_robot
 from snakewalk.config.robot import JointConfig, RobotConfig
+from snakewalk.config.robot_file import robot_toml
+from tests.helpers.uneven import UNEVEN, spelt_out
 
 OWN = """
 name = "mine"
@@ -81,6 +85,37 @@ def test_a_chain_without_joints_of_its_own_is_as_before() -> None:
             {"joint_axes": "y", "joints": [{"current_limit_a": 1.0}]},
             "current_limit_a of joint 1: only pitch joints have one",
         ),
+        ({"joint_axes": "y", "links": [{}]}, "a spine of 1 joints has 2"),
+        ({"joint_axes": "y", "links": [{"length_m": 0.0}, {}]}, "of the head and of the tail must"),
+        (
+            {"joint_axes": "yyp", "links": [{}, {"length_m": 0}, {}, {}]},
+            "length_m of link 1 is 0: the axes of the joints before and behind it must differ",
+        ),
+        (
+            {"joint_axes": "ypy", "links": [{}, {"length_m": 0}, {"length_m": 0}, {}]},
+            "a module has two axes at most",
+        ),
+        (
+            {"joint_axes": "y", "links": [{"radius_m": 0.05}, {}]},
+            "body_radius_m = 0.03: is the thickest link's, 0.05",
+        ),
+        (
+            {"joint_axes": "y", "links": [{"shape": "rails"}, {}]},
+            'shape rails needs belly.shape = "rails" and its width_m',
+        ),
+        (
+            {
+                "joint_axes": "y",
+                "links": [{"radius_m": 0.02}, {}],
+                "body_profile": [0.5, 1.0],
+            },
+            "radius_m and body_profile: one of them",
+        ),
+        (
+            {"joint_axes": "yp", "links": [{}, {"length_m": 0, "shape": "capsule"}, {}]},
+            "a capsule needs a length; ball or none",
+        ),
+        ({"joint_axes": "y", "links": [{"length_m": 0.003}, {}]}, "length_m: 0, or over 0.005"),
         (
             {"joint_axes": "yy", "joints": [{}, {"zero_rad": -2.0}]},
             "joint 2 (ID 2): zero_rad -2 with a limit of 1.5 rad leaves the servo's turn",
@@ -96,3 +131,22 @@ def test_what_cannot_be_is_told(keys: dict[str, object], said: str) -> None:
     with pytest.raises(ConfigError) as caught:
         checked(RobotConfig, {"name": "x", **keys}, "x.toml")
     assert said in "\n".join(caught.value.faults)
+
+
+def test_a_chain_says_what_each_link_is() -> None:
+    assert UNEVEN.length_m == pytest.approx(0.12 + 4 * 0.08 + 0.15)
+    assert UNEVEN.mass_kg == pytest.approx(0.3 + 4 * 0.2 + 5 * 0.01 + 0.06)
+    assert UNEVEN.link_shapes[:3] == ("capsule", "none", "capsule")
+    ends_m = np.array(UNEVEN.link_ends) * UNEVEN.mean_link_length_m
+    np.testing.assert_allclose(np.diff(ends_m), UNEVEN.link_lengths_m, atol=1e-12)
+    assert UNEVEN.radii_m(3) == (0.04, 0.04, 0.02)
+    read = checked(RobotConfig, tomllib.loads(robot_toml(UNEVEN)), "uneven.toml")
+    assert read == UNEVEN
+
+
+def test_links_spelt_out_are_the_same_chain() -> None:
+    plain = load_robot("alternating12")
+    same = spelt_out(plain)
+    assert same.link_ends == plain.link_ends
+    assert same.radii_m(20) == plain.radii_m(20)
+    assert same.length_m == pytest.approx(plain.length_m, rel=1e-15)

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.sim.physics.friction import stop_drag
+from snakewalk.sim.physics.friction import stop_share
 from snakewalk.sim.physics.mechanics import FOOT, GROUND, LEAST_DEPTH_M, Mechanics, velocities
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.physics.water import add_water
@@ -77,14 +77,14 @@ def friction_forces(m: Mechanics) -> Floats:
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
     across = np.cross(up, along)
     v_along, v_across = (sliding * along).sum(axis=1), (sliding * across).sum(axis=1)
-    still = stop_drag(centre[: m.spine_links], m.link_mass_kg, m.radius_m, m.step_s)
+    still = stop_share(centre[: m.spine_links], m.radius_m) * m.link_mass_kg[link] / m.step_s
     f_along, f_across = ellipse_forces(normal_n, v_along, v_across, m.mu, still, load)
     m.totals[0] -= float(f_along @ v_along + f_across @ v_across) * m.step_s
     m.totals[1] += float((np.abs(v_across) * share).sum()) * m.step_s / len(centre)
     force = f_along[:, None] * along + f_across[:, None] * across
     wrench = np.zeros((len(centre), 6))
     np.add.at(wrench, link, np.hstack([force, np.cross(place, force)]))
-    if m.water[3] > 0.0:
+    if m.water[0, 3] > 0.0:
         m.totals[0] += add_water(wrench, centre, d.xmat[1:], velocity, spin, m.water, m.step_s)
     behind = wrench[::-1].cumsum(axis=0)[::-1]
     f, t = behind[1:, :3], behind[1:, 3:]

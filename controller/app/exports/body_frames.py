@@ -55,8 +55,8 @@ def body_frames(record: RunRecord) -> BodyFrames:
     translation = np.zeros((len(time_s), count, 3))
     quaternion = np.zeros((len(time_s), count, 4))
     translation[:, 0], quaternion[:, 0] = head_m, Rotation.from_matrix(turn).as_quat()
-    translation[:, 1, 0] = -0.5 * robot.link_length_m
-    translation[:, 2:, 0] = -robot.link_length_m
+    lengths_m = robot.link_lengths_m
+    translation[:, 1:, 0] = -np.array([0.5 * lengths_m[0], *lengths_m[1:-1]])
     for joint, axis in enumerate(robot.joint_axes):
         half_rad = 0.5 * _at(time_s, cycle.time_s, cycle.measured_rad[:, joint])
         quaternion[:, joint + 1, 3] = np.cos(half_rad)

@@ -148,8 +148,10 @@ def _joints(record: RunRecord) -> Iterator[Row]:
 def _body(record: RunRecord) -> Iterator[Json]:
     """A cylinder for each link of the spine, which moves with its frame."""
     robot = record.header.robot
-    length_m, width_m = robot.link_length_m, 2.0 * robot.body_radius_m
     for link, color in zip(range(robot.link_count), cycle(_LINKS), strict=False):
+        length_m, width_m = robot.link_lengths_m[link], 2.0 * robot.link_radii_m[link]
+        if length_m == 0.0:
+            continue
         cylinder = {
             "pose": _pose([0.0 if link == 0 else -0.5 * length_m, 0.0, 0.0], _ALONG),
             "size": _xyz([width_m, width_m, 0.94 * length_m]),  # a gap shows the joint

@@ -60,9 +60,9 @@ def skin_look(look: str, header: Header) -> "SkinLook | None":
     dressed = body_skin(animal(header.run.track) if look == ANIMAL else look)
     robot = header.robot
     skin = robot_skin(dressed.skin, robot, isinstance(header.world.ground, WaterGround))
-    bone_m = np.full(robot.link_count, robot.link_length_m)
+    bone_m = np.array(robot.link_lengths_m)
     origins = rest_fronts_m(bone_m, skin.axis_m)  # a body begins at its joint, the head's amidst
-    origins[0, 0] -= 0.5 * robot.link_length_m
+    origins[0, 0] -= 0.5 * bone_m[0]
     return _look(skin, bone_m, origins, dressed.texture)
 
 

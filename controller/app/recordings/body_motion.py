@@ -87,13 +87,13 @@ def robot_skin(skin: Skin, robot: RobotConfig, in_water: bool = False) -> Skin:
 def from_poses(robot: RobotConfig, time_s: Floats, qpos: Floats) -> BoneMotion:
     """Bones that are the robot's links; ``qpos`` (T, 7 + J) as ``MujocoPlant.qpos``."""
     links = robot.link_count
-    half = 0.5 * robot.link_length_m
+    bone_m = np.array(robot.link_lengths_m)
+    half = 0.5 * bone_m[:, None]
     turns = Rotation.from_quat(qpos[:, 3:7], scalar_first=True).as_matrix()
     front, rotation = np.empty((len(qpos), links, 3)), np.empty((len(qpos), links, 3, 3))
     for k, row in enumerate(qpos):
         body = body_in_world(robot, BodyPose(float(time_s[k]), row[:3], turns[k]), row[7:])
         front[k], rotation[k] = body.link_m + half * body.forward, body.rotation
-    bone_m = np.full(links, robot.link_length_m)
     return BoneMotion(time_s - time_s[0], front, rotation, bone_m)
 
 

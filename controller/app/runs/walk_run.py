@@ -47,7 +47,7 @@ class WalkRun(PathRun):
         """The ground as far as a chain of stiff links can follow it."""
         if self.ground is None:
             return None
-        return bridged(self.ground, _BRIDGED_LINKS * self.robot.link_length_m)
+        return bridged(self.ground, _BRIDGED_LINKS * self.robot.mean_link_length_m)
 
     @cached_property
     def retarget(self) -> Retarget:

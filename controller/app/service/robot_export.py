@@ -19,10 +19,10 @@ def urdf_text(robot: RobotConfig) -> str:
     """
     if robot.limbs:
         raise InputError(f"{robot.name}: has legs; a URDF is written of a chain only: give --mjcf")
-    length, radius, mass = robot.link_length_m, robot.body_radius_m, robot.link_mass_kg
-    across = mass * (3.0 * radius**2 + length**2) / 12.0
     root = ET.Element("robot", name=robot.name)
-    for link in range(robot.joint_count + 1):
+    rows = zip(robot.link_lengths_m, robot.link_radii_m, robot.link_masses_kg, strict=True)
+    for link, (length, radius, mass) in enumerate(rows):
+        across = mass * (3.0 * radius**2 + length**2) / 12.0
         centre = f"{0.0 if link == 0 else -0.5 * length!r} 0 0"
         body = ET.SubElement(root, "link", name=f"link{link}")
         inertial = ET.SubElement(body, "inertial")
@@ -38,14 +38,14 @@ def urdf_text(robot: RobotConfig) -> str:
             ixz="0",
             iyz="0",
         )
-        for kind in ("visual", "collision"):
+        for kind in ("visual", "collision") if length else ():
             shape = ET.SubElement(body, kind)
             ET.SubElement(shape, "origin", xyz=centre, rpy="0 1.5707963267948966 0")
             geometry = ET.SubElement(shape, "geometry")
             ET.SubElement(geometry, "cylinder", radius=repr(radius), length=repr(length))
     for joint, axis in enumerate(robot.joint_axes):
         limit = robot.limit_rad[joint]
-        back = -(0.5 if joint == 0 else 1.0) * length
+        back = -(0.5 if joint == 0 else 1.0) * robot.link_lengths_m[joint]
         hinge = ET.SubElement(root, "joint", name=f"joint{joint}", type="revolute")
         ET.SubElement(hinge, "origin", xyz=f"{back!r} 0 0", rpy="0 0 0")
         ET.SubElement(hinge, "parent", link=f"link{joint}")

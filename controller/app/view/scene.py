@@ -123,9 +123,9 @@ class BodyScene:
     def _links(
         self, name: str, colors: np.ndarray, radii_m: Floats, share: float
     ) -> viser.BatchedMeshHandle:
-        """One mesh for all links: a cylinder along x, widened to their radii."""
-        length_m = self._robot.link_length_m * share
-        mesh = trimesh.creation.cylinder(1.0, length_m, sections=20)
+        """One mesh for all links: a cylinder along x, drawn to their lengths and radii."""
+        mesh = trimesh.creation.cylinder(1.0, self._robot.mean_link_length_m * share, sections=20)
+        long = np.diff(self._robot.link_ends)
         links = self._robot.link_count
         return self._scene.add_batched_meshes_simple(
             name,
@@ -133,7 +133,7 @@ class BodyScene:
             np.asarray(mesh.faces),
             batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (links, 1)),
             batched_positions=np.zeros((links, 3)),
-            batched_scales=np.column_stack([np.ones(links), radii_m, radii_m]),
+            batched_scales=np.column_stack([long, radii_m, radii_m]),
             batched_colors=colors,
             flat_shading=False,
             lod="off",

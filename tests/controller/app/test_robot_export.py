@@ -11,13 +11,15 @@ from typer.testing import CliRunner
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, shipped
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.robot_file import robot_toml
 from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.app.service.robot_export import mjcf_text, urdf_text
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.drivers.types import BodyPose
+from tests.helpers.uneven import UNEVEN
 
 ROBOTS = [load_robot(name) for name in shipped("robots")]
-CHAINS = [robot for robot in ROBOTS if not robot.limbs]
+CHAINS = [*(robot for robot in ROBOTS if not robot.limbs), UNEVEN]
 
 
 def poses(robot: RobotConfig) -> np.ndarray:
@@ -41,18 +43,18 @@ def test_links_of_the_urdf_are_where_ours_are(robot: RobotConfig) -> None:
         ours = body_in_world(robot, head, joint_rad)
         assert np.abs(data.xipos[1:] - ours.link_m[1:]).max() < 1e-9
         assert np.abs(data.xmat[1:].reshape(-1, 3, 3) - ours.rotation[1:]).max() < 1e-9
-    assert np.abs(model.body_mass[1:] - robot.link_mass_kg).max() < 1e-9
+    assert np.abs(model.body_mass[1:] - robot.link_masses_kg[1:]).max() < 1e-9
     assert limits(model) == pytest.approx(np.outer(robot.limit_rad, [-1.0, 1.0]))
     names = [model.joint(j).name for j in range(model.njnt)]
     assert names == [f"joint{j}" for j in range(robot.joint_count)]
 
 
-@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+@pytest.mark.parametrize("robot", [*ROBOTS, UNEVEN], ids=lambda robot: robot.name)
 def test_links_of_the_mjcf_are_where_ours_are(robot: RobotConfig) -> None:
     model = mujoco.MjModel.from_xml_string(mjcf_text(robot))
     data = mujoco.MjData(model)
-    legs = sum(2 * len(pair.joint_axes) * pair.segment_mass_kg for pair in robot.limbs)
-    assert abs(model.body_mass.sum() - robot.link_mass_kg * robot.link_count - legs) < 1e-9
+    assert abs(model.body_mass.sum() - robot.mass_kg) < 1e-9
+    mass_kg = model.body_mass[1 : 1 + robot.link_count, None]
     turned = np.array([0.3, -0.5, 0.6, 0.2])
     for joint_rad in poses(robot):
         data.qpos[:3], data.qpos[3:7] = (0.4, -1.0, 0.2), turned / np.linalg.norm(turned)
@@ -63,6 +65,8 @@ def test_links_of_the_mjcf_are_where_ours_are(robot: RobotConfig) -> None:
         ours = body_in_world(robot, BodyPose(0.0, data.qpos[:3].copy(), axes[0].copy()), joint_rad)
         assert np.abs(data.xipos[spine] - ours.link_m).max() < 1e-9
         assert np.abs(axes - ours.rotation).max() < 1e-9
+        centre_m = (mass_kg * data.xipos[spine]).sum(axis=0) / mass_kg.sum()
+        assert np.abs(centre_m - ours.centre_m).max() < 1e-9
 
 
 def test_a_urdf_of_a_body_with_legs_is_refused_not_written_without_them() -> None:
@@ -109,3 +113,13 @@ def test_show_knows_every_joint_of_every_shipped_robot(robot: RobotConfig) -> No
     assert [each["id"] for each in shown["joints"]] == list(robot.servo_ids)
     assert "".join(each["axis"] for each in shown["joints"]) == robot.all_axes
     assert shown["links"] == robot.link_count
+
+
+def test_show_tells_each_link_where_links_differ(tmp_path: Path) -> None:
+    file = tmp_path / "uneven.toml"
+    file.write_text(robot_toml(UNEVEN))
+    words = ["robot", "show", str(file)]
+    shown = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
+    assert [link["length_m"] for link in shown["each_link"]] == list(UNEVEN.link_lengths_m)
+    assert shown["mass_kg"] == 1.21
+    assert "none" in CliRunner().invoke(app, words).stdout

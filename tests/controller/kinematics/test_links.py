@@ -11,8 +11,10 @@ from snakewalk.controller.kinematics.links import (
     chain_axes,
     chain_jacobian,
     chain_points_m,
+    link_weights,
 )
 from snakewalk.drivers.types import BodyPose
+from tests.helpers.uneven import UNEVEN, spelt_out
 
 YAW = load_robot("yaw16")
 BOTH = load_robot("alternating16")
@@ -91,3 +93,22 @@ def test_the_jacobian_is_the_slope_of_the_points() -> None:
         moved = (points - tip) @ turn.T + tip
         np.testing.assert_allclose(jacobian[:, :, 3 + k], (moved - points) / step, atol=1e-5)
         np.testing.assert_array_equal(jacobian[:, :, k], np.tile(np.eye(3)[k], (18, 1)))
+
+
+def test_links_spelt_out_move_the_same_to_the_digit() -> None:
+    joints = np.random.default_rng(3).uniform(-1, 1, 16)
+    for robot in (YAW, BOTH):
+        one, other = (body_in_world(r, pose(0.4), joints) for r in (robot, spelt_out(robot)))
+        for name in ("link_m", "rotation", "centre_m"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_links_that_differ_meet_at_their_joints_and_two_axes_at_one_place() -> None:
+    joints = np.random.default_rng(3).uniform(-1, 1, UNEVEN.joint_count)
+    points = chain_points_m(UNEVEN, body_in_world(UNEVEN, pose(0.7), joints))
+    apart = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    np.testing.assert_allclose(apart, UNEVEN.link_lengths_m, atol=1e-12)
+    weights = link_weights(UNEVEN)
+    assert weights.sum() == pytest.approx(UNEVEN.link_count)
+    assert weights[0] / weights[1] == pytest.approx(30.0)
+    np.testing.assert_array_equal(link_weights(YAW), 1.0)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.kinematics.retarget import Retarget
+from tests.helpers.uneven import UNEVEN, spelt_out
 
 YAW = load_robot("yaw16")
 BOTH = load_robot("alternating16")
@@ -41,3 +42,19 @@ def test_the_residual_is_zero_when_straight_and_small_against_the_bend() -> None
     wave = 0.7 * np.sin(2 * np.pi * 1.2 * S)
     assert 0.0 < retarget.residual_m(wave) < 0.02
     assert Retarget(BOTH).residual_m(wave) > retarget.residual_m(wave)
+
+
+def test_links_that_differ_take_the_mean_angle_over_their_own_length() -> None:
+    joints = Retarget(UNEVEN).joints_rad(-1.6 * S)
+    ends = np.array(UNEVEN.link_ends) / UNEVEN.link_count
+    edges = np.array([0.0, *ends[np.array(UNEVEN.yaw_joints) + 1], 1.0])
+    bends = 1.6 * np.diff(0.5 * (edges[1:] + edges[:-1]))
+    np.testing.assert_allclose(joints[list(UNEVEN.yaw_joints)], bends, atol=5e-4)
+    assert Retarget(UNEVEN).residual_m(np.full(100, 0.7)) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_links_spelt_out_are_retargeted_the_same_to_the_digit() -> None:
+    shape = np.random.default_rng(2).normal(size=100).cumsum() * 0.05
+    for robot in (YAW, BOTH):
+        one, other = (Retarget(r).joints_rad(shape) for r in (robot, spelt_out(robot)))
+        np.testing.assert_array_equal(one, other)

@@ -23,7 +23,7 @@ def test_a_bar_dragged_sideways_loads_its_joints_like_a_cantilever() -> None:
     centres = np.stack([-length * (np.arange(links) + 0.5), np.zeros(links)], axis=1)
     velocity = np.tile([0.0, 0.3], (links, 1))
     force = friction_n(velocity, np.zeros(links), SNAKE, weight)
-    load = yaw_load_n_m(centres, np.zeros(links), length, force)
+    load = yaw_load_n_m(centres, np.zeros(links), np.full(links, length), force)
     behind = length * np.arange(links - 1, 0, -1)  # what hangs behind each joint
     expected = 0.7 * weight / length * behind**2 / 2
     np.testing.assert_allclose(np.abs(load), expected, rtol=1e-6)
@@ -44,7 +44,7 @@ def test_forces_in_balance_load_front_and_back_alike() -> None:
     moment = (arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum()
     twist = np.stack([-arm[:, 1], arm[:, 0]], axis=1)
     force -= twist * moment / (arm**2).sum()
-    load = yaw_load_n_m(centres, headings, 1.0, force)
+    load = yaw_load_n_m(centres, headings, np.ones(links), force)
     for j in range(links - 1):
         ahead = centres[: j + 1] - ends[j + 1]
         f = force[: j + 1]

@@ -7,10 +7,15 @@ from scipy.ndimage import gaussian_filter
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.drivers.types import BodyPose
+from tests.helpers.uneven import UNEVEN
 
 YAW, BOTH, LONG = (load_robot(name) for name in ("yaw16", "alternating16", "alternating32"))
+ALIKE_THICK = UNEVEN.model_copy(
+    update={"links": tuple(link.model_copy(update={"radius_m": None}) for link in UNEVEN.links)}
+)
 X = np.arange(-3.0, 3.001, 0.05)
 
 
@@ -94,3 +99,15 @@ def pose(head_m: np.ndarray, heading: float) -> BodyPose:
 def test_goals_stay_within_the_joint_limits() -> None:
     goals = PitchFitter(BOTH, ridge(2.0))((0.9, 0.0), np.zeros(17)).goal_rad
     assert np.abs(goals).max() <= BOTH.pitch_limit_rad
+
+
+def test_links_that_differ_lie_on_an_incline_too() -> None:
+    incline = HeightField(np.tile(0.3 * X, (len(X), 1)), 0.05, -3.0, -3.0)
+    fit = PitchFitter(ALIKE_THICK, incline)((0.6, 0.1), headings(ALIKE_THICK, 0.0) + 0.4)
+    np.testing.assert_allclose(fit.goal_rad, 0.0, atol=2e-3)
+    assert fit.residual_m < 1e-4
+    skeleton = GroundStep(ridge(0.1)).place(
+        headings(UNEVEN, 0.5), (0.3, 0.1), UNEVEN.link_lengths_m, 0.03, known="head"
+    )
+    apart = np.linalg.norm(np.diff(skeleton.points_m, axis=0), axis=1)
+    np.testing.assert_allclose(apart, UNEVEN.link_lengths_m, atol=1e-9)

@@ -5,6 +5,7 @@ import pytest
 
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
+from snakewalk.config.robot import LinkConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.mechanics.rigid_motion import rigid_velocity
@@ -16,6 +17,7 @@ from snakewalk.controller.mechanics.rollout import (
     Rolled,
     Rollout,
 )
+from tests.helpers.uneven import spelt_out
 
 SNAKE = FrictionConfig(along=0.1, across=0.7)
 ROBOT = load_robot("yaw16")
@@ -150,3 +152,30 @@ def test_a_path_goes_on_straight_beyond_its_end() -> None:
     steps = np.diff(table[100:], axis=0)
     np.testing.assert_allclose(np.hypot(*steps.T), PATH_STEP_M)
     np.testing.assert_allclose(steps / PATH_STEP_M, np.tile(steps[:1] / PATH_STEP_M, (400, 1)))
+
+
+def test_links_spelt_out_roll_the_same_to_the_digit() -> None:
+    slope = plane(0.1, 0.05)
+    one, other = (
+        Rollout(robot, SNAKE, slope, 100)(sine(0, 102), sine(102, 40)[None], 101.0, START, STRAIGHT,
+                                          0, 25.0, Drift())
+        for robot in (ROBOT, spelt_out(ROBOT))
+    )  # fmt: skip
+    np.testing.assert_array_equal(one.centre_m, other.centre_m)
+    np.testing.assert_array_equal(one.offset_rad, other.offset_rad)
+
+
+def test_a_link_that_weighs_nothing_does_not_slow_the_others() -> None:
+    """A last link of a hundredth of the weight: the body goes as one that has no such link."""
+    light = ROBOT.model_copy(
+        update={"links": (*(LinkConfig(),) * 16, LinkConfig(mass_kg=0.01 * ROBOT.link_mass_kg))}
+    )
+    heavy = ROBOT.model_copy(
+        update={"links": (*(LinkConfig(),) * 16, LinkConfig(mass_kg=30.0 * ROBOT.link_mass_kg))}
+    )
+    gone = [
+        float(roll(Rollout(robot, SNAKE, None, 100), sine(102, 60)[None]).along_m[0])
+        for robot in (light, ROBOT, heavy)
+    ]
+    assert gone[0] > gone[1] - 0.02
+    assert gone[2] < 0.8 * gone[1]  # an anchor

@@ -8,6 +8,7 @@ from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.kinematics.links import body_in_world, chain_axes, chain_points_m, pose_at
 from snakewalk.controller.mechanics.support import lifted, support_n
+from tests.helpers.uneven import UNEVEN
 
 ROBOT = load_robot("alternating16")
 L = ROBOT.joint_count + 1
@@ -78,3 +79,11 @@ def test_currents_of_a_sidewinding_body_tell_what_the_ground_bears() -> None:
     told = measured("sidewinding", "flat", seconds=5.0)
     assert told.correlation > 0.8
     assert told.agree > 0.75
+
+
+def test_no_torque_is_the_weight_of_each_link_where_links_differ() -> None:
+    body = body_in_world(UNEVEN, pose_at(np.zeros(2), 0.4), np.zeros(UNEVEN.joint_count))
+    bears = support_n(UNEVEN, body, np.zeros(UNEVEN.joint_count))
+    weight_n = np.array(UNEVEN.link_masses_kg) * GRAVITY_M_S2
+    np.testing.assert_allclose(bears, weight_n, rtol=1e-6)
+    assert not lifted(UNEVEN, bears).any()

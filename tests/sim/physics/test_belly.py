@@ -35,7 +35,7 @@ def profile(height: Floats, spacing: float, width_m: float = 1.0) -> HeightField
 def test_on_a_floor_it_has_its_points_and_rests_at_its_radius(belly: BellyConfig) -> None:
     body = MujocoPlant(robot(belly), FLAT)
     contacts = body.mechanics.data.contact
-    points = body.link_positions_m[:, None] + belly_points_m(robot(belly)).reshape(-1, 3)
+    points = body.link_positions_m[:, None] + belly_points_m(robot(belly), 1).reshape(-1, 3)
     found = np.asarray(contacts.pos)[:, :2]
     assert len(found) == points.shape[0] * points.shape[1]
     gap = np.linalg.norm(found[:, None] - points.reshape(-1, 3)[None, :, :2], axis=2)
@@ -45,10 +45,10 @@ def test_on_a_floor_it_has_its_points_and_rests_at_its_radius(belly: BellyConfig
 
 
 def test_the_ends_of_a_capsule_are_gauss_points_unless_it_is_slender() -> None:
-    assert straight_part_m(ROBOT) == pytest.approx(0.07 / np.sqrt(3.0))
+    assert straight_part_m(0.07, 0.03) == pytest.approx(0.07 / np.sqrt(3.0))
     slender = ROBOT.model_copy(update={"link_length_m": 0.2})
-    assert straight_part_m(slender) == pytest.approx(0.2 - 1.2 * 0.03)
-    row = belly_points_m(slender)[0, :, 0]
+    assert straight_part_m(0.2, 0.03) == pytest.approx(0.2 - 1.2 * 0.03)
+    row = belly_points_m(slender, 1)[0, :, 0]
     assert np.diff(row).max() <= 1.4 * 0.03  # no hole between the balls that meet a field
 
 
@@ -117,7 +117,7 @@ def test_a_body_that_curls_up_meets_itself() -> None:
         drive.goal_rad[:] = 0.25 + 0.62 * min(1.0, k / 50)
         body.advance(0.02 * k, drive)
     axes = body.link_rotations
-    points = body.link_positions_m[:, None] + belly_points_m(ROBOT)[0] @ axes.swapaxes(1, 2)
+    points = body.link_positions_m[:, None] + belly_points_m(ROBOT, 1)[0] @ axes.swapaxes(1, 2)
     apart = np.linalg.norm(points[:, None, :, None] - points[None, :, None], axis=-1).min((2, 3))
     far = np.abs(np.subtract.outer(np.arange(17), np.arange(17))) >= 3
     assert apart[far].min() > 2 * ROBOT.body_radius_m - 0.004

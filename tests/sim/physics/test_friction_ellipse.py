@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from snakewalk.sim.physics.friction import BENT_STOP_SHARE, ellipse_force, stop_drag
+from snakewalk.sim.physics.friction import BENT_STOP_SHARE, ellipse_force, stop_share
 from tests.oracles.numpy_steps import ellipse_forces
 
 MU = (0.1, 0.7, 0.3)
@@ -63,6 +63,6 @@ def test_many_at_once_are_one_by_one() -> None:
 def test_a_straight_body_that_may_roll_is_stopped_three_times_more_gently(heading: float) -> None:
     s = np.linspace(0.0, 1.0, 17)
     line = np.stack([s * np.cos(heading), s * np.sin(heading), 0.0 * s], axis=1)
-    assert stop_drag(line, 0.11, 0.03, 0.002) == pytest.approx(1.8 / 3.0 * 0.11 / 0.002)
+    assert stop_share(line, 0.03) == pytest.approx(1.8 / 3.0)
     bent = line + 0.2 * np.sin(9.0 * s)[:, None] * np.array([-np.sin(heading), np.cos(heading), 0])
-    assert stop_drag(bent, 0.11, 0.03, 0.002) == pytest.approx(BENT_STOP_SHARE * 0.11 / 0.002)
+    assert stop_share(bent, 0.03) == pytest.approx(BENT_STOP_SHARE)

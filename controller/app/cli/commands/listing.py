@@ -63,22 +63,36 @@ def show_robot(name: RobotName, as_json: Json = False) -> None:
             zip(robot.all_axes, *columns, strict=True), start=1
         )
     ]
+    links: list[dict[str, object]] = [
+        {"link": k, "length_m": length_m, "mass_kg": mass_kg, "radius_m": radius_m, "shape": shape}
+        for k, (length_m, mass_kg, radius_m, shape) in enumerate(
+            zip(
+                robot.link_lengths_m,
+                robot.link_masses_kg,
+                robot.link_radii_m,
+                robot.link_shapes,
+                strict=True,
+            )
+        )
+        if robot.links
+    ]
     facts: dict[str, object] = {
         "robot": robot.name,
         "links": robot.link_count,
-        "link_length_m": robot.link_length_m,
+        "link_length_m": round(robot.mean_link_length_m, 4),
         "body_radius_m": robot.body_radius_m,
         "length_m": round(robot.length_m, 4),
         "mass_kg": round(robot.mass_kg, 4),
         "baud": robot.servo.baud,
         "supply_v": robot.servo.supply_v,
     }
-    show(facts | ({"joints": joints} if as_json else {}), as_json)
-    if not as_json:
-        table = Table(*(key.replace("_", " ") for key in joints[0]), box=None)
-        for joint in joints:
-            table.add_row(*map(str, joint.values()))
-        console.print(table)
+    show(facts | ({"joints": joints, "each_link": links} if as_json else {}), as_json)
+    for rows in () if as_json else (joints, links):
+        if rows:
+            table = Table(*(key.replace("_", " ") for key in rows[0]), box=None)
+            for row in rows:
+                table.add_row(*map(str, row.values()))
+            console.print(table)
 
 
 def export_robot(

@@ -119,10 +119,11 @@ def _bodies(axes: Axes, record: RunRecord) -> None:
     along_m = np.cumsum(np.hypot(*np.diff(pose.centre_m[known, :2], axis=0, prepend=[[0, 0]]).T))
     along_m -= along_m[0]
     count = 1 + max(1, int(along_m[-1] / (_BODY_SPACING * robot.length_m)))
+    half_m = 0.5 * robot.link_lengths_m[0], 0.5 * robot.link_lengths_m[-1]
     chosen = known[np.searchsorted(along_m, np.linspace(0.0, along_m[-1], count))]
     for k, row in enumerate(chosen):
         strength = 0.25 + 0.6 * k / max(len(chosen) - 1, 1)
-        outline = body_outline_m(pose.links_m[row, :, :2], robot.link_length_m, robot.body_radius_m)
+        outline = body_outline_m(pose.links_m[row, :, :2], half_m, robot.body_radius_m)
         axes.add_patch(
             Polygon(
                 outline,
@@ -137,12 +138,14 @@ def _bodies(axes: Axes, record: RunRecord) -> None:
         )
 
 
-def body_outline_m(links_m: Floats, link_length_m: float, radius_m: float) -> Floats:
-    """Outline (n, 2) of a body along link centres (L, 2): round head, tapering tail."""
+def body_outline_m(links_m: Floats, half_m: tuple[float, float], radius_m: float) -> Floats:
+    """Outline (n, 2) of a body along link centres (L, 2): round head, tapering tail.
+
+    ``half_m`` are half the lengths of the head and of the tail.
+    """
     first = _unit(links_m[0] - links_m[1])
     last = _unit(links_m[-1] - links_m[-2])
-    half = 0.5 * link_length_m
-    line = np.vstack([links_m[0] + half * first, links_m, links_m[-1] + half * last])
+    line = np.vstack([links_m[0] + half_m[0] * first, links_m, links_m[-1] + half_m[1] * last])
     tangent = _unit(np.gradient(-line, axis=0))  # towards the head
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
     radius = radius_m * np.interp(np.linspace(0, 1, len(line)), [0, 0.75, 1], [1, 1, 0.35])

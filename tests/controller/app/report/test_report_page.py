@@ -190,7 +190,7 @@ def test_thinning_keeps_the_peaks_and_the_mean() -> None:
 def test_outline_of_a_straight_body() -> None:
     """A straight body's outline is as long as the body, as wide, and symmetrical."""
     links = np.column_stack([1.0 - 0.07 * np.arange(17), np.zeros(17)])
-    outline = body_outline_m(links, 0.07, 0.03)
+    outline = body_outline_m(links, (0.035, 0.035), 0.03)
     assert outline[:, 0].max() == pytest.approx(1.0 + 0.035 + 0.03, abs=1e-3)
     assert outline[:, 0].min() == pytest.approx(1.0 - 16 * 0.07 - 0.035)
     assert np.abs(outline[:, 1]).max() == pytest.approx(0.03)
