@@ -41,6 +41,26 @@ class StatesConfig(Strict):
     )
 
 
+class PitchConfig(Strict):
+    """How the servos of the pitch joints are set up in a walk; by default as the robot says."""
+
+    p_gain: int | None = Field(None, ge=0, le=16383, description="register 84")
+    current_limit_a: float | None = Field(
+        None, gt=0.0, description="goal current: at least 0.3 A carry a body that rolls"
+    )
+    lead_s: float | None = Field(None, ge=0.0, le=2.0, description="how early goals are sent")
+
+    def set_up(self, robot: RobotConfig) -> RobotConfig:
+        """Return the robot with these settings; those of single joints stay."""
+        given = {
+            "pitch_p_gain": self.p_gain,
+            "pitch_current_limit_a": self.current_limit_a,
+            "pitch_lead_s": self.lead_s,
+        }
+        changes = {key: value for key, value in given.items() if value is not None}
+        return robot.model_copy(update={"servo": robot.servo.model_copy(update=changes)})
+
+
 class WalkConfig(Strict):
     """How states follow each other and how the measured pose steers (docs/method.md)."""
 
@@ -62,6 +82,12 @@ class WalkConfig(Strict):
     ramp_limit_rad: float = Field(
         0.8, ge=0.0, description="walk-blind: heading error that a ramp cancels on a piece"
     )
+    rolls: bool = Field(
+        True,
+        description="a body that has missed its way and climbs badly rolls up the slope sideways, "
+        "if it is round and its pitch joints carry it",
+    )
+    pitch: PitchConfig = PitchConfig()
     fallback: bool = Field(
         True, description="a serpenoid from the second miss of a waypoint on until it is reached"
     )

@@ -46,7 +46,8 @@ def failure(record: RunRecord) -> Failure | None:
     if len(waypoint_times_s(pose, plan)) == len(plan.waypoints_m):
         return None
     roll = np.abs(roll_rad(pose.rotation))
-    over = np.flatnonzero(roll > ROLL_LIMIT_RAD)
+    walks = pose.pulse_m_s > 0.0 if record.header.run.gait is None else np.ones(len(roll), bool)
+    over = np.flatnonzero((roll > ROLL_LIMIT_RAD) & walks)  # a body that rolls uphill is none
     if len(over):
         return Failure(
             "roll",

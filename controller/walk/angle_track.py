@@ -36,6 +36,10 @@ class AngleTrack:
         """Add ``piece_rad`` (n,), oldest (tail side) first, as it is."""
         self._samples = np.concatenate([self._samples, piece_rad])
 
+    def restart(self, body_rad: Floats) -> None:
+        """Go on from a body (N,), head first, that came about otherwise: its head is at the end."""
+        self.append(body_rad[::-1])
+
     def body_rad(self, head: float) -> Floats:
         """Angles (N,), head first, of a body whose head has travelled ``head`` segments.
 

@@ -55,36 +55,37 @@ class OnCourse:
     """What a motion along a course tells of it: part of ``PathProgress``."""
 
     def __init__(self, course: "Course") -> None:
-        self._course = course
+        self.course = course
+        """In force."""
 
     @property
     def path(self) -> SplinePath:
         """The path in force."""
-        return self._course.path
+        return self.course.path
 
     @property
     def reached(self) -> int:
         """Number of waypoints reached."""
-        return self._course.reached
+        return self.course.reached
 
     @property
     def missed(self) -> int:
         """How often another path was laid to a waypoint."""
-        return self._course.missed
+        return self.course.missed
 
     @property
     def replanned(self) -> str | None:
         """Why another path was laid in the last step, if one was."""
-        return self._course.replanned
+        return self.course.replanned
 
     @property
     def along_m(self) -> float:
         """Arc length of the path point nearest to the body's centre."""
-        return self._course.along_m
+        return self.course.along_m
 
     def path_m(self, count: int) -> Floats:
         """(count, 2) points along the path in force."""
-        return self._course.path_m(count)
+        return self.course.path_m(count)
 
 
 class Course:
@@ -144,6 +145,16 @@ class Course:
         """Whether every waypoint has been reached."""
         return self.reached == len(self._goals_m)
 
+    def ahead_m(self, reach_m: float) -> Floats:
+        """(2,) the next waypoint, or a point of the path before it, ``reach_m`` ahead."""
+        at = min(float(self._along_m[0]) + reach_m, self._passed_m[self.reached])
+        return np.asarray(self.path.position(at))
+
+    @property
+    def astray(self) -> bool:
+        """Whether the way to the next waypoint has been missed before."""
+        return self._missed_before == self.reached
+
     @property
     def along_m(self) -> float:
         """Arc length of the path point nearest to the body's centre."""
@@ -157,6 +168,28 @@ class Course:
     def path_m(self, count: int) -> Floats:
         """(count, 2) points along the path in force."""
         return self.path.position(np.linspace(0.0, self.path.length_m, count))
+
+    def observe(
+        self,
+        centre_m: Floats,
+        head_m: Floats,
+        fall_back: Callable[[bool], None] = lambda lost: None,
+    ) -> bool:
+        """Note how far the body has come; count a waypoint, and return True, if it is near it.
+
+        Arguments as in ``follow``.
+        """
+        self._followers_m[0], self._followers_m[1] = centre_m, head_m
+        self.path.project(self._followers_m, self._along_m, self._gap_m)
+        self.replanned = None
+        if self.complete:
+            return False
+        x_m, y_m = self._goals_m[self.reached]
+        if math.hypot(x_m - centre_m[0], y_m - centre_m[1]) > self._radius_m:
+            return False
+        self.reached += 1
+        fall_back(False)
+        return True
 
     def follow(
         self,
@@ -176,16 +209,10 @@ class Course:
             fall_back: told whether the same waypoint was missed again, and when one is reached.
 
         """
-        self._followers_m[0], self._followers_m[1] = centre_m, head_m
-        self.path.project(self._followers_m, self._along_m, self._gap_m)
-        self.replanned, self._travel = None, travel
-        if self.complete:
+        self._travel = travel
+        if self.observe(centre_m, head_m, fall_back) or self.complete:
             return
-        x_m, y_m = self._goals_m[self.reached]
-        if math.hypot(x_m - centre_m[0], y_m - centre_m[1]) <= self._radius_m:
-            self.reached += 1
-            fall_back(False)
-        elif self._feedback and travel >= self._replan_after:
+        if self._feedback and travel >= self._replan_after:
             self._note_gain()
             self.replanned = self._failing(centre_m)
             if self.replanned is None:

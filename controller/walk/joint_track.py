@@ -43,6 +43,11 @@ class JointTrack:
     def _joints_of(self, body_rad: Floats) -> Floats:
         return np.clip(self._joints(body_rad), -self._limit_rad, self._limit_rad)
 
+    def restart(self) -> None:
+        """Begin again at the end of the track, where the body lies now."""
+        self.first = self.track.end
+        self._q = self._joints_of(self.track.body_rad(float(self.first)))[None]
+
     @property
     def last(self) -> int:
         """Largest head at which the goal no longer depends on what will be appended, plus one."""

@@ -126,13 +126,15 @@ class Pilot(OnCourse):
         self._feedback = feedback
         self._aim_at_waypoint = aim_at_waypoint
         self._start: tuple[Floats, float] | None = None
+        self._at_rest = False
+        self._decides = True
         self.decision: Decision | None = None
         """Made in the last step, if one was."""
 
     @property
     def done(self) -> bool:
         """Whether every waypoint has been reached and the shape has come to rest."""
-        return self._course.complete and self._time_law.speed_segments_s == 0.0
+        return self.course.complete and self._time_law.speed_segments_s == 0.0
 
     @property
     def head(self) -> float:
@@ -167,6 +169,37 @@ class Pilot(OnCourse):
         self._last_rad = self._earlier_rad = self._goal_rad
         return self._goal_rad
 
+    @property
+    def at_end(self) -> bool:
+        """Whether the head has come to the end of the track."""
+        return self.head >= self._chooser.track.end - 1.0
+
+    def end_on(self, piece_rad: Floats) -> None:
+        """Append a piece (n,) of track, the last until ``go_on`` or ``restart``."""
+        self._chooser.track.append(piece_rad)
+        self._decides = False
+
+    def go_on(self, think_anew: Callable[[], None]) -> None:
+        """Decide again what comes next; ``think_anew`` of the chooser."""
+        think_anew()
+        self._decides = True
+
+    def watch(self, view: BodyView) -> None:
+        """Count waypoints while something else moves the body."""
+        self.course.observe(view.centre_m[:2], view.link_m[0, :2], self._fall_back)
+        self.decision = None
+
+    def restart(self, view: BodyView, restart: Callable[[Floats], None]) -> None:
+        """Go on, from rest, with the body as it lies; ``restart`` of the chooser takes it (N,)."""
+        points = self._chooser.track.points
+        at = (np.arange(points) + 0.5) * self._links / points - 0.5
+        restart(np.interp(at, np.arange(self._links), view.headings_rad))
+        self._time_law.restart()
+        self._pitch_rad, self._at_rest, self._decides = None, True, True
+        self._goal_rad = self._on_ground(self._time_law.goal_rad(), 0.0, view)
+        self._last_rad = self._earlier_rad = self._goal_rad
+        self._last_s = self._earlier_s = self._saved_s = 0.0
+
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""
         self._saved_s += dt_s
@@ -179,7 +212,7 @@ class Pilot(OnCourse):
         return goal
 
     def _steer(self, dt_s: float, view: BodyView) -> Floats:
-        self._course.follow(
+        self.course.follow(
             view.centre_m[:2],
             view.link_m[0, :2],
             lambda: float(view.headings_rad.mean()),
@@ -188,11 +221,17 @@ class Pilot(OnCourse):
         )
         self.decision = None
         left = self._chooser.track.end - self.head
-        if left <= _LOOKAHEAD_SEGMENTS:
-            self.decision = self._chooser.decide(self._path_pose(view))
+        if not self._decides or (
+            # at rest there is the time to think to the end
+            self._at_rest and self._chooser.think(lambda: self.path_pose(view))
+        ):
+            pass
+        elif left <= _LOOKAHEAD_SEGMENTS:
+            self._at_rest = False
+            self.decision = self._chooser.decide(self.path_pose(view))
         elif left <= _LOOKAHEAD_SEGMENTS + _THINK_SEGMENTS:
-            self._chooser.think(lambda: self._path_pose(view))
-        if self._course.complete:
+            self._chooser.think(lambda: self.path_pose(view))
+        if self.course.complete:
             self._time_law.stop()
         self._time_law.advance(dt_s)
         goal_rad = self._on_ground(self._time_law.goal_rad(), dt_s, view)
@@ -234,7 +273,8 @@ class Pilot(OnCourse):
         at = (np.arange(self._links) + 0.5) * points / self._links - 0.5
         return np.interp(at, np.arange(points), body)
 
-    def _path_pose(self, view: BodyView) -> PathPose:
+    def path_pose(self, view: BodyView) -> PathPose:
+        """Where the body is, and where its path leads."""
         offset, aim = self._aim(view)
         at = round(self.along_m / PATH_STEP_M)
         return PathPose(self.head, offset, view.centre_m[:2].copy(), aim, self._path_table(), at)
@@ -254,7 +294,7 @@ class Pilot(OnCourse):
         if self._start is None:
             self._start = (head_m, offset)
         if self._aim_at_waypoint:
-            waypoints_m = self._course.waypoints_m
+            waypoints_m = self.course.waypoints_m
             target = waypoints_m[min(self.reached, len(waypoints_m) - 1)]
             return offset, float(np.arctan2(*(target - centre_m)[::-1]))
         if not self._feedback:
@@ -267,7 +307,7 @@ class Pilot(OnCourse):
         heading = view.headings_rad.mean()
         ahead_m = head_m + lead_m * np.array([np.cos(heading), np.sin(heading)])
         return offset, aim_rad(
-            self.path, ahead_m, self._course.head_along_m + lead_m, self._carrot_m
+            self.path, ahead_m, self.course.head_along_m + lead_m, self._carrot_m
         )
 
     def _measured(self, view: BodyView) -> tuple[float, Floats, Floats]:

@@ -113,12 +113,25 @@ class PredictiveWalker:
         self._tried: list[_Tried] = []
         self._thinking: Iterator[bool] | None = None
         self._lost = False
+        self.outlook = 1.0
+        """Predicted of the last decision: progress over that at the wanted pulse without slip."""
+
+    def restart(self, body_rad: Floats) -> None:
+        """Go on with another state from a body (N,) that came about otherwise than by the track."""
+        self.track.restart(body_rad)
+        self.steering.forget()
+        self._option, self._bends = None, np.zeros(2)
+        self.think_anew()
+
+    def think_anew(self) -> None:
+        """Go on with another state."""
+        self._thinking, self._until = None, self._at
 
     def fall_back(self, lost: bool) -> None:
         """Set whether to go on as a serpenoid: at the very last, steered the same way."""
         if lost != self._lost:
-            self._lost, self._thinking = lost, None
-            self._until = self._at
+            self._lost = lost
+            self.think_anew()
 
     def think(self, look: Callable[[], PathPose]) -> bool:
         """Spend a cycle on the next decision; only the first call looks where the body is.
@@ -142,6 +155,7 @@ class PredictiveWalker:
             pass
         self._thinking = None
         best = self._best()
+        self.outlook = best.progress
         option, keep = best.option, self._keep
         if self._is_new:
             if option.state != SERPENOID:

@@ -92,6 +92,14 @@ class Steering:
             *(w + _UPDATE * (float(v) / pulse - w) for v, w in zip(seen, was, strict=True))
         )
 
+    def roll_out(self, pose: PathPose, pieces_rad: Floats) -> Rolled:
+        """What becomes of the body on pieces (C, n) that would be appended to the track."""
+        return self._roll(pose, pieces_rad, self.drift)
+
+    def forget(self) -> None:
+        """Leave out what came before: the body has moved otherwise than by its track."""
+        self._past.clear()
+
     def judge(self, pose: PathPose, pieces_rad: Floats) -> tuple[Floats, Floats]:
         """Roll out pieces (C, n) that would be appended to the track.
 
@@ -100,7 +108,11 @@ class Steering:
             without slip.
 
         """
-        weights, rolled = self._weights, self._roll(pose, pieces_rad, self.drift)
+        return self.cost_of(self.roll_out(pose, pieces_rad))
+
+    def cost_of(self, rolled: Rolled) -> tuple[Floats, Floats]:
+        """Cost (C,) in square metres, and progress (C,), of what became of the body."""
+        weights = self._weights
         progress = rolled.along_m / (rolled.time_s * self._cruise * self._rollout.segment_m)
         cost = (
             weights.off_path * rolled.off_path_m**2

@@ -29,18 +29,27 @@ class TimeLaw:
     ) -> None:
         """Start at rest on the first head of ``joints``; ``ramp_time_s`` to the cruise speed."""
         self.joints = joints
-        self.head = float(joints.first)
-        """Segments travelled."""
-        self.speed_segments_s = 0.0
         self._cruise = cruise_segments_s
         self._speed_limit = speed_limit_rad_s
         self._half_acceleration = 0.5 * acceleration_limit_rad_s2
         self._slew = cruise_segments_s / ramp_time_s
         self._stopping = False
-        self._first = joints.first
-        self._allowed = np.array([cruise_segments_s])
-        self._slope = np.zeros(1)
         self._least = cruise_segments_s
+        self._rest()
+
+    def _rest(self) -> None:
+        """Stand on the first head of the joints."""
+        self.head = float(self.joints.first)
+        """Segments travelled."""
+        self.speed_segments_s = 0.0
+        self._first = self.joints.first
+        self._allowed = np.array([self._cruise])
+        self._slope = np.zeros(1)
+
+    def restart(self) -> None:
+        """Begin again, at rest, at the end of the track, where the body lies now."""
+        self.joints.restart()
+        self._rest()
 
     def stop(self) -> None:
         """Slow down to rest from now on."""

@@ -144,7 +144,8 @@ def prepare_job(
         )
     if run.motion == "source":
         raise InputError(f"run {run.name}: a source of your own is run by prepare_source")
-    robot = _with_keys_of("robot", load_robot(run.robot, beside), keys)
+    robot = run.walk.pitch.set_up(load_robot(run.robot, beside))
+    robot = _with_keys_of("robot", robot, keys)
     _check_servos(run, robot)
     world = _with_keys_of("world", load_world(run.world, beside), keys)
     if run.motion == "gait":

@@ -28,6 +28,7 @@ from snakewalk.controller.walk.pilot import Aimed, Pilot, ShapeChooser
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker
 from snakewalk.controller.walk.serpenoid import Serpenoid
 from snakewalk.controller.walk.shape_filters import MADE, passes_all, shape_filters
+from snakewalk.controller.walk.side_roll import RollPlanner, SideRolls
 from snakewalk.controller.walk.steering import Steering
 from snakewalk.controller.walk.time_law import TimeLaw
 from snakewalk.controller.walk.walker import Walker
@@ -36,6 +37,9 @@ POINTS = 100
 _BRIDGED_LINKS = 4.0
 """Radius of the ball that bridges the ground, over a link's length (ours): steps of 4 cm are passed
 in 41 s with 4, in 49 s with 1, by one of eight bodies not with 0."""
+
+_ROLLING_A = 0.3
+"""Goal current of pitch joints that roll a body up a slope of 18 degrees (ours, decision 37)."""
 
 
 @dataclass(frozen=True)
@@ -111,8 +115,10 @@ class WalkRun(PathRun):
 
         ``level`` leaves the pitch joints at 0, whatever the ground.
         """
+        return self._pilot(self._chooser(), level=level)
+
+    def _pilot(self, chooser: ShapeChooser, *, level: bool = False) -> Pilot:
         run, robot = self.run, self.robot
-        chooser = self._chooser()
         time_law = TimeLaw(
             JointTrack(chooser.track, self.retarget.joints_rad, robot.limit_rad),
             self.pulse_segments_s,
@@ -188,7 +194,33 @@ class WalkRun(PathRun):
         """Return a fresh pilot; it warns where the recording has no part in the walk."""
         for line in self.warnings:
             on_event("shapes", line)
-        return self.pilot()
+        chooser = self._chooser()
+        pilot = self._pilot(chooser)
+        if not isinstance(chooser, PredictiveWalker) or self.bridged is None or not self._rolls:
+            return pilot
+        relief = self.planner.relief
+        return SideRolls(
+            pilot,
+            chooser,
+            self.robot,
+            RollPlanner(
+                self.robot,
+                self.bridged,
+                lambda point_m: relief is None or bool(relief.safe(*point_m)),
+            ),
+            climb_progress=self.run.walk.climb_progress,
+            pulse_m_s=self.pulse_segments_s * self.robot.length_m / POINTS,
+            on_event=on_event,
+        )
+
+    @property
+    def _rolls(self) -> bool:
+        """Whether the body may roll sideways: it has to be round, on joints that carry it."""
+        robot = self.robot
+        if not robot.pitch_joints or robot.belly.shape == "rails":
+            return False
+        carried_a = min(robot.current_limits_a[joint] for joint in robot.pitch_joints)
+        return self.run.walk.rolls and carried_a >= _ROLLING_A
 
     @property
     def warnings(self) -> tuple[str, ...]:

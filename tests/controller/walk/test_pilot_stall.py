@@ -55,7 +55,7 @@ def test_the_reason_for_another_path_is_the_one_that_holds(
     view = body_in_world(
         robot, pose_at(centre_m - view.centre_m[:2], heading), np.zeros(robot.joint_count)
     )
-    pilot._course._along_m[:] = at_m
+    pilot.course._along_m[:] = at_m
     pilot.step(STEP_S, view)
     if why is None:
         assert pilot.replanned is None

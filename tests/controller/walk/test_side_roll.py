@@ -1,0 +1,134 @@
+"""Side rolls: what is predicted of them, when they are chosen, and how they are joined."""
+
+import numpy as np
+import pytest
+
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.app.runs.factory import prepare_walk
+from snakewalk.controller.kinematics.links import BodyView, body_in_world, pose_at
+from snakewalk.controller.kinematics.rotations import rotation_by
+from snakewalk.controller.walk.side_roll import MOST_TURNS, RollPlan, RollPlanner, SideRolls
+
+ROBOT = load_robot("alternating16")
+GIRTH_M = 2.0 * np.pi * ROBOT.body_radius_m
+SLOPE = np.tan(np.radians(18.0))
+HILL = HeightField(np.tile(SLOPE * np.arange(-4.0, 4.01, 0.1), (81, 1)), 0.1, -4.0, -4.0)
+"""A plane that rises along x."""
+ALONG = np.stack([np.zeros(17), 0.07 * np.arange(8, -9, -1)], axis=1)
+"""Links (L, 2) along a contour, heading 90 degrees: uphill is to the right."""
+DT_S = 0.02
+
+
+def test_a_roll_uphill_brings_the_body_nearer_by_its_girth_a_turn() -> None:
+    to_go_m = RollPlanner(ROBOT, HILL).to_go_m(np.array([3.5, 0.0]), ALONG, np.pi / 2, -1.0)
+    np.testing.assert_allclose(to_go_m, 3.5 - GIRTH_M * np.arange(MOST_TURNS + 1), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("heading_rad", "side"),
+    [(np.pi / 2, 1.0), (0.0, 1.0), (0.0, -1.0), (np.pi, 1.0), (-np.pi / 2, -1.0)],
+)
+def test_no_roll_goes_downhill_or_across(heading_rad: float, side: float) -> None:
+    planner, target_m = RollPlanner(ROBOT, HILL), np.array([3.5, 0.0])
+    turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+    turned = np.linalg.matrix_power(turn, round(heading_rad / (np.pi / 2)) - 1)
+    to_go_m = planner.to_go_m(target_m, ALONG @ turned.T, heading_rad, side)
+    np.testing.assert_allclose(to_go_m, [3.5], atol=1e-9)
+
+
+def test_a_roll_ends_before_unsafe_ground_and_on_level_ground() -> None:
+    target_m = np.array([3.5, 0.0])
+    fenced = RollPlanner(ROBOT, HILL, lambda point_m: bool(point_m[0] < 1.0))
+    assert len(fenced.to_go_m(target_m, ALONG, np.pi / 2, -1.0)) == 1 + int(1.0 / GIRTH_M)
+    level = HeightField(np.minimum(HILL.z_m, 0.5 * SLOPE), 0.1, -4.0, -4.0)
+    reach_m = GIRTH_M * (
+        len(RollPlanner(ROBOT, level).to_go_m(target_m, ALONG, np.pi / 2, -1.0)) - 1
+    )
+    assert 0.5 <= reach_m < 0.5 + GIRTH_M
+
+
+class Scene:
+    """A walk on the steep run whose body stands still, and rolls as its joints say."""
+
+    def __init__(self, plan: RollPlan | None, progress: float = 0.0) -> None:
+        self.prepared = prepare_walk("jacksboro-steep", seed=3)
+        self.events: list[str] = []
+        source = self.prepared.make_source(lambda kind, text: self.events.append(text))
+        assert isinstance(source, SideRolls)
+        self.rolls, self.progress = source, progress
+        self.rolls._planner.best = lambda pose, walker, target_m: plan  # type: ignore[method-assign]
+        self.rolls.course._missed_before = 0
+        self.roll_rad = 0.0
+        self.rolls.begin(self.view(np.zeros(16)))
+
+    def view(self, joint_rad: np.ndarray) -> BodyView:
+        at = pose_at(np.array([*self.prepared.run.start_m, 0.0])[:2], 1.2)
+        turned = at.rotation @ rotation_by(np.array([self.roll_rad, 0.0, 0.0]))
+        view = body_in_world(self.prepared.robot, at._replace(rotation=turned), joint_rad)
+        return view._replace(centre_m=view.centre_m * [1.0, 1.0, 0.0])
+
+    def step(self) -> np.ndarray:
+        """One cycle; joints that follow at once, and a body that rolls on its ground."""
+        view = self.view(self.rolls.goal_rad())
+        self.rolls._walker.outlook = self.progress
+        under_way = self.rolls._rolling
+        if under_way is not None:
+            self.roll_rad -= under_way._plan.side * 2.0 * np.pi * under_way._hz * DT_S
+        return self.rolls.step(DT_S, view)
+
+
+def arc(bend_rad: float, turns: int = 2) -> RollPlan:
+    piece = bend_rad * np.linspace(0.0, 1.0, 100)
+    return RollPlan(bend_rad, piece, turns, np.zeros(2), 0.1)
+
+
+@pytest.mark.parametrize("bend_rad", [2.0, -1.6])
+def test_walk_and_roll_are_joined_within_the_joints_limits(bend_rad: float) -> None:
+    scene = Scene(arc(bend_rad))
+    goals, rolled, walked_on = [scene.rolls.goal_rad()], False, False
+    for _ in range(1200):
+        goals.append(scene.step())
+        if scene.rolls.rolling and not rolled:
+            rolled, goals = True, goals[-3:]
+        if scene.rolls.rolling:
+            assert scene.rolls.pulse_m_s == 0.0
+            assert scene.rolls.decision is None
+        elif rolled and scene.rolls.decision is not None:
+            walked_on = True
+            break
+    side = "left" if bend_rad > 0.0 else "right"
+    assert walked_on
+    assert scene.events[0] == f"rolls uphill to its {side}: 2 turns are planned"
+    assert scene.events[1].startswith(("rolled 2.0 turns", "rolled 1.9 turns"))
+    speed = np.diff(goals, axis=0) / DT_S
+    limit = scene.prepared.robot.joint_speed_limit_rad_s
+    assert np.abs(speed).max() <= 1.05 * limit
+    hard = np.abs(np.diff(speed, axis=0)).max() / DT_S
+    assert hard <= 1.5 * scene.prepared.robot.joint_acceleration_limit_rad_s2
+
+
+@pytest.mark.parametrize(
+    ("plan", "progress", "astray"),
+    [(None, 0.0, True), (arc(2.0), 0.7, True), (arc(2.0), 0.0, False)],
+)
+def test_a_walk_that_gets_on_does_not_roll(
+    plan: RollPlan | None, progress: float, astray: bool
+) -> None:
+    scene = Scene(plan, progress)
+    if not astray:
+        scene.rolls.course._missed_before = -1
+    for _ in range(400):
+        scene.step()
+    assert not scene.rolls.rolling
+    assert not scene.events
+
+
+def test_soft_joints_and_rails_do_not_roll() -> None:
+    soft = prepare_walk("jacksboro-steep", keys={"run.walk.pitch.current_limit_a": 0.1})
+    rails = prepare_walk(
+        "jacksboro-steep", keys={"robot.belly.shape": "rails", "robot.belly.width_m": 0.08}
+    )
+    off = prepare_walk("jacksboro-steep", keys={"run.walk.rolls": False})
+    for prepared in (soft, rails, off):
+        assert not isinstance(prepared.make_source(lambda kind, text: None), SideRolls)
