@@ -11,7 +11,7 @@ CLIENTS := lerobot==0.4.4 deepdiff orderly-set cachebox tqdm deprecation
 # This one brings an old dynamixel_sdk along, so it gets a folder of its own, without that.
 ASIDE := dynamixel-controller==0.9.2
 
-.PHONY: setup loops run test lint types unit docs docs-commands bench campaign failures clean
+.PHONY: setup loops run test lint types unit docs bench campaign failures clean
 
 setup: $(STAMP)
 
@@ -51,10 +51,6 @@ unit: loops
 # make docs      the site, in build/docs; a link that leads nowhere inside it, or any other warning, is an error
 docs: setup
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs build/docs
-
-# make docs-commands   runs what README and the pages print (minutes), where tests/docs run the cheap ones
-docs-commands: loops
-	$(BIN)/pytest -m slow tests/docs
 
 # make bench     ratios to peers and limits; make campaign  100,000 cycles under faults
 bench: setup
