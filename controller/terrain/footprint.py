@@ -35,6 +35,15 @@ class Footprint:
             far = far_m / max(config.clearance_m, ground.spacing_m)
             self._nearness = np.maximum(1.0 - far, 0.0) ** 2
 
+    @property
+    def layers(self) -> Floats:
+        """(rows, columns, 6) slopes, their mean squares xx, xy, yy, and nearness.
+
+        Nearness is 1 on ground that cannot be climbed, falling to 0 over the clearance. It is
+        ground whose slope under the whole footprint exceeds the climb limit, or is unknown.
+        """
+        return np.concatenate([self._layers, self._nearness[..., None]], axis=-1)
+
     def slope_rad(self, points_m: Floats) -> Floats:
         """Inclination (...) of the plane fitted to the footprint at points (..., 2)."""
         x, y = np.moveaxis(points_m, -1, 0)
@@ -57,10 +66,3 @@ class Footprint:
         dx, dy = np.moveaxis(direction, -1, 0)
         across = xx * dy**2 - 2.0 * xy * dx * dy + yy * dx**2
         return np.stack([gx * dx + gy * dy, np.sqrt(np.maximum(across, 0.0))])
-
-    def nearness(self, points_m: Floats) -> Floats:
-        """Return 1 (...) on ground that cannot be climbed, falling to 0 over the clearance.
-
-        It is ground whose slope under the whole footprint exceeds the climb limit, or is unknown.
-        """
-        return interpolated(self._ground, self._nearness, *np.moveaxis(points_m, -1, 0))

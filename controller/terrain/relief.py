@@ -15,6 +15,8 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.drivers.compiling import compiled, readonly_array
 
+EDGE_TOLERANCE_M = 1e-9
+"""By which a point may lie beyond the margin and count as on it."""
 _UNKNOWN_RISK = 1e9
 """Of samples beside which something was not measured; finite, as it is interpolated."""
 
@@ -41,6 +43,11 @@ class Relief:
             self._unknown[binary_dilation(~ground.known, disc > 0.0)] = 1.0
         self._risk = np.where(self._unknown > 0.0, _UNKNOWN_RISK, self._risk)
 
+    @property
+    def layers(self) -> Floats:
+        """(rows, columns, 2) risk without the edge margin, and elevation variance."""
+        return np.stack([self._risk, self._variance], axis=-1)
+
     def variance_m2(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         """Elevation variance in a disc of ``variance_window_m`` around each point."""
         return self._at(self._variance, x_m, y_m)
@@ -65,7 +72,7 @@ class Relief:
     def within(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points lie on the field and ``edge_margin_m`` away from its border."""
         x, y = np.asarray(x_m, float), np.asarray(y_m, float)
-        ground, margin = self.ground, self.config.edge_margin_m - 1e-9
+        ground, margin = self.ground, self.config.edge_margin_m - EDGE_TOLERANCE_M
         w, h = ground.size_m
         inside = np.minimum(x - ground.x0_m, ground.x0_m + w - x) >= margin
         inside &= np.minimum(y - ground.y0_m, ground.y0_m + h - y) >= margin

@@ -9,7 +9,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from snakewalk.config.arrays import Bools, Floats, Indices
 from snakewalk.controller.terrain.footprint import Footprint
-from snakewalk.controller.terrain.relief import Relief
+from snakewalk.controller.terrain.relief import EDGE_TOLERANCE_M, Relief
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 # A tenth is kept back for the nodes and edges: the spline may leave the polygon by a little.
 RISK_LIMIT = 0.9
@@ -55,6 +56,7 @@ class SafeGraph:
         self.safe_share = float(safe.mean()) if safe.size else 0.0
         """Safe nodes over all nodes inside the margin."""
         self._avoid_m = np.empty((0, 2))
+        self._layers = np.concatenate([relief.layers, self.footprint.layers], axis=-1)
         self._edges = self._joined(index)
         self._trees: dict[int, tuple[Floats, Indices]] = {}
 
@@ -111,8 +113,8 @@ class SafeGraph:
         part = np.linspace(0.0, 1.0, count)[:, None]
         at = from_m[:, None] + part * (to_m - from_m)[:, None]
         direction = (to_m - from_m) / np.maximum(length, 1e-12)[:, None]
-        there, back = self._cost_per_m(at, direction[:, None])
-        safe = (self._relief.risk(*np.moveaxis(at, -1, 0)) <= RISK_LIMIT).all(axis=-1)
+        there, back, risk = self._cost_per_m(at, np.repeat(direction[:, None], count, axis=1))
+        safe = (risk <= RISK_LIMIT).all(axis=-1)
         return length * there.mean(axis=-1), length * back.mean(axis=-1), np.asarray(safe)
 
     def cost_per_m(self, points_m: Floats) -> Floats:
@@ -121,19 +123,33 @@ class SafeGraph:
         length = np.hypot(step[..., 0], step[..., 1])
         return self._cost_per_m(points_m, step / np.maximum(length, 1e-12)[..., None])[0]
 
-    def _cost_per_m(self, points_m: Floats, direction: Floats) -> tuple[Floats, Floats]:
-        """Weight (...) of a metre along unit vectors (..., 2), and of one against them."""
-        config = self._relief.config
-        up, side = self.footprint.slopes(points_m, direction) / np.tan(config.climb_limit_rad)
-        level = 1.0 + config.clearance_weight * self.footprint.nearness(points_m)
-        level = level + config.side_weight * side**4 + self._avoided(points_m)
-        variance = self._relief.variance_m2(*np.moveaxis(points_m, -1, 0)) / config.node_spacing_m
-        there, back = (
-            variance
-            + config.length_weight * (level + config.climb_weight * np.maximum(climb, 0.0) ** 4)
-            for climb in (up, -up)
+    def _cost_per_m(self, points_m: Floats, direction: Floats) -> tuple[Floats, Floats, Floats]:
+        """Weight (...) of a metre along unit vectors (..., 2), of one against, and the risk."""
+        ground, config = self._relief.ground, self._relief.config
+        w, h = ground.size_m
+        margin = config.edge_margin_m - EDGE_TOLERANCE_M
+        shape, count = points_m.shape[:-1], points_m[..., 0].size
+        there, back, risk = np.empty(count), np.empty(count), np.empty(count)
+        _weigh(
+            self._layers,
+            (ground.x0_m, ground.y0_m, ground.spacing_m),
+            (margin, margin, w - margin, h - margin),
+            (
+                1.0 / config.node_spacing_m,
+                self.length_weight,
+                self.length_weight * config.clearance_weight,
+                self.length_weight * config.side_weight,
+                self.length_weight * config.climb_weight,
+                float(np.tan(config.climb_limit_rad)),
+            ),
+            np.ascontiguousarray(points_m).reshape(-1, 2),
+            np.ascontiguousarray(direction).reshape(-1, 2),
+            there,
+            back,
+            risk,
         )
-        return there, back
+        more = self.length_weight * self._avoided(points_m) if len(self._avoid_m) else 0.0
+        return there.reshape(shape) + more, back.reshape(shape) + more, risk.reshape(shape)
 
     def _tree(self, target: int) -> tuple[Floats, Indices]:
         """Score to ``target`` and the next node towards it, from every node.
@@ -167,3 +183,60 @@ class SafeGraph:
 def _centred(middle: float, extent: float, spacing: float) -> Floats:
     count = max(0, int(extent / spacing + 1e-9)) + 1 if extent >= 0.0 else 0
     return np.asarray(middle + (np.arange(count) - (count - 1) / 2) * spacing)
+
+
+@compiled(
+    f"void({readonly_array(dimensions=3, layout='C')}, UniTuple(float64, 3), UniTuple(float64, 4),"
+    f" UniTuple(float64, 6), {readonly_array(dimensions=2, layout='C')},"
+    f" {readonly_array(dimensions=2, layout='C')}, float64[::1], float64[::1], float64[::1])"
+)
+def _weigh(
+    layers: Floats,
+    grid: tuple[float, float, float],
+    within: tuple[float, float, float, float],
+    weights: tuple[float, float, float, float, float, float],
+    points: Floats,
+    direction: Floats,
+    there: Floats,
+    back: Floats,
+    risk: Floats,
+) -> None:
+    """Write the weight of a metre at each point (n, 2), of one back, and the risk there.
+
+    One look-up of all fields a point and no arrays between: the edges of a world have some hundred
+    thousand points.
+
+    Args:
+        layers: (rows, columns, 8) risk, variance, and those of the footprint.
+        grid: corner and spacing.
+        within: least and largest x, then y, from the corner; the risk is infinite beyond.
+        weights: of variance, length, nearness, slope across and along, and the climb limit.
+        points: (n, 2)
+        direction: (n, 2) unit vectors.
+        there: (n,) written.
+        back: (n,) written.
+        risk: (n,) written.
+
+    """
+    rows, columns, count = layers.shape
+    x0, y0, spacing = grid
+    west, south, east, north = within
+    uneven, level_m, near_m, side_m, climb_m, limit = weights
+    field = np.empty(count)
+    for k in range(len(points)):
+        x, y, dx, dy = points[k, 0] - x0, points[k, 1] - y0, direction[k, 0], direction[k, 1]
+        u, v = min(max(x / spacing, 0.0), columns - 1.0), min(max(y / spacing, 0.0), rows - 1.0)
+        i, j = min(int(u), columns - 2), min(int(v), rows - 2)
+        fu, fv = u - i, v - j
+        for m in range(count):
+            low = layers[j, i, m] * (1.0 - fu) + layers[j, i + 1, m] * fu
+            high = layers[j + 1, i, m] * (1.0 - fu) + layers[j + 1, i + 1, m] * fu
+            field[m] = low * (1.0 - fv) + high * fv
+        up = (field[2] * dx + field[3] * dy) / limit
+        across = field[4] * dy * dy - 2.0 * field[5] * dx * dy + field[6] * dx * dx
+        side = max(across, 0.0) / (limit * limit)
+        level = uneven * field[1] + level_m + near_m * field[7] + side_m * side * side
+        there[k] = level + climb_m * max(up, 0.0) ** 4
+        back[k] = level + climb_m * max(-up, 0.0) ** 4
+        outside = x < west or x > east or y < south or y > north
+        risk[k] = np.inf if outside else field[0]

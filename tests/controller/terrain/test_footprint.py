@@ -3,14 +3,23 @@
 import numpy as np
 import pytest
 
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.terrain.footprint import Footprint
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
+from snakewalk.controller.terrain.relief import Relief, interpolated
+from snakewalk.controller.terrain.safe_graph import RISK_LIMIT
 from snakewalk.controller.terrain.summary import path_relief, path_warnings
 from tests.controller.terrain.test_planner import field, looked_at
 
 CONFIG = PlannerConfig()
+
+
+def nearness(ground: HeightField, config: PlannerConfig, points_m: Floats) -> Floats:
+    """Return that of points (n, 2) to ground that cannot be climbed."""
+    return interpolated(ground, Footprint(ground, config).layers, *points_m.T)[:, 5]
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 30.0, 90.0, 180.0, 250.0])
@@ -38,14 +47,43 @@ def test_the_two_sides_of_a_valley_do_not_cancel() -> None:
 def test_nearness_falls_over_the_clearance() -> None:
     """A wall along x = 1: its footprint's slope is over the limit from 0.3 m before it on."""
     config = PlannerConfig(clearance_m=0.8)
-    footprint = Footprint(field(lambda x, y: 0.5 * (x > 1.0)), config)
+    ground = field(lambda x, y: 0.5 * (x > 1.0))
     x = np.linspace(-1.5, 1.0, 51)
-    near = footprint.nearness(np.stack([x, 0.0 * x], axis=-1))
+    near = nearness(ground, config, np.stack([x, 0.0 * x], axis=-1))
     wall = x[np.flatnonzero(near == 1.0)[0]]
     assert 0.65 < wall < 0.85
     np.testing.assert_allclose(near, np.clip(1.0 - (wall - x) / 0.8, 0.0, 1.0) ** 2, atol=0.12)
-    level = Footprint(field(lambda x, y: 0.1 * x), config)
-    assert (level.nearness(np.stack([x, 0.0 * x], axis=-1)) == 0.0).all()
+    level = field(lambda x, y: 0.1 * x)
+    assert (nearness(level, config, np.stack([x, 0.0 * x], axis=-1)) == 0.0).all()
+
+
+def test_an_edge_weighs_what_its_fields_say_at_its_points() -> None:
+    """The formula of the graph, by the fields one by one."""
+    config = PlannerConfig(clearance_m=0.8)
+    ground = field(lambda x, y: 0.12 * np.sin(1.3 * x) * np.cos(1.7 * y))
+    graph = TerrainPlanner(ground, config).graph
+    assert graph is not None
+    relief, footprint = Relief(ground, config), Footprint(ground, config)
+    random = np.random.default_rng(0)
+    a, turn = random.uniform(-1.9, 1.9, (200, 2)), random.uniform(-np.pi, np.pi, 200)
+    ahead = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    b = a + 0.04 * ahead
+    weight = []
+    for sign in (1.0, -1.0):
+        ends = []
+        for at in (a, b):
+            up, side = footprint.slopes(at, sign * ahead) / np.tan(config.climb_limit_rad)
+            level = 1.0 + config.clearance_weight * nearness(ground, config, at)
+            level += config.side_weight * side**4 + config.climb_weight * np.maximum(up, 0.0) ** 4
+            uneven = relief.variance_m2(*at.T) / config.node_spacing_m
+            ends.append(uneven + config.length_weight * level)
+        weight.append(0.04 * np.mean(ends, axis=0))
+    risk = np.maximum(relief.risk(*a.T), relief.risk(*b.T))
+    there, back, safe = graph.edge_cost(a, b)
+    np.testing.assert_allclose(there, weight[0], rtol=1e-9)
+    np.testing.assert_allclose(back, weight[1], rtol=1e-9)
+    np.testing.assert_array_equal(safe, risk <= RISK_LIMIT)
+    assert 20 < safe.sum() < 180
 
 
 def test_uphill_costs_more_than_downhill_and_a_contour_less() -> None:
@@ -102,11 +140,10 @@ def test_half_a_body_is_kept_from_a_hill_where_there_is_room() -> None:
     path = TerrainPlanner(ground, CONFIG).plan([(-2.0, -0.3), (2.0, -0.3)])
     at = looked_at(path)
     assert at[np.argmin(abs(at[:, 0])), 1] == pytest.approx(0.2, abs=0.12)
-    near = Footprint(ground, CONFIG).nearness(at)
+    near = nearness(ground, CONFIG, at)
     plain = PlannerConfig(clearance_weight=0.0, side_weight=0.0, climb_weight=0.0)
-    before = Footprint(ground, CONFIG).nearness(
-        looked_at(TerrainPlanner(ground, plain).plan([(-2.0, -0.3), (2.0, -0.3)]))
-    )
+    direct = TerrainPlanner(ground, plain).plan([(-2.0, -0.3), (2.0, -0.3)])
+    before = nearness(ground, CONFIG, looked_at(direct))
     assert near.mean() < before.mean()
     assert near.max() < before.max()
 
