@@ -242,13 +242,17 @@ def read_numbers(file: Path) -> Floats:
                 for line in lines
             ]
         )
-    except ValueError as error:
-        raise InputError(f"{file}: {error}") from None
+    except ValueError:
+        odd = [cell for line in lines for cell in line.split(comma) if not _is_number(cell)]
+        raise InputError(
+            f"{file}: {len(odd)} of its cells are no numbers, such as {odd[0].strip()!r}; leave "
+            "cells without a height empty"
+        ) from None
 
 
 def _is_number(cell: str) -> bool:
     try:
-        float(cell or "nan")
+        float(cell if cell.strip() else "nan")
     except ValueError:
         return False
     return True

@@ -245,7 +245,20 @@ class SerialPort:
             return f"{self._device}: another program has it open{holders and ': '}{holders}"
         if isinstance(error, ValueError):
             return f"{self._device}: {self._baud} bit/s is not possible here: {error}"
+        if _is_no_terminal(self._device):
+            return f"{self._device}: is no serial device, which is such as /dev/ttyUSB0"
         return f"{self._device}: cannot be opened: {error}"
+
+
+def _is_no_terminal(device: str) -> bool:
+    """Whether there is a file, a folder or a device that has no baud rate."""
+    with suppress(OSError):
+        descriptor = os.open(device, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            return not os.isatty(descriptor)
+        finally:
+            os.close(descriptor)
+    return False
 
 
 def _holders(device: str) -> list[str]:

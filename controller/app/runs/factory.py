@@ -149,6 +149,8 @@ def prepare_job(
     _check_servos(run, robot)
     world = _with_keys_of("world", load_world(run.world, beside), keys)
     if run.motion == "gait":
+        if changes.get("track") is not None:
+            raise InputError(f"run {run.name}: moves by a gait: leave --track out")
         steered = SteeredRun(run, robot, world)
         steered.check_plan()
         gait = steered.gait

@@ -194,7 +194,7 @@ FAULTS = {
     "none.asc": (b"ncols 3\nnrows x\n", "cannot be read as AAIGrid"),
     "none.png": (b"no", "is no PNG"),
     "big.png": (bad_png(Path()), "would expand to"),
-    "text.csv": (b"a,b\nc,d\n", "could not convert"),
+    "text.csv": (b"a,b\nc,d\n", "2 of its cells are no numbers, such as 'c'"),
     "ragged.csv": (b"1,2\n1\n", "all need as many"),
     "empty.csv": (b"", "holds no numbers"),
     "bytes.csv": (b"\xff\xfe\x00", "is no text"),

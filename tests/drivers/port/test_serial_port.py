@@ -82,8 +82,10 @@ def test_a_port_that_is_not_there_is_an_input_error() -> None:
 def test_a_file_is_no_port(tmp_path: os.PathLike[str]) -> None:
     path = os.path.join(tmp_path, "file")
     open(path, "w").close()
-    with pytest.raises(PortError, match="cannot be opened"):
+    with pytest.raises(PortError, match="is no serial device"):
         SerialPort(path)
+    with pytest.raises(PortError, match="is no serial device"):
+        SerialPort("/dev/null")
 
 
 def test_a_port_is_opened_for_one_program_alone(pair: tuple[int, SerialPort]) -> None:
