@@ -1,8 +1,8 @@
 """Numbers to JSON: rounded below what any sensor resolves, NaN as null, nothing that is not JSON.
 
 What was asked and sent keeps every digit, so that a replay can be compared and fed exactly. The
-rows of every cycle are printed by templates with a fixed number of digits, ``%.6f`` and ``%.17g``:
-the same numbers, four times quicker than the shortest text that gives a number back.
+rows of every cycle are printed with a fixed number of digits, ``%.6f`` by a compiled loop and
+``%.17g`` by a template: the same numbers, quicker than the shortest text that gives a number back.
 """
 
 import json
@@ -14,10 +14,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snakewalk.config.arrays import Bytes, Ints
 from snakewalk.config.heightfield import HeightField
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 _DECIMALS: Final = 6  # a thousandth of an encoder count, a microsecond, a micrometre
 _GROUND_POINTS: Final = 160  # along the longer edge
+_NUMBER_BYTES: Final = 24
+"""More than a number of a million, its sign, its brackets and its comma."""
 _EXACT: Final = ".17g"  # gives every float64 back
 encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 
@@ -71,8 +75,12 @@ def rounded_texts(arrays: Sequence[NDArray[np.float64]]) -> list[str]:
     flat = np.concatenate([each.ravel() for each in arrays])
     if not math.isfinite(flat.dot(flat)):
         return [encode(floats(each)) for each in arrays]
-    template = _template(tuple(each.shape for each in arrays), f".{_DECIMALS}f")
-    return (template % tuple(flat.tolist())).split("\n")
+    shapes = tuple([each.shape for each in arrays])
+    printed = np.empty(_NUMBER_BYTES * (len(flat) + len(shapes)), np.uint8)
+    count = _print_rounded(flat, _lists(shapes), printed)
+    if count < 0:
+        return (_template(shapes, f".{_DECIMALS}f") % tuple(flat.tolist())).split("\n")
+    return printed[:count].tobytes().decode("ascii").split("\n")
 
 
 @lru_cache(maxsize=256)
@@ -91,6 +99,66 @@ def _template(shapes: tuple[tuple[int, ...], ...], digits: str) -> str:
         return "[" + ",".join([lists(shape[1:])] * shape[0]) + "]"
 
     return "\n".join(map(lists, shapes))
+
+
+@cache
+def _lists(shapes: tuple[tuple[int, ...], ...]) -> Ints:
+    """(A, 2) rows of each array, 0 if it is one row, and numbers in a row."""
+    made = np.array([(0, *shape)[-2:] for shape in shapes], dtype=np.int64)
+    made.setflags(write=False)
+    return made
+
+
+@compiled(f"int64({readonly_array()}, {readonly_array('int64', 2)}, uint8[::1])")
+def _print_rounded(values: NDArray[np.float64], lists: Ints, out: Bytes) -> int:
+    """Print finite ``values`` as ``_template`` does; how many bytes, or -1 where it must be used.
+
+    It must for large numbers, and for those so near the middle between two of six digits that their
+    product with a million, which is rounded, does not tell which is printed.
+    """
+    at = k = 0
+    for a in range(len(lists)):
+        if a > 0:
+            out[at] = 10  # a new line
+            at += 1
+        rows, columns = lists[a]
+        if rows > 0:
+            out[at] = 91  # [
+            at += 1
+        for row in range(max(rows, 1)):
+            if row > 0:
+                out[at] = 44  # ,
+                at += 1
+            out[at] = 91
+            at += 1
+            for column in range(columns):
+                if column > 0:
+                    out[at] = 44
+                    at += 1
+                if np.signbit(values[k]):
+                    out[at] = 45  # -
+                    at += 1
+                scaled = abs(values[k]) * 1e6
+                k += 1
+                if scaled > 1e12 or abs(scaled - np.floor(scaled) - 0.5) <= 4e-16 * scaled:
+                    return -1
+                left = np.int64(np.rint(scaled))
+                digits = 7
+                while left >= 10**digits:
+                    digits += 1
+                for place in range(digits, -1, -1):
+                    if place == digits - 6:
+                        out[at + place] = 46  # .
+                    else:
+                        out[at + place] = 48 + left % 10
+                        left //= 10
+                at += digits + 1
+            out[at] = 93  # ]
+            at += 1
+        if rows > 0:
+            out[at] = 93
+            at += 1
+    return at
 
 
 def thinned(ground: HeightField) -> dict[str, Any]:

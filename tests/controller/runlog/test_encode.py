@@ -50,6 +50,16 @@ def test_rounded_rows_are_those_of_the_plain_encoder(values: list[float]) -> Non
     assert json.loads(empty) == []
 
 
+_EDGES = [0.0, -0.0, 1e-9, -1e-9, 5e-7, 1.5e-6, 0.0000025, 999_999.9999995, -12.25, 1e6, 3e9]
+
+
+@given(st.lists(st.floats(-1e7, 1e7) | st.sampled_from(_EDGES), max_size=8))
+def test_rounded_rows_have_six_digits(values: list[float]) -> None:
+    printed = "[" + ",".join(f"{value:.6f}" for value in values) + "]"
+    assert rounded_texts([np.array(values)]) == [printed]
+    assert rounded_texts([np.array([values, values])]) == [f"[{printed},{printed}]"]
+
+
 def test_what_is_unknown_is_null_in_any_row() -> None:
     rows = [np.array([1.0, np.nan]), np.array([[np.inf, 0.25], [0.0, -1.0]])]
     first, second = rounded_texts(rows)
