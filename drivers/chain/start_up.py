@@ -91,7 +91,7 @@ def inspect(
             text = f"{joint}: is a {name}, not a {table.model}"
             faults.append(ChainFault(FaultCause.OTHER_MODEL, text))
             continue
-        report = _report(bus, servo_id, name)
+        report = read_report(bus, servo_id, name)
         servos.append(report)
         if report.hardware_error:
             text = (
@@ -102,7 +102,13 @@ def inspect(
     return Inspection(tuple(servos), tuple(faults))
 
 
-def _report(bus: DynamixelBus, servo_id: int, name: str) -> ServoReport:
+def read_report(bus: DynamixelBus, servo_id: int, name: str) -> ServoReport:
+    """Read what a servo tells of itself; changes nothing.
+
+    Raises:
+        BusError: it does not answer, or refuses.
+
+    """
     return ServoReport(
         servo_id=servo_id,
         model=name,

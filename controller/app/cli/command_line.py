@@ -19,6 +19,7 @@ from snakewalk.controller.app.cli.commands.body import body
 from snakewalk.controller.app.cli.commands.bus import (
     backup,
     blink,
+    bus_identify,
     bus_set,
     reboot,
     restore,
@@ -34,7 +35,12 @@ from snakewalk.controller.app.cli.commands.fish import film, match, synthesise
 from snakewalk.controller.app.cli.commands.gait import list_gaits, show_gait
 from snakewalk.controller.app.cli.commands.gait_fit import fit_gait
 from snakewalk.controller.app.cli.commands.gait_run import run_gait
-from snakewalk.controller.app.cli.commands.listing import export_robot, list_, show_robot
+from snakewalk.controller.app.cli.commands.listing import (
+    export_robot,
+    import_robot,
+    list_,
+    show_robot,
+)
 from snakewalk.controller.app.cli.commands.logs.compare import compare
 from snakewalk.controller.app.cli.commands.logs.export import export
 from snakewalk.controller.app.cli.commands.logs.identify import identify
@@ -313,6 +319,10 @@ bus.command(epilog=_examples("bus reboot --id 3 --id 4"))(reboot)
 
 bus.command(epilog=_examples("bus blink --id 7 --times 10"))(blink)
 
+bus.command(
+    "identify", epilog=_examples("bus identify", "bus identify --baud 1000000 -o mine.toml")
+)(bus_identify)
+
 bus.command(epilog=_examples("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))(sniff)
 
 app.command(
@@ -344,7 +354,7 @@ gait_app.command(
     epilog=_examples("gait fit CURVE.csv --picture fit.png", "gait fit CURVE.csv -o joints.npz"),
 )(fit_gait)
 
-robot_app = _App(no_args_is_help=True, help="A robot: show it, export it.")
+robot_app = _App(no_args_is_help=True, help="A robot: show it, export it, import one.")
 
 app.add_typer(robot_app, name="robot", rich_help_panel=_JOB)
 
@@ -355,6 +365,14 @@ robot_app.command("show", epilog=_examples("robot show alternating16", "robot sh
 robot_app.command(
     "export", epilog=_examples("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml")
 )(export_robot)
+
+robot_app.command(
+    "import",
+    epilog=_examples(
+        "robot import snake.urdf -o snake.toml",
+        "robot import swimmer.xml -o swimmer.toml --scale 0.1 --servo XL330-M288",
+    ),
+)(import_robot)
 
 terrain_app = _App(
     no_args_is_help=True, help="Worlds from real ground: maps of files, and of stereo."

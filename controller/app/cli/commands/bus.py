@@ -313,6 +313,54 @@ def backup(
     show({"servos": [each.id for each in found.servos], "backup": str(out)}, as_json)
 
 
+def bus_identify(
+    port: Port = None,
+    baud: Annotated[
+        list[int] | None, typer.Option(help="only this rate, may be given again; default: all")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="a robot's file to begin with (.toml)")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Tell who is on the wire: models, IDs, firmware, faults; suggest a robot's file."""
+    from snakewalk.controller.app.service import inventory, scan  # noqa: PLC0415  --help stays quick
+    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: a robot's file ends in .toml")
+    refuse_to_overwrite([out], force)
+    scan.check_bauds(baud or ())
+    device = scan.pick_port(port)
+    with SerialPort(device, baud[0] if baud else 1_000_000) as line:
+        entries = inventory.take_inventory(
+            line, line.latency_s, baud or (), lambda step: typer.echo(step, err=True)
+        )
+    if not entries:
+        raise InputError(f"{device}: nobody answers: power? cable? adapter's switch?")
+    if out is not None:
+        text = inventory.robot_skeleton(out.stem, entries)
+        with atomic_write(out) as part:
+            part.write_text(text, encoding="utf-8")
+    if as_json:
+        servos = [entry.to_dict() for entry in entries]
+        print(json.dumps({"port": device, "servos": servos, "robot": out and str(out)}))
+        return
+    table = Table("ID", "model", "firmware", "baud", "volt", "Celsius", "torque", "fault", box=None)
+    for entry in entries:
+        found, state = entry.found, entry.report
+        told = ("-",) * 3
+        if state is not None:
+            torque = "on" if state.torque_on else "off"
+            told = f"{state.voltage_v:.1f}", f"{state.temperature_c:.0f}", torque
+        about = (found.servo_id, found.model, found.firmware, found.baud)
+        table.add_row(*map(str, about), *told, entry.fault)
+    console.print(table)
+    if out is not None:
+        console.print(f"robot {out}: say the axes, then: snakewalk calibrate --robot {out}")
+
+
 def restore(
     file: Annotated[Path, typer.Argument(help="of `snakewalk bus backup`", dir_okay=False)],
     servo_id: Annotated[

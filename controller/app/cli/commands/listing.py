@@ -95,6 +95,48 @@ def show_robot(name: RobotName, as_json: Json = False) -> None:
             console.print(table)
 
 
+def import_robot(
+    file: Annotated[Path, typer.Argument(help="MuJoCo model (.xml) or URDF of a chain")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
+    servo: Annotated[
+        str, typer.Option(help="model of all servos, which such files do not know")
+    ] = ("XM430-W350"),
+    scale: Annotated[float, typer.Option(help="lengths times this, masses times its cube")] = 1.0,
+    reverse: Annotated[bool, typer.Option(help="the model's first body is the tail")] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Make a robot's file of another program's model; what cannot be said there is told."""
+    from snakewalk.config.extras import require_extra  # noqa: PLC0415  --help stays quick
+    from snakewalk.config.robot_file import robot_toml  # noqa: PLC0415
+
+    require_extra("MuJoCo models and URDF need", "mujoco")
+    from snakewalk.controller.app.service import robot_import  # noqa: PLC0415
+
+    if out.suffix != ".toml":
+        raise InputError(f"{out}: a robot's file ends in .toml")
+    if not 1e-3 <= scale <= 1e3:
+        raise InputError(f"--scale {scale:g}: 0.001 to 1000")
+    refuse_to_overwrite([out], force)
+    made = robot_import.import_robot(file, out.stem, servo, scale=scale, reverse=reverse)
+    joints = ", ".join(made.joint_names)
+    comment = [f"From {file.name} by snakewalk robot import. Joints from the head: {joints}."]
+    comment += [f"- {note}" for note in made.notes]
+    with atomic_write(out) as part:
+        part.write_text(robot_toml(made.robot, "\n".join(comment)), encoding="utf-8")
+    facts: dict[str, object] = {
+        "robot": str(out),
+        "joints": made.robot.joint_count,
+        "axes": made.robot.joint_axes,
+        "length_m": round(made.robot.length_m, 4),
+        "mass_kg": round(made.robot.mass_kg, 4),
+        "kinematics_error_m": made.kinematics_error_m,
+    }
+    show(facts | ({"notes": list(made.notes)} if as_json else {}), as_json)
+    for note in () if as_json else made.notes:
+        console.print(f"- {note}", markup=False)
+
+
 def export_robot(
     name: RobotName,
     urdf: Annotated[Path | None, typer.Option(help="write a URDF here")] = None,
