@@ -147,6 +147,7 @@ class Analysis:
             "frames_bridged": track.bridged,
             "rate_hz": round(track.rate_hz, 3),
             "rate_assumed": track.rate_assumed,
+            "times_uneven": track.uneven,
             "length_m": None if track.length_m is None else round(track.length_m, 6),
             "frequency_hz": of_wave(wave.frequency_hz),
             "waves_on_body": of_wave(wave.waves),

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from snakewalk.config.arrays import Bools, Image
+from snakewalk.config.arrays import Bools, DeepImage
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.background import (
@@ -37,7 +37,7 @@ class Detection:
     silhouette: Silhouette
     skeleton: Skeleton
     """Its ends in no particular order; its status is that of the frame."""
-    background: Image
+    background: DeepImage
     """(H, W[, 3]) the image that the frame was compared with."""
 
 
@@ -45,7 +45,7 @@ class Detection:
 class BodyDetector:
     """Background and contrast of a scene; ``detect`` takes any frame, in any order."""
 
-    background: Image | None
+    background: DeepImage | None
     """(H, W[, 3]) the scene without the animal; None: the ground is found in each frame alone."""
     polarity: Polarity
     background_source: str
@@ -58,7 +58,7 @@ class BodyDetector:
     threshold: float | None = None
     """Contrast at the body's boundary, grey levels; None: half of the body's own."""
 
-    def detect(self, image: Image) -> Detection:
+    def detect(self, image: DeepImage) -> Detection:
         """Find the animal in one frame; a frame that cannot be used is not ``GOOD``.
 
         Raises:
@@ -86,7 +86,7 @@ class BodyDetector:
                 skeleton = no_skeleton(status)
         return Detection(body, skeleton, background)
 
-    def ground_of(self, image: Image) -> Image:
+    def ground_of(self, image: DeepImage) -> DeepImage:
         """(H, W[, 3]) what a frame is compared with."""
         if self.background is not None:
             return self.background
@@ -96,8 +96,8 @@ class BodyDetector:
 
 
 def make_detector(
-    frames: Sequence[Image],
-    background: Image | None = None,
+    frames: Sequence[DeepImage],
+    background: DeepImage | None = None,
     *,
     cropped: bool = False,
     inside: Bools | None = None,
@@ -157,7 +157,7 @@ def make_detector(
     return _best([*(_Candidate.of(detector, frames) for detector in fixed), *alone])
 
 
-def whole_share(detector: BodyDetector, frames: Sequence[Image]) -> float:
+def whole_share(detector: BodyDetector, frames: Sequence[DeepImage]) -> float:
     """Share of the frames that show a whole body of about the usual length."""
     return _Candidate.of(detector, frames).share
 
@@ -174,7 +174,7 @@ class _Candidate:
     width_px: float
 
     @classmethod
-    def of(cls, detector: BodyDetector, frames: Sequence[Image]) -> "_Candidate":
+    def of(cls, detector: BodyDetector, frames: Sequence[DeepImage]) -> "_Candidate":
         bodies = [detector.detect(frame).skeleton for frame in frames]
         length = np.array([one.length_px for one in bodies])
         if not np.isfinite(length).any():
@@ -201,7 +201,7 @@ def _best(candidates: Sequence[_Candidate]) -> BodyDetector:
 
 
 def _with_surroundings(
-    surface: BodyDetector, seen: _Candidate, frames: Sequence[Image]
+    surface: BodyDetector, seen: _Candidate, frames: Sequence[DeepImage]
 ) -> BodyDetector | None:
     """The detector that compares each place with its surroundings; None without a polarity."""
     if surface.polarity is Polarity.BOTH:
@@ -220,7 +220,7 @@ def _with_surroundings(
     return _best(found)
 
 
-def _painted_out(detector: BodyDetector, frames: Sequence[Image]) -> BodyDetector | None:
+def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDetector | None:
     """Median of the frames with the animal painted over; None where it is seldom found alone."""
     out = []
     for frame in frames:
@@ -248,7 +248,7 @@ def _painted_out(detector: BodyDetector, frames: Sequence[Image]) -> BodyDetecto
     )
 
 
-def _usual_polarity(frames: Sequence[Image], background: Image | None) -> Polarity:
+def _usual_polarity(frames: Sequence[DeepImage], background: DeepImage | None) -> Polarity:
     """The polarity of most frames.
 
     Against a background that shows the animal a frame stands out both ways; then what each frame
@@ -264,6 +264,6 @@ def _usual_polarity(frames: Sequence[Image], background: Image | None) -> Polari
     return usual
 
 
-def _size(image: Image) -> str:
+def _size(image: DeepImage) -> str:
     kind = "grey" if image.ndim == 2 else "colour"
     return f"{image.shape[1]} x {image.shape[0]} {kind}"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from snakewalk.config.archive import read_arrays
-from snakewalk.config.arrays import Bools, Floats, Image
+from snakewalk.config.arrays import Bools, DeepImage, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.body_detector import BodyDetector
 from snakewalk.controller.capture.frame_status import FrameStatus
@@ -21,6 +21,7 @@ from snakewalk.controller.capture.small_body.film_fit import fit_film
 
 _DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
 _LOST_FRAMES = 5  # for so many frames a lost small body is searched where it was last
+_OF_FRAMES = ("length_px", "head_margin", "expected_px", "company")  # arrays (T,) of a file
 _STILL = 0.02  # of the length: less change than that is no motion
 
 
@@ -43,6 +44,8 @@ class Capture:
     margin: Floats
     """(T,) how surely the head is where it was in the frame before: ``identity.margins``."""
     rate_hz: float
+    time_s: Floats
+    """(T,) when the frames were taken; uneven where the film says so."""
     head_by: str
     """How the head was told from the tail: ``given``, ``travel``, ``wave`` or ``taper``."""
     head_sure: float
@@ -70,7 +73,7 @@ class Capture:
 
 
 def capture(
-    frames: Iterable[Image],
+    frames: Iterable[DeepImage],
     detector: BodyDetector,
     rate_hz: float,
     *,
@@ -119,6 +122,7 @@ def capture(
         distractors=np.array(found.distractors),
         margin=margins(fitted.skeletons),
         rate_hz=rate_hz,
+        time_s=np.arange(len(points)) / rate_hz,
         head_by=by,
         head_sure=min(1.0, abs(score)),
     )
@@ -147,7 +151,8 @@ def save_capture(path: Path, held: CaptureFile) -> None:
     """Write an .npz that ``load_track`` reads, with the data of every frame beside the track.
 
     ``points`` (T, 101, 2) head first, m (pixels where there is no scale), y upwards; ``rate_hz``,
-    ``rate_assumed``, ``length_m`` (NaN: no scale), ``name``, ``source``, ``licence`` are the track.
+    ``time_s`` (T,), ``rate_assumed``, ``length_m`` (NaN: no scale), ``name``, ``source``,
+    ``licence`` are the track.
     Of every frame, used or not: ``verdict`` (T,) its status in words, ``points_px`` (T, 101, 2) as
     in the image, ``radius_px`` (T, 101), ``length_px`` (T,), ``head_margin`` (T,),
     ``expected_px`` (T,), the error of a point, ``company`` (T,), the size of the next largest
@@ -161,6 +166,7 @@ def save_capture(path: Path, held: CaptureFile) -> None:
             stream,
             points=captured.points_px * [scale, -scale],
             rate_hz=captured.rate_hz,
+            time_s=captured.time_s,
             rate_assumed=held.rate_assumed,
             length_m=length_m,
             name=held.name,
@@ -194,7 +200,7 @@ def load_capture(path: Path) -> CaptureFile:
         raise InputError(f"{path}: is no .npz; a track that `capture` wrote is needed") from None
     frames = len(held["verdict"]) if "verdict" in held and held["verdict"].ndim == 1 else 0
     shapes: dict[str, tuple[int, ...]] = {}
-    shapes |= dict.fromkeys(("length_px", "head_margin", "expected_px", "company"), (frames,))
+    shapes |= dict.fromkeys(_OF_FRAMES, (frames,))
     shapes |= dict.fromkeys(("rate_hz", "m_per_px", "head_sure", "rate_assumed"), ())
     shapes |= {"points_px": (frames, SEGMENTS + 1, 2), "radius_px": (frames, SEGMENTS + 1)}
     known = {str(one) for one in FrameStatus}
@@ -209,7 +215,9 @@ def load_capture(path: Path) -> CaptureFile:
     )
     if not whole:
         raise InputError(f"{path}: is no track that `capture` wrote: it lacks data of the frames")
-    scale = float(held["m_per_px"])
+    scale, rate_hz = float(held["m_per_px"]), float(held["rate_hz"])
+    even_s = np.arange(frames) / rate_hz  # files of before held no times
+    time_s = np.asarray(held.get("time_s", even_s), dtype=float)
     return CaptureFile(
         Capture(
             points_px=np.asarray(held["points_px"], dtype=float),
@@ -219,7 +227,8 @@ def load_capture(path: Path) -> CaptureFile:
             expected_px=np.asarray(held["expected_px"], dtype=float),
             distractors=np.asarray(held["company"], dtype=float),
             margin=np.asarray(held["head_margin"], dtype=float),
-            rate_hz=float(held["rate_hz"]),
+            rate_hz=rate_hz,
+            time_s=time_s if time_s.shape == (frames,) else even_s,
             head_by=str(held["head_by"]),
             head_sure=float(held["head_sure"]),
         ),
@@ -245,7 +254,7 @@ class _Detections:
 
 
 def _detect_all(
-    frames: Iterable[Image], detector: BodyDetector, on_progress: Callable[[], None] | None
+    frames: Iterable[DeepImage], detector: BodyDetector, on_progress: Callable[[], None] | None
 ) -> _Detections:
     """Run the detector on every frame, and keep crops of small bodies for the fit."""
     out = _Detections()

@@ -4,14 +4,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
-from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.resample import equal_arc_length, tangent_angles
 
 MOST_FRAMES = 500_000
 """Frames of a track, gaps included (ours): 4.6 hours at 30 Hz."""
+_UNEVEN = 0.1  # of a frame: times that are off by more are not those of an even rate
+_JOINED = 2.5  # frames: bodies are not put between those that are further apart in time
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,13 +29,15 @@ class Track:
     time_s: Floats
     """(T,) of the kept frames, increasing; a gap where frames were dropped."""
     rate_hz: float
-    """Frames a second of the camera."""
+    """Frames a second of the camera; of uneven times, the rate at which bodies are put between."""
     length_m: float | None
     """Body length; None where the recording has no scale."""
     dropped: int
     """Frames that were left out because points were missing."""
     rate_assumed: bool = False
     """Whether the file states no rate, so that the default of its format was taken."""
+    uneven: bool = False
+    """Whether the frames came at uneven times, so that bodies were put between them."""
     status: tuple[FrameStatus, ...] = ()
     """(T,) of the kept frames; empty where the file says nothing of them."""
     source: str = "not stated"
@@ -70,6 +75,7 @@ def track_from_points(
     *,
     scale_m: float | None = None,
     frame: Ints | None = None,
+    time_s: Floats | None = None,
     rate_assumed: bool = False,
     status: Sequence[FrameStatus] = (),
     source: str = "not stated",
@@ -83,6 +89,9 @@ def track_from_points(
         rate_hz: frames a second.
         scale_m: metres per unit; None where it is unknown (points become body lengths).
         frame: (T,) frame numbers, increasing; default 0, 1, 2...
+        time_s: (T,) when the frames were taken, increasing. Where these are not the times of an
+            even rate, they decide: bodies are put between them (a cubic spline of each point) at
+            an even rate, that of their median step.
         rate_assumed: whether ``rate_hz`` is a guess.
         status: of every frame (T,), or nothing.
         source: origin of the recording.
@@ -97,15 +106,21 @@ def track_from_points(
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
         raise InputError(f"{name}: the frame rate must be above 0 Hz, not {rate_hz}")
     number = np.arange(len(points)) if frame is None else frame
-    if np.any(number[1:] <= number[:-1]):
+    _check_span(name, number)
+    uneven = time_s is not None and _is_uneven(name, time_s, number)
+    if time_s is not None and uneven:
+        rate_hz = 1.0 / float(np.median(np.diff(time_s)))
+        number = np.rint(np.clip((time_s - time_s[0]) * rate_hz, 0.0, 2.0**53)).astype(np.int64)
+        _check_span(name, number)
+    elif np.any(number[1:] <= number[:-1]):
         raise InputError(f"{name}: frame numbers must increase, one row of points for each frame")
-    span = int(number[-1]) - int(number[0]) + 1 if len(number) else 0
-    if span > MOST_FRAMES:
-        raise InputError(
-            f"{name}: its frames span {span}; a track has at most {MOST_FRAMES}: give a part of it"
-        )
     whole = np.asarray(np.isfinite(points).all(axis=(1, 2)))
     whole[whole] = [_distinct(body) for body in points[whole]]
+    dropped = int(len(points) - whole.sum())
+    if time_s is not None and uneven:
+        points, number, nearest = _between(points, time_s - time_s[0], whole, rate_hz)
+        status = [status[k] for k in nearest.tolist()] if status else ()
+        whole = np.ones(len(points), dtype=bool)
     if int(whole.sum()) < 2:
         raise InputError(f"{name}: only {int(whole.sum())} of {len(points)} frames hold a midline")
     kept = points[whole]
@@ -118,12 +133,61 @@ def track_from_points(
         time_s=(number[whole] - number[0]) / rate_hz,
         rate_hz=float(rate_hz),
         length_m=None if scale_m is None else length * scale_m,
-        dropped=int(len(points) - whole.sum()),
+        dropped=dropped,
         rate_assumed=rate_assumed,
+        uneven=uneven,
         status=tuple(status[k] for k in np.flatnonzero(whole).tolist()) if status else (),
         source=source,
         licence=licence,
     )
+
+
+def _check_span(name: str, number: Ints) -> None:
+    span = int(number[-1]) - int(number[0]) + 1 if len(number) else 0
+    if span > MOST_FRAMES:
+        raise InputError(
+            f"{name}: its frames span {span}; a track has at most {MOST_FRAMES}: give a part of it"
+        )
+
+
+def _is_uneven(name: str, time_s: Floats, number: Ints) -> bool:
+    """Whether times are off those of any one rate by more than a part of a frame.
+
+    Raises:
+        InputError: times or frame numbers do not increase.
+
+    """
+    if np.any(np.diff(number) <= 0) or not (np.diff(time_s) > 0.0).all():
+        raise InputError(f"{name}: frames and their times must increase, one body at a time")
+    if len(time_s) < 3:
+        return False
+    step_s = float(time_s[-1] - time_s[0]) / float(number[-1] - number[0])
+    off_s = time_s - time_s[0] - step_s * (number - number[0])
+    return bool(np.abs(off_s).max() > _UNEVEN * step_s)
+
+
+def _between(
+    points: Floats, time_s: Floats, whole: Bools, rate_hz: float
+) -> tuple[Floats, Ints, Ints]:
+    """Bodies (T', P, 2) at an even rate, their frame numbers, and the nearest frame of each.
+
+    None lies beside a frame without a body, or where frames are far apart.
+    """
+    first = np.flatnonzero(whole[:-1] & whole[1:] & (np.diff(time_s) <= _JOINED / rate_hz))
+    bodies, numbers, nearest = [points[:0]], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for run in np.split(first, np.flatnonzero(np.diff(first) > 1) + 1):
+        if not run.size:
+            continue
+        own = np.append(run, run[-1] + 1)
+        at_s = time_s[own]
+        low, high = np.ceil(at_s[0] * rate_hz - 1e-9), np.floor(at_s[-1] * rate_hz + 1e-9)
+        grid = np.arange(int(low), int(high) + 1)
+        even_s = np.clip(grid / rate_hz, at_s[0], at_s[-1])
+        bodies.append(make_interp_spline(at_s, points[own], k=min(3, len(own) - 1))(even_s))
+        numbers.append(grid)
+        middle = 0.5 * (at_s[1:] + at_s[:-1])
+        nearest.append(own[np.searchsorted(middle, even_s)])
+    return np.concatenate(bodies), np.concatenate(numbers), np.concatenate(nearest)
 
 
 def frame_numbers(name: str, values: Floats) -> Ints:

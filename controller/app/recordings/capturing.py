@@ -3,13 +3,14 @@
 A track that was captured before is corrected by what a person has saved from its review page.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
-from snakewalk.config.arrays import Image
+from snakewalk.config.arrays import DeepImage
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.messages import stderr_console
 from snakewalk.controller.app.progress import ProgressBar
@@ -25,8 +26,9 @@ from snakewalk.controller.capture.capture import (
     save_capture,
 )
 from snakewalk.controller.capture.corrections import apply_corrections, read_corrections
-from snakewalk.controller.capture.image.region import WHOLE, region_of
-from snakewalk.controller.capture.image.video import Footage, open_footage, read_image
+from snakewalk.controller.capture.image.region import WHOLE, Region, region_of
+from snakewalk.controller.capture.image.silhouette import as_deep_as
+from snakewalk.controller.capture.image.video import Footage, frame_times, in_8_bits, open_footage
 from snakewalk.controller.capture.scale import scale_of_length, scale_of_marker
 
 _SAMPLE = 25  # frames from which the background is learnt
@@ -156,31 +158,39 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
                 f"{options.recording}: --roi and --mask need images of one size; these differ"
             )
         region = region_of(options.roi, options.mask, whole[0].shape)
-        some = [region.cut(frame) for frame in whole]
+        in_colour = any(frame.ndim == 3 for frame in whole)
+        some = [region.cut(_of_kind(frame, in_colour)) for frame in whole]
         background = (
             None
             if options.background is None
-            else region.cut(_like(read_image(options.background), whole[0]))
+            else region.cut(_of_kind(footage.image(options.background), in_colour))
         )
         detector = make_detector(
             some,
             background,
             cropped=options.cropped,
             inside=region.inside,
-            threshold=options.threshold,
+            threshold=_threshold(options, footage),
         )
         m_per_px = None
         if options.marker is not None:
             bare = detector.background if region is WHOLE else None
             ground = whole[0] if bare is None else bare
-            m_per_px = scale_of_marker(options.marker, ground)
+            m_per_px = scale_of_marker(options.marker, in_8_bits(ground))
     scale = 1.0
     if options.review is not None:
         scale = picture_scale(some[::3], footage.count, str(options.recording))
     fixed = not options.cropped and len({frame.shape for frame in whole}) == 1
+    stated_s: list[float] = []
+
+    def cut_frames() -> Iterator[DeepImage]:
+        for frame, at_s in footage.timed():
+            stated_s.append(at_s)
+            yield region.cut(_of_kind(frame, in_colour))
+
     with ProgressBar("frames", footage.count, transient=True) as bar:
         captured = capture(
-            map(region.cut, footage.read()),
+            cut_frames(),
             detector,
             footage.rate_hz,
             name=str(options.recording),
@@ -188,7 +198,12 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             fixed=fixed,
             on_progress=bar.advance,
         )
-        captured = replace(captured, points_px=region.moved(captured.points_px))
+        time_s, rate_hz = captured.time_s, captured.rate_hz
+        if options.rate_hz is None:
+            time_s, rate_hz = frame_times(stated_s, footage.rate_hz)
+        captured = replace(
+            captured, points_px=region.moved(captured.points_px), time_s=time_s, rate_hz=rate_hz
+        )
         if options.length_m is not None:
             m_per_px = scale_of_length(options.length_m, captured.length_px)
         held = CaptureFile(
@@ -200,29 +215,45 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         )
         with atomic_write(options.output) as part:
             save_capture(part, held)
-        if options.sheet is not None:
-            contact_sheet(options.sheet, footage.read(), captured)
-        if options.steps is not None:
-            number = int(np.argmax(captured.used))
-            image = region.cut(next(islice(footage.read(), number, None)))
-            line = captured.points_px[number] - np.array(region.origin_px)
-            step_picture(options.steps, image, detector, line)
-        if options.overlay is not None:
-            bar.update(0, footage.count, description="overlay film")
-            overlay_film(options.overlay, footage.read(), captured, bar.advance)
-        if options.review is not None:
-            bar.update(0, footage.count, description="review page")
-            text = review_page(
-                held,
-                map(region.cut, footage.read()),
-                scale=scale,
-                track=options.output,
-                origin_px=region.origin_px,
-                on_progress=bar.advance,
-            )
-            with atomic_write(options.review) as part:
-                part.write_text(text, encoding="utf-8")
+        _write_pictures(options, footage, region, detector, held, bar, scale, in_colour)
     return _facts(options, footage, detector, captured, m_per_px)
+
+
+def _write_pictures(
+    options: CaptureOptions,
+    footage: Footage,
+    region: Region,
+    detector: BodyDetector,
+    held: CaptureFile,
+    bar: ProgressBar,
+    scale: float,
+    in_colour: bool,
+) -> None:
+    """Write what the options ask for to look at; ``scale`` is that of the review page."""
+    captured = held.captured
+    if options.sheet is not None:
+        contact_sheet(options.sheet, footage.read(), captured)
+    if options.steps is not None:
+        number = int(np.argmax(captured.used))
+        shot = next(islice(footage.read(), number, None))
+        image = region.cut(_of_kind(shot, in_colour))
+        line = captured.points_px[number] - np.array(region.origin_px)
+        step_picture(options.steps, image, detector, line)
+    if options.overlay is not None:
+        bar.update(0, footage.count, description="overlay film")
+        overlay_film(options.overlay, footage.read(), captured, bar.advance)
+    if options.review is not None:
+        bar.update(0, footage.count, description="review page")
+        text = review_page(
+            held,
+            map(region.cut, footage.read()),
+            scale=scale,
+            track=options.output,
+            origin_px=region.origin_px,
+            on_progress=bar.advance,
+        )
+        with atomic_write(options.review) as part:
+            part.write_text(text, encoding="utf-8")
 
 
 def _check(options: CaptureOptions) -> None:
@@ -262,13 +293,20 @@ def _place(text: str) -> tuple[float, float]:
     return x, y
 
 
-def _like(background: Image, frame: Image) -> Image:
-    """Grey where the frames are grey, colour where they are in colour."""
-    if background.ndim == frame.ndim:
-        return background
-    if frame.ndim == 3:
-        return np.dstack([background] * 3)
-    return np.asarray(np.rint(background.mean(axis=2)), dtype=np.uint8)
+def _threshold(options: CaptureOptions, footage: Footage) -> float | None:
+    """The contrast that the user knows, in the levels of 8 bit."""
+    if options.threshold is None or footage.deep is None:
+        return options.threshold
+    return options.threshold * footage.deep.gain
+
+
+def _of_kind(image: DeepImage, in_colour: bool) -> DeepImage:
+    """The image in colour, or grey: a codec makes some frames of a grey film faintly coloured."""
+    if (image.ndim == 3) is in_colour:
+        return image
+    if in_colour:
+        return np.dstack([image] * 3)
+    return as_deep_as(image, image.mean(axis=2))
 
 
 def _facts(
@@ -289,7 +327,7 @@ def _facts(
         frames_rough=int((captured.used & ~captured.good).sum()),
         frames_with_company=int(captured.with_distractors.sum()),
         verdicts=captured.counts,
-        rate_hz=footage.rate_hz,
+        rate_hz=captured.rate_hz,
         rate_assumed=footage.rate_assumed,
         background=detector.background_source,
         animal=str(detector.polarity),

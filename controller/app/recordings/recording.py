@@ -50,6 +50,8 @@ class RecordingFacts:
     head_and_tail_swapped: int
     rate_hz: float
     rate_assumed: bool
+    times_uneven: bool
+    """Whether the frames came at uneven times; ``rate_hz`` is then that of bodies put between."""
     length_mm: float | None
     waves_on_body: float | None
     wave_hz: float | None
@@ -113,6 +115,7 @@ def examine(
         head_and_tail_swapped=track.flips,
         rate_hz=round(track.rate_hz, 3),
         rate_assumed=track.rate_assumed,
+        times_uneven=track.uneven,
         length_mm=None if track.length_m is None else round(1e3 * track.length_m, 1),
         waves_on_body=None if wave.not_told else round(wave.waves, 2),
         wave_hz=None if wave.not_told else round(wave.frequency_hz, 2),

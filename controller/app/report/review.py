@@ -15,10 +15,12 @@ from typing import Final
 import cv2
 import numpy as np
 
-from snakewalk.config.arrays import Image
+from snakewalk.config.arrays import DeepImage
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import CaptureFile
 from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.capture.image.silhouette import as_deep_as
+from snakewalk.controller.capture.image.video import in_8_bits
 
 _TEMPLATE: Final = Path(__file__).with_name("review.html")
 _LARGEST_PX: Final = 1280
@@ -29,7 +31,7 @@ _MOST_BYTES: Final = 150_000_000
 _QUALITY: Final = 85
 
 
-def picture_scale(some: Sequence[Image], count: int, name: str) -> float:
+def picture_scale(some: Sequence[DeepImage], count: int, name: str) -> float:
     """How much smaller the frames are drawn, so that the page stays one that a browser opens.
 
     Args:
@@ -56,7 +58,7 @@ def picture_scale(some: Sequence[Image], count: int, name: str) -> float:
 
 def review_page(
     held: CaptureFile,
-    frames: Iterable[Image],
+    frames: Iterable[DeepImage],
     *,
     scale: float,
     track: Path,
@@ -67,7 +69,7 @@ def review_page(
 
     Args:
         held: the recording.
-        frames: all of them, (H, W[, 3]) 8 bit, as they were captured.
+        frames: all of them, (H, W[, 3]), as they were captured.
         scale: of their pictures: ``picture_scale``.
         track: the file of the recording, which the page names.
         origin_px: x, y of the frames' first pixel in the whole picture.
@@ -93,7 +95,7 @@ def review_page(
             ["snakewalk", "capture", str(track), "--corrections", corrections, "-o", str(corrected)]
         ),
         "rate_hz": captured.rate_hz,
-        "time_s": [round(k / captured.rate_hz, 4) for k in range(len(captured.status))],
+        "time_s": np.round(captured.time_s, 4).tolist(),
         "origin": list(origin_px),
         "sizes": sizes,
         "length": round(float(np.nanmedian(captured.length_px)), 2),
@@ -110,9 +112,9 @@ def review_page(
     return _TEMPLATE.read_text(encoding="utf-8").replace("__DATA__", text, 1)
 
 
-def _packed(frame: Image, scale: float) -> bytes:
+def _packed(frame: DeepImage, scale: float) -> bytes:
     """A frame as JPEG."""
     if scale < 1.0:
         size = tuple(max(1, round(side * scale)) for side in frame.shape[1::-1])
-        frame = np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    return bytes(cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1])
+        frame = as_deep_as(frame, cv2.resize(frame, size, interpolation=cv2.INTER_AREA))
+    return bytes(cv2.imencode(".jpg", in_8_bits(frame), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1])

@@ -13,7 +13,7 @@ from snakewalk.controller.capture.body_detector import BodyDetector, make_detect
 from snakewalk.controller.capture.fish.matching import SilhouetteFrame
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.silhouette import Polarity, contrast, silhouette_of
-from snakewalk.controller.capture.image.video import Footage, open_footage, read_image
+from snakewalk.controller.capture.image.video import Footage, in_8_bits, open_footage
 
 _FOR_BACKGROUND = 25
 _LEAST_WHOLE = 0.5
@@ -40,13 +40,13 @@ class FishFilm:
 
         """
         rows, columns = self.size_px
-        for image in self.footage.read():
+        for image in self.footage.shown():
             if image.shape[:2] != self.size_px:
                 raise InputError(
                     f"{self.footage.path}: a frame of {image.shape[1]} x {image.shape[0]} pixels "
                     f"over a background of {columns} x {rows}"
                 )
-            ground = self.detector.ground_of(grey(image))
+            ground = in_8_bits(self.detector.ground_of(grey(image)))
             yield silhouette_frame(image, ground, self.detector.polarity)
 
 
@@ -67,10 +67,10 @@ def open_film(path: Path, background: Path | None = None, rate_hz: float | None 
 
     """
     footage = open_footage(path, rate_hz)
-    some = [grey(image) for image in footage.spread(_FOR_BACKGROUND)]
+    some = [grey(in_8_bits(image)) for image in footage.spread(_FOR_BACKGROUND)]
     if len({image.shape for image in some}) > 1:
         raise InputError(f"{path}: its frames differ in size")
-    empty = None if background is None else grey(read_image(background))
+    empty = None if background is None else grey(in_8_bits(footage.image(background)))
     if empty is not None and empty.shape != some[0].shape:
         raise InputError(
             f"{background}: {empty.shape[1]} x {empty.shape[0]} pixels; the film has "

@@ -4,9 +4,10 @@ from collections.abc import Iterator, Sequence
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Image
-from snakewalk.controller.capture.image.silhouette import Polarity
+from snakewalk.config.arrays import DeepImage
+from snakewalk.controller.capture.image.silhouette import Polarity, as_deep_as
 
 _GRID_PX = 64  # longest side of the picture to which the surface is fitted
 _ROUNDS = 4
@@ -14,12 +15,14 @@ _STRONGEST_PX = 20.0  # pixels that decide the polarity
 _QUANTILE = 0.85  # a dark animal may cover a pixel in so large a share of the frames
 
 
-def median_background(frames: Sequence[Image]) -> Image:
+def median_background(frames: Sequence[DeepImage]) -> DeepImage:
     """(H, W[, 3]) median over frames of one size; right where the animal is gone half the time."""
     return _quantile(np.stack(frames), 0.5)
 
 
-def background_candidates(frames: Sequence[Image]) -> Iterator[tuple[Image, Polarity | None, str]]:
+def background_candidates(
+    frames: Sequence[DeepImage],
+) -> Iterator[tuple[DeepImage, Polarity | None, str]]:
     """The median over frames, and for slow animals a light and a dark quantile of each pixel.
 
     Yields:
@@ -32,12 +35,12 @@ def background_candidates(frames: Sequence[Image]) -> Iterator[tuple[Image, Pola
     yield _quantile(stack, 1.0 - _QUANTILE), Polarity.LIGHT, "the darker frames at each place"
 
 
-def _quantile(stack: Image, quantile: float) -> Image:
+def _quantile(stack: DeepImage, quantile: float) -> DeepImage:
     place = round(quantile * (len(stack) - 1))
     return np.ascontiguousarray(np.partition(stack, place, axis=0)[place])
 
 
-def smooth_background(image: Image) -> Image:
+def smooth_background(image: DeepImage) -> DeepImage:
     """A background from the frame itself: a second-order surface through all but the animal.
 
     For an animal that hardly moves, and for images cropped to it: the ground must be plain, but
@@ -59,12 +62,14 @@ def smooth_background(image: Image) -> Image:
         some = terms[kept]
         fit = np.linalg.solve(some.T @ some + 1e-6 * np.eye(6), some.T @ grey[kept])
         rest = grey - terms @ fit
-    surface = np.clip((terms @ fit).reshape(small.shape), 0.0, 255.0).astype(np.float32)
+    surface = (terms @ fit).reshape(small.shape).astype(np.float32)
+    if image.dtype == np.uint8:
+        surface = np.clip(surface, 0.0, 255.0)
     whole = cv2.resize(surface, (columns, rows), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(np.rint(whole), dtype=np.uint8)
+    return as_deep_as(image, whole)
 
 
-def surrounding_ground(image: Image, polarity: Polarity, side_px: int) -> Image:
+def surrounding_ground(image: DeepImage, polarity: Polarity, side_px: int) -> DeepImage:
     """(H, W[, 3]) the image without what is narrower than ``side_px``: a morphological closing.
 
     Of dark things on lighter ground; an opening of light things on darker ground. Wide shades of
@@ -74,12 +79,13 @@ def surrounding_ground(image: Image, polarity: Polarity, side_px: int) -> Image:
     calm = cv2.medianBlur(image, 3)
     box = np.ones((side_px, side_px), dtype=np.uint8)
     closed = cv2.morphologyEx(calm, kind, box, borderType=cv2.BORDER_REPLICATE)
-    return np.asarray(cv2.blur(closed, (side_px, side_px)), dtype=np.uint8)
+    return as_deep_as(image, cv2.blur(closed, (side_px, side_px)))
 
 
-def contrast_polarity(image: Image, background: Image) -> Polarity:
+def contrast_polarity(image: DeepImage, background: DeepImage) -> Polarity:
     """Whether the pixels that stand out most are darker or lighter than the ground, or both."""
-    apart = image.astype(np.int16) - background
+    kind: type[np.int16 | np.float32] = np.int16 if image.dtype == np.uint8 else np.float32
+    apart: NDArray[np.int16 | np.float32] = image.astype(kind) - background.astype(kind)
     if apart.ndim == 3:
         strongest = np.argmax(np.abs(apart), axis=2)[..., None]
         apart = np.take_along_axis(apart, strongest, axis=2)[..., 0]

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from snakewalk.config.arrays import Bools, Floats, Image, Indices
+from snakewalk.config.arrays import Bools, DeepImage, Floats, Indices
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.image.video import read_image
 
@@ -28,7 +28,7 @@ class Region:
     fill: tuple[Indices, Indices] | None = None
     """Rows and columns of the ground that each pixel of the outside takes."""
 
-    def cut(self, frame: Image) -> Image:
+    def cut(self, frame: DeepImage) -> DeepImage:
         """(height, width[, C]) the region of a frame (H, W[, C])."""
         if self.size_px == (0, 0):
             return frame

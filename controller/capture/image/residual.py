@@ -3,11 +3,11 @@
 import cv2
 import numpy as np
 
-from snakewalk.config.arrays import Bools, Floats, Image
+from snakewalk.config.arrays import Bools, DeepImage, Floats
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.background import surrounding_ground
 from snakewalk.controller.capture.image.medial_axis import Skeleton
-from snakewalk.controller.capture.image.silhouette import Polarity, Silhouette, contrast
+from snakewalk.controller.capture.image.silhouette import Polarity, Silhouette, as_deep_as, contrast
 
 _AROUND = 0.5  # of the length, looked at on each side
 _WEAK = 0.2  # of the body's contrast: what is left over and weaker is ground
@@ -19,8 +19,8 @@ _GHOST_WEAK = 0.3  # of the body's contrast
 
 
 def check_residual(
-    image: Image,
-    background: Image,
+    image: DeepImage,
+    background: DeepImage,
     polarity: Polarity,
     silhouette: Silhouette,
     skeleton: Skeleton,
@@ -61,7 +61,7 @@ def check_residual(
     return FrameStatus.GOOD
 
 
-def _beyond_tips(same: Image, body: Bools, tips: Floats, wide: float, least: float) -> float:
+def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least: float) -> float:
     """Sum of contrast of what begins at a tip and goes away from the body."""
     apart = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
     rest = (same > least) & (apart > 1.5)
@@ -78,7 +78,7 @@ def _beyond_tips(same: Image, body: Bools, tips: Floats, wide: float, least: flo
 
 
 def _ghost(
-    seen: Image, ground: Image, polarity: Polarity, body: Bools, wide: float, least: float
+    seen: DeepImage, ground: DeepImage, polarity: Polarity, body: Bools, wide: float, least: float
 ) -> float:
     """Sum of what stands out the wrong way beside the body where the ground holds something alike.
 
@@ -96,5 +96,5 @@ def _ghost(
     return float(wrong[shown & near[label]].sum())
 
 
-def _soft(apart: Image) -> Image:
-    return np.asarray(cv2.GaussianBlur(apart, (3, 3), 0.0), dtype=np.uint8)
+def _soft(apart: DeepImage) -> DeepImage:
+    return as_deep_as(apart, cv2.GaussianBlur(apart, (3, 3), 0.0))

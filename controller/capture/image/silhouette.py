@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Image
+from snakewalk.config.arrays import Bools, DeepImage
 from snakewalk.controller.capture.frame_status import FrameStatus
 
 _MARGIN = 4
@@ -50,7 +51,14 @@ class Silhouette:
         return np.asarray(self.level > self.threshold)
 
 
-def contrast(image: Image, background: Image, polarity: Polarity) -> Image:
+def as_deep_as(image: DeepImage, values: NDArray[Any]) -> DeepImage:
+    """Grey levels as whole numbers where the image has only these; deeper ones as they are."""
+    if image.dtype == np.uint8 and values.dtype != np.uint8:
+        return np.asarray(np.rint(values), dtype=np.uint8)
+    return np.asarray(values, dtype=image.dtype)
+
+
+def contrast(image: DeepImage, background: DeepImage, polarity: Polarity) -> DeepImage:
     """(H, W) how much each pixel stands out; of a colour image its strongest channel."""
     if polarity is Polarity.BOTH:
         apart = cv2.absdiff(image, background)
@@ -61,10 +69,10 @@ def contrast(image: Image, background: Image, polarity: Polarity) -> Image:
     if apart.ndim == 3:
         one, two, three = (cv2.extractChannel(apart, k) for k in range(3))
         apart = cv2.max(cv2.max(one, two, dst=one), three, dst=one)
-    return np.asarray(apart)
+    return np.asarray(np.maximum(apart, 0) if apart.dtype == np.float32 else apart)
 
 
-def _noise_of(apart: Image) -> tuple[float, float]:
+def _noise_of(apart: DeepImage) -> tuple[float, float]:
     """Median and spread of the contrast of the background, from every n-th pixel."""
     every = max(1, min(apart.shape) // _SHRUNK_PX + 1)
     some = apart[::every, ::every].ravel()
@@ -74,23 +82,21 @@ def _noise_of(apart: Image) -> tuple[float, float]:
 
 
 def silhouette_of(
-    image: Image,
-    background: Image,
+    image: DeepImage,
+    background: DeepImage,
     polarity: Polarity = Polarity.BOTH,
     threshold: float | None = None,
 ) -> Silhouette:
     """Find the animal of one frame.
 
     Args:
-        image: (H, W) or (H, W, 3), 8 bit.
+        image: (H, W) or (H, W, 3), see ``DeepImage``.
         background: the same without the animal.
         polarity: whether the animal is darker or lighter than its ground.
         threshold: contrast at the boundary, grey levels; None: half of the body's own.
 
     """
-    apart: Image = np.asarray(
-        cv2.GaussianBlur(contrast(image, background, polarity), (3, 3), 0.0), dtype=np.uint8
-    )
+    apart = as_deep_as(image, cv2.GaussianBlur(contrast(image, background, polarity), (3, 3), 0.0))
     middle, spread = _noise_of(apart)
     clear = middle + _CLEAR * spread
     if threshold is not None:
@@ -103,7 +109,7 @@ def silhouette_of(
 
 
 def _threshold_of_body(
-    apart: Image,
+    apart: DeepImage,
     label: NDArray[np.int32],
     stats: NDArray[np.int32],
     middle: float,
@@ -144,7 +150,7 @@ def _no_silhouette() -> Silhouette:
     return Silhouette(empty, 0.5, 0.0, (0.0, 0.0), 0.0, 0.0, FrameStatus.NOTHING)
 
 
-def _parts(mask: Image) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
+def _parts(mask: DeepImage) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
     """Labels and statistics of the connected parts, searched only where the mask is not empty."""
     left, top, wide, high = cv2.boundingRect(mask)
     if wide * high < _LEAST_PX:
@@ -160,7 +166,7 @@ def _parts(mask: Image) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
     return label, np.asarray(stats, dtype=np.int32)
 
 
-def _cut_out(apart: Image, threshold: float, noise_level: float, middle: float) -> Silhouette:
+def _cut_out(apart: DeepImage, threshold: float, noise_level: float, middle: float) -> Silhouette:
     """The body of most contrast above the threshold, with a margin; whether alone and whole."""
     found = _parts((apart > threshold).astype(np.uint8))
     if found is None:

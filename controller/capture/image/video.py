@@ -1,8 +1,12 @@
-"""Frames of a recording: a video that OpenCV or PyAV reads, or a folder of images by name."""
+"""Frames of a recording: a video that OpenCV or PyAV reads, or a folder of images by name.
+
+Images of 16 bit keep their depth: they become float32, and one scale for the whole recording puts
+what its camera uses of the range where 8 bit would have it. Frames of a video have its times.
+"""
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Image
+from snakewalk.config.arrays import DeepImage, Floats, Image
 from snakewalk.config.errors import InputError
 
 os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
@@ -20,7 +24,22 @@ os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # faults get our own mess
 
 IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".webp")
 ASSUMED_HZ = 30.0
+_DEEP_RANGE = (16.0, 240.0)
+"""Grey levels between which the values of deep images are put."""
+_DEEP_SAMPLE = 9
+_EVEN = 0.1  # of a frame: times that are off by more are not those of an even rate
+_ALIKE = 0.005  # of the rate: what the times say beside what the file states
 _MISSING = 0.02  # of the frames that a file declares may be absent: some codecs count wrongly
+
+
+@dataclass(frozen=True, slots=True)
+class GreyScale:
+    """Where the values of images of 16 bit lie on the scale of 8 bit."""
+
+    black: float
+    """Value of grey level 0."""
+    gain: float
+    """Grey levels a value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,32 +56,55 @@ class Footage:
     """Whether ``rate_hz`` is a guess: neither the caller nor the file states it."""
     decoded_by_av: bool = False
     """Whether PyAV reads the video, as this OpenCV lacks its codec."""
+    deep: GreyScale | None = None
+    """Of images of 16 bit; None for all others."""
 
-    def read(self) -> Iterator[Image]:
-        """(H, W) or (H, W, 3) 8-bit frames in order.
+    def read(self) -> Iterator[DeepImage]:
+        """(H, W) or (H, W, 3) frames in order, 8 bit, or deeper ones on the same scale.
 
         Raises:
             InputError: a frame that cannot be read; of a video, as soon as it ends early.
 
         """
-        return self._images() if self.files else self._video(1)
+        return (frame for frame, _ in self.timed())
 
-    def spread(self, most: int) -> list[Image]:
+    def shown(self) -> Iterator[Image]:
+        """Frames as of ``read``, 8 bit all of them: to be drawn on."""
+        return map(in_8_bits, self.read())
+
+    def timed(self) -> Iterator[tuple[DeepImage, float]]:
+        """Frames as of ``read``, and when a video says they are shown, s; NaN for images."""
+        if self.files:
+            return ((self.image(file), float("nan")) for file in self.files)
+        return self._video(1)
+
+    def spread(self, most: int) -> list[DeepImage]:
         """At most ``most`` frames, spread over the recording."""
         every = max(1, -(-self.count // most))
         if self.files:
-            return [read_image(file) for file in self.files[::every]]
-        return list(self._video(every))
+            return [self.image(file) for file in self.files[::every]]
+        return [frame for frame, _ in self._video(every)]
 
-    def _images(self) -> Iterator[Image]:
-        for file in self.files:
-            yield read_image(file)
+    def image(self, file: Path) -> DeepImage:
+        """One image of the recording, or one that belongs to it: a background.
 
-    def _video(self, every: int) -> Iterator[Image]:
+        Raises:
+            InputError: no image in this file.
+
+        """
+        if self.deep is None:
+            return read_image(file)
+        whole = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
+        if whole.dtype != np.uint16:
+            return _one_channel(whole)
+        return _one_channel((whole.astype(np.float32) - self.deep.black) * self.deep.gain)
+
+    def _video(self, every: int) -> Iterator[tuple[DeepImage, float]]:
         done = 0
-        for frame in _av_frames(self.path, every) if self.decoded_by_av else self._grabbed(every):
+        shots = _av_frames(self.path, every) if self.decoded_by_av else self._grabbed(every)
+        for frame, at_s in shots:
             if frame is not None:
-                yield _one_channel(frame)
+                yield _one_channel(frame), at_s
             done += 1
         if done < (1.0 - _MISSING) * self.count - 1.0:
             raise InputError(
@@ -70,32 +112,35 @@ class Footage:
                 "codec is damaged; copy it again, or cut it there and give the part"
             )
 
-    def _grabbed(self, every: int) -> Iterator[NDArray[np.generic] | None]:
-        """All frames by OpenCV; None for those between each ``every``-th, which stay undecoded."""
+    def _grabbed(self, every: int) -> Iterator[tuple[Image | None, float]]:
+        """All frames by OpenCV, with their times; None for those between each ``every``-th."""
         film = cv2.VideoCapture(str(self.path))
         number = 0
         try:
             while film.grab():
+                at_s = 1e-3 * film.get(cv2.CAP_PROP_POS_MSEC)
                 if number % every:
-                    yield None
+                    yield None, at_s
                 else:
                     whole, frame = film.retrieve()
                     if not whole:
                         break
-                    yield frame
+                    yield np.asarray(frame, dtype=np.uint8), at_s
                 number += 1
         finally:
             film.release()
 
 
-def _av_frames(path: Path, every: int) -> Iterator[NDArray[np.generic] | None]:
-    """All frames by PyAV, blue first as OpenCV has them; None for those that are not asked for."""
+def _av_frames(path: Path, every: int) -> Iterator[tuple[Image | None, float]]:
+    """All frames by PyAV, blue first as OpenCV has them, with times; None for those between."""
     import av  # noqa: PLC0415  an extra
 
     try:
         with av.open(str(path)) as film:
             for number, frame in enumerate(film.decode(video=0)):
-                yield None if number % every else frame.to_ndarray(format="bgr24")
+                at_s = float("nan") if frame.time is None else float(frame.time)
+                whole = None if number % every else frame.to_ndarray(format="bgr24")
+                yield None if whole is None else np.asarray(whole, dtype=np.uint8), at_s
     except (av.error.FFmpegError, IndexError):
         return  # what is missing is counted by the caller
 
@@ -131,7 +176,14 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
         )
         if not files:
             raise InputError(f"{path}: holds no images ({', '.join(IMAGES)})")
-        return Footage(path, files, len(files), rate_hz or ASSUMED_HZ, rate_hz is None)
+        return Footage(
+            path,
+            files,
+            len(files),
+            rate_hz or ASSUMED_HZ,
+            rate_hz is None,
+            deep=_scale_of_deep(files[:: max(1, len(files) // _DEEP_SAMPLE)]),
+        )
     if not path.is_file():
         raise InputError(f"{path}: no such video or folder of images")
     if path.stat().st_size == 0:
@@ -157,6 +209,56 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
     return Footage(path, (), max(1, int(count)), rate, assumed, by_av is not None)
 
 
+def frame_times(stated_s: Sequence[float], rate_hz: float) -> tuple[Floats, float]:
+    """When frames were taken, (T,) s from the first, and frames a second.
+
+    Args:
+        stated_s: of each frame, as the film says; NaN where it does not.
+        rate_hz: that the file states.
+
+    Returns:
+        Times of the stated rate where the film's own are even and of about that rate, or none.
+        Even times of another rate have theirs; uneven times are kept, with the rate of their
+        median step.
+
+    """
+    number = np.arange(len(stated_s))
+    time_s = np.array(stated_s, dtype=float)
+    if len(time_s) < 3 or not (np.diff(time_s) > 0.0).all():
+        return number / rate_hz, rate_hz
+    time_s -= time_s[0]
+    step_s = float(time_s[-1]) / (len(time_s) - 1)
+    if float(np.abs(time_s - step_s * number).max()) > _EVEN * step_s:
+        return time_s, 1.0 / float(np.median(np.diff(time_s)))
+    own_hz = rate_hz if abs(step_s * rate_hz - 1.0) < _ALIKE else 1.0 / step_s
+    return number / own_hz, own_hz
+
+
+def in_8_bits(image: DeepImage) -> Image:
+    """A frame to be shown."""
+    if image.dtype == np.uint8:
+        return np.asarray(image, dtype=np.uint8)
+    return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
+
+
+def _scale_of_deep(files: Sequence[Path]) -> GreyScale | None:
+    """The scale of a recording in 16 bit, from some of its images; None for one in 8 bit.
+
+    A camera of 12 bit fills a sixteenth of the range, and a dim film less.
+    """
+    low, high = float("inf"), -float("inf")
+    for file in files:
+        whole = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
+        if whole.dtype != np.uint16:
+            return None
+        calm = cv2.medianBlur(whole, 3)  # a pixel that is broken has no say
+        low, high = min(low, float(calm.min())), max(high, float(calm.max()))
+    if high <= low:
+        return GreyScale(low - _DEEP_RANGE[0], 1.0)
+    gain = (_DEEP_RANGE[1] - _DEEP_RANGE[0]) / (high - low)
+    return GreyScale(low - _DEEP_RANGE[0] / gain, gain)
+
+
 def read_image(file: Path) -> Image:
     """(H, W) or (H, W, 3) 8 bit.
 
@@ -164,19 +266,25 @@ def read_image(file: Path) -> Image:
         InputError: no image in this file.
 
     """
+    return in_8_bits(_one_channel(_decoded(file, cv2.IMREAD_ANYCOLOR)))
+
+
+def _decoded(file: Path, how: int) -> NDArray[np.uint8 | np.uint16 | np.float32]:
     try:
         data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}") from None
-    image = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR) if data.size else None
+    image = cv2.imdecode(data, how) if data.size else None
     if image is None:
         raise InputError(f"{file}: is no image that can be read")
-    return _one_channel(image)
+    whole: NDArray[np.uint8 | np.uint16 | np.float32] = np.asarray(image)
+    return whole
 
 
-def _one_channel(image: NDArray[np.generic]) -> Image:
+def _one_channel(image: NDArray[np.uint8 | np.uint16 | np.float32]) -> DeepImage:
     """One channel where all three are the same: three times quicker."""
-    out = np.asarray(image, dtype=np.uint8)
+    deep = image.dtype == np.float32
+    out: DeepImage = np.asarray(image, dtype=np.float32 if deep else np.uint8)
     if out.ndim == 3 and not (
         cv2.absdiff(out[..., 0], out[..., 1]).any() or cv2.absdiff(out[..., 1], out[..., 2]).any()
     ):

@@ -27,6 +27,7 @@ _BODIES = ("points", "angles_rad", "x", "y", "skeletons")
 ARRAYS = {*_BODIES, "t", "rate_hz", "length_m", "score", "name", "source", "licence"} | {
     "rate_assumed",
     "verdict",
+    "time_s",
 }
 """The arrays that are read of an .npz; others, such as the widths of a body, stay in the file."""
 
@@ -121,10 +122,16 @@ def track_from_arrays(
 
     ``points`` are (T, P, 2) head first, or ``x`` and ``y`` (T, P), in metres where ``length_m`` is
     a number; ``angles_rad`` are the (T, P) directions of equally long pieces, and ``length_m`` is
-    then the body's length. Frames a second are ``rate_hz``, or ``t`` in seconds. ``score`` (T, P)
+    then the body's length. Frames a second are ``rate_hz``, or ``time_s`` or ``t`` in seconds
+    say when each frame was taken, evenly or not. ``score`` (T, P)
     is how sure the tracker was. ``skeletons`` are pixels, rows downwards.
     """
-    given = _rate(file, held) if rate_hz is None else rate_hz
+    time_s = None if rate_hz is not None else _times(file, held)
+    given = rate_hz
+    if given is None and "rate_hz" in held:
+        given = _scalar(file, "rate_hz", held["rate_hz"])
+    if given is None and time_s is not None:
+        given = float(1.0 / np.median(np.diff(time_s)))
     bodies = held.keys() & {"points", "angles_rad"} or {"x", "y"} <= held.keys()
     if bodies and given is not None:
         length_m = _scalar(file, "length_m", held.get("length_m", np.array(np.nan)))
@@ -134,6 +141,7 @@ def track_from_arrays(
             _without_unsure(file, points, held, least_score),
             given,
             scale_m=1.0 if np.isfinite(length_m) else None,
+            time_s=time_s if time_s is not None and len(time_s) == len(points) else None,
             rate_assumed=rate_hz is None and _assumed(held),
             status=_status(held, len(points)),
             source=_text(held, "source", "not stated"),
@@ -165,16 +173,16 @@ def _status(held: dict[str, NDArray[np.generic]], frames: int) -> list[FrameStat
     return list(map(FrameStatus, words)) if len(words) == frames and known >= set(words) else []
 
 
-def _rate(file: Path, held: dict[str, NDArray[np.generic]]) -> float | None:
-    """Frames a second that the file states; None if it states none."""
-    if "rate_hz" in held:
-        return _scalar(file, "rate_hz", held["rate_hz"])
-    if "t" not in held:
+def _times(file: Path, held: dict[str, NDArray[np.generic]]) -> Floats | None:
+    """When the frames were taken, s; None if the file does not say."""
+    key = next((name for name in ("time_s", "t") if name in held), None)
+    if key is None:
         return None
-    step = np.diff(_floats(file, "t", held["t"]).ravel())
-    if len(step) == 0 or not (step > 0.0).all() or step.max() > 1.5 * np.median(step):
-        raise InputError(f"{file}: t must increase evenly from frame to frame, in seconds")
-    return float(1.0 / np.median(step))
+    time_s = _floats(file, key, held[key]).ravel()
+    step = np.diff(time_s)
+    if len(step) == 0 or not (step > 0.0).all():
+        raise InputError(f"{file}: {key} must increase from frame to frame, in seconds")
+    return time_s
 
 
 def _bodies(file: Path, held: dict[str, NDArray[np.generic]], length: float) -> Floats:

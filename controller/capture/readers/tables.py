@@ -79,6 +79,7 @@ def _midline(file: Path, table: Floats, scale_m: float, rate_hz: float | None) -
             f"{file}: every frame must list the same points; frame {odd} differs from the first"
         )
     points = table[:, 3:].reshape(len(frames), int(count[0]), 2)
+    time_s = table[first, 0] if rate_hz is None else None
     if rate_hz is None:
         if len(frames) < 2:
             raise InputError(f"{file}: holds 1 frame; a motion needs at least 2")
@@ -91,7 +92,12 @@ def _midline(file: Path, table: Floats, scale_m: float, rate_hz: float | None) -
             )
         rate_hz = float(1.0 / np.median(step))
     return track_from_points(
-        file.stem, points, rate_hz, scale_m=scale_m, frame=frame_numbers(str(file), frames)
+        file.stem,
+        points,
+        rate_hz,
+        scale_m=scale_m,
+        frame=frame_numbers(str(file), frames),
+        time_s=time_s,
     )
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.controller.capture.small_body.ribbon import BENDS, bend_basis
 
 LONGEST_PX = 120.0
@@ -23,8 +23,8 @@ _REACH = 6.0  # working pixels beside the body that are fitted
 class Crop:
     """A cut-out of a frame and of its ground."""
 
-    image: Image
-    ground: Image
+    image: DeepImage
+    ground: DeepImage
     origin_px: tuple[int, int]
     """x, y of its first pixel."""
 
@@ -35,7 +35,7 @@ class Crop:
         return bool(inside.all(axis=1).any())
 
 
-def crop_body(image: Image, ground: Image, points_px: Floats) -> Crop:
+def crop_body(image: DeepImage, ground: DeepImage, points_px: Floats) -> Crop:
     """Cut the body of (P, 2) points out."""
     length = float(np.hypot(*np.diff(points_px, axis=0).T).sum())
     reach = max(_AROUND * length, _LEAST_AROUND_PX)

@@ -91,6 +91,8 @@ def _pictures(recordings: list[str], picture: Path | None, force: bool) -> list[
 def _show(facts: dict[str, Any]) -> None:
     """One recording as a table of two columns with the units in words."""
     assumed = " (assumed; say --rate)" if facts["rate_assumed"] else ""
+    if facts["times_uneven"]:
+        assumed = " (frames came at uneven times; bodies put between them)"
     bridged = f"{facts['frames_bridged']} with a keypoint set, " if facts["frames_bridged"] else ""
     length = "no scale" if facts["length_m"] is None else f"{1e3 * facts['length_m']:.4g} mm long"
     low, high = facts["pulse_quartiles_body_lengths_s"]

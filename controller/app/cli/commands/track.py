@@ -97,6 +97,8 @@ def _show(facts: "RecordingFacts") -> None:
     length = "no scale" if facts.length_mm is None else f"{facts.length_mm:g} mm long"
     bridged = f"{facts.frames_bridged} with a keypoint set, " if facts.frames_bridged else ""
     assumed = " (assumed; say --rate)" if facts.rate_assumed else ""
+    if facts.times_uneven:
+        assumed = " (frames came at uneven times; bodies put between them)"
     refused = ", ".join(f"{n} for {why}" for why, n in facts.states_refused.items() if n)
     stall = pace.times_no_load_speed
     rows = {

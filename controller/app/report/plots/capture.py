@@ -7,12 +7,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import DeepImage, Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.result_files import atomic_write
 from snakewalk.controller.capture.body_detector import BodyDetector
 from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.capture.image.video import in_8_bits
 
 _BODY, _HEAD, _TEXT, _BAD = (60, 200, 255), (80, 255, 80), (255, 255, 255), (80, 80, 255)
 _BACK = 32
@@ -23,14 +24,15 @@ _FILM_PX = 480
 
 
 def drawn(
-    image: Image, points_px: Floats, status: FrameStatus, wide_px: int, high_px: int
+    image: DeepImage, points_px: Floats, status: FrameStatus, wide_px: int, high_px: int
 ) -> Image:
     """(high, wide, 3) the frame enlarged or shrunk to fit, the skeleton, its head, its status."""
     canvas = np.full((high_px, wide_px, 3), _BACK, dtype=np.uint8)
     factor = min(wide_px / image.shape[1], (high_px - 18) / image.shape[0])
     size = (max(1, round(image.shape[1] * factor)), max(1, round(image.shape[0] * factor)))
     how = cv2.INTER_AREA if factor < 1.0 else cv2.INTER_NEAREST
-    colour = image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+    plain = in_8_bits(image)
+    colour = plain if plain.ndim == 3 else cv2.cvtColor(plain, cv2.COLOR_GRAY2BGR)
     canvas[: size[1], : size[0]] = cv2.resize(colour, size, interpolation=how)
     if status.has_points:
         line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
@@ -47,7 +49,7 @@ def _words(canvas: Image, text: str, good: bool) -> None:
 
 
 def contact_sheet(
-    path: Path, frames: Iterable[Image], captured: Capture, columns: int = 6, rows: int = 4
+    path: Path, frames: Iterable[DeepImage], captured: Capture, columns: int = 6, rows: int = 4
 ) -> None:
     """Frames spread over the recording, every third place kept for frames that were not used."""
     chosen = set(_chosen(captured, columns * rows))
@@ -68,7 +70,7 @@ def contact_sheet(
             raise InputError(f"{path}: a contact sheet is a .png or .jpg")
 
 
-def _tile(image: Image, points_px: Floats, status: FrameStatus) -> Image:
+def _tile(image: DeepImage, points_px: Floats, status: FrameStatus) -> Image:
     """The animal and a little around it; all of a frame in which it was not found."""
     if status.has_points:
         reach = 0.12 * float(np.hypot(*np.diff(points_px, axis=0).T).sum()) + 6.0
@@ -85,7 +87,7 @@ def _written(path: Path, image: Image) -> bool:
         return False
 
 
-def step_picture(path: Path, image: Image, detector: BodyDetector, points_px: Floats) -> None:
+def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px: Floats) -> None:
     """One frame through all steps: image, silhouette, medial axis, equal chords, head.
 
     Raises:
@@ -137,7 +139,7 @@ def _spread(numbers: NDArray[np.intp], most: int) -> list[int]:
 
 def overlay_film(
     path: Path,
-    frames: Iterable[Image],
+    frames: Iterable[DeepImage],
     captured: Capture,
     on_progress: Callable[[], None] | None = None,
 ) -> None:

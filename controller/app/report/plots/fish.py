@@ -66,7 +66,7 @@ def _frames(panels: list[Axes], matched: FilmMatch, footage: Path) -> None:
     shown = known[np.linspace(0, len(known) - 1, min(len(panels), len(known))).astype(int)]
     model, wanted = matched.model, set(shown.tolist())
     reach = 0.7 * model.length_px
-    images = ((k, image) for k, image in enumerate(open_footage(footage).read()) if k in wanted)
+    images = ((k, image) for k, image in enumerate(open_footage(footage).shown()) if k in wanted)
     for axes, (k, image) in zip(panels, images, strict=False):
         at = matched.parameters[k]
         spine = model.midline(at[:2], float(at[2]), at[3:])
