@@ -34,6 +34,11 @@ class CameraConfig(Strict):
     corners_m: tuple[Place, Place, Place, Place] | None = Field(
         None, description="the same on the floor; with them the camera may look aslant"
     )
+    lens: str | None = Field(
+        None,
+        description="file of `snakewalk camera calibrate`: the distortion of a real camera is "
+        "undone; default: none",
+    )
     shade: float = Field(
         0.35, ge=0.0, le=0.9, description="part of the floor's light that a shadow may take away"
     )

@@ -18,6 +18,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.body_detector import BodyDetector, Detection
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.silhouette import Polarity
+from snakewalk.controller.localization.lens import Lens
 
 _LEAST_AREA = 0.01  # of the image: four corners that span less fix no plane
 
@@ -32,9 +33,13 @@ class CameraModel:
     """(2,) floor below the lens."""
     height_m: float
     """Of the lens above the floor."""
+    lens: Lens | None = None
+    """Where it distorts, the homography is of pixels without distortion."""
 
     @classmethod
-    def straight_down(cls, camera: CameraConfig, centre_m: tuple[float, float]) -> Self:
+    def straight_down(
+        cls, camera: CameraConfig, centre_m: tuple[float, float], lens: Lens | None = None
+    ) -> Self:
         """Build the model of an upright pinhole camera above ``centre_m``."""
         scale = camera.field_width_m / camera.width_px
         c, s = scale * np.cos(camera.turn_rad), scale * np.sin(camera.turn_rad)
@@ -42,10 +47,12 @@ class CameraModel:
         floor = np.eye(3)
         floor[:2, :2] = [[c, s], [s, -c]]  # the image's y runs down
         floor[:2, 2] = centre_m[0] - (c * x + s * y), centre_m[1] - (s * x - c * y)
-        return cls(floor, np.array(centre_m, dtype=float), camera.height_m)
+        return cls(floor, np.array(centre_m, dtype=float), camera.height_m, lens)
 
     @classmethod
-    def from_corners(cls, camera: CameraConfig, centre_m: tuple[float, float]) -> Self:
+    def from_corners(
+        cls, camera: CameraConfig, centre_m: tuple[float, float], lens: Lens | None = None
+    ) -> Self:
         """Build the model from four places that are known in the image and on the floor.
 
         Raises:
@@ -55,6 +62,8 @@ class CameraModel:
         if camera.corners_px is None or camera.corners_m is None:
             raise InputError("camera: corners_px and corners_m are needed")
         px = np.array(camera.corners_px, dtype=np.float32)
+        if lens is not None:
+            px = lens.undistorted(px.astype(float)).astype(np.float32)
         floor = np.array(camera.corners_m, dtype=np.float32)
         for name, corners, whole in (
             ("corners_px", px, float(camera.width_px * camera.height_px)),
@@ -63,18 +72,20 @@ class CameraModel:
             if _least_triangle(corners) < _LEAST_AREA * whole or whole == 0.0:
                 raise InputError(f"camera: {name}: three of the four places lie on a line")
         found = np.asarray(cv2.getPerspectiveTransform(px, floor), dtype=float)
-        return cls(found, np.array(centre_m, dtype=float), camera.height_m)
+        return cls(found, np.array(centre_m, dtype=float), camera.height_m, lens)
 
     def on_plane(self, points_px: Floats, z_m: float) -> Floats:
         """(..., 2) world places of pixels (..., 2) of what is ``z_m`` above the floor."""
-        floor = _projected(self.floor_from_px, points_px)
+        plain = points_px if self.lens is None else self.lens.undistorted(points_px)
+        floor = _projected(self.floor_from_px, plain)
         return np.asarray(self.foot_m + (floor - self.foot_m) * (1.0 - z_m / self.height_m))
 
     def in_image(self, points_m: Floats, z_m: float) -> Floats:
         """(..., 2) pixels of world places (..., 2) that are ``z_m`` above the floor."""
         floor = self.foot_m + (points_m - self.foot_m) / (1.0 - z_m / self.height_m)
         back = np.asarray(np.linalg.inv(self.floor_from_px), dtype=float)
-        return _projected(back, floor)
+        plain = _projected(back, floor)
+        return plain if self.lens is None else self.lens.distorted(plain)
 
 
 @dataclass(frozen=True, slots=True)

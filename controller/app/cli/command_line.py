@@ -26,6 +26,8 @@ from snakewalk.controller.app.cli.commands.bus import (
     serve,
     sniff,
 )
+from snakewalk.controller.app.cli.commands.camera.board import board
+from snakewalk.controller.app.cli.commands.camera.lens import calibrate_camera
 from snakewalk.controller.app.cli.commands.capture import capture
 from snakewalk.controller.app.cli.commands.files.elevation import elevation
 from snakewalk.controller.app.cli.commands.files.init import init
@@ -396,6 +398,23 @@ terrain_app.command(
         "terrain from-stereo l.png r.png --calibration c.yml --height 0.5 --tilt 30 -o yard.toml",
     ),
 )(stereo)
+
+camera_app = _App(no_args_is_help=True, help="The camera above the robot: its board, its lens.")
+
+app.add_typer(camera_app, name="camera", rich_help_panel=_JOB)
+
+camera_app.command(
+    epilog=_examples(
+        "camera board -o board.pdf", "camera board -o a3.pdf --squares 9x6 --square 42"
+    )
+)(board)
+
+camera_app.command(
+    "calibrate",
+    epilog=_examples(
+        "camera calibrate pictures -o lens.yml", "camera calibrate 0 -o lens.yml --size 1280x720"
+    ),
+)(calibrate_camera)
 
 fish_app = _App(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
 

@@ -18,6 +18,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.app.runs.rendered_camera import centre_of, require_whole_body
 from snakewalk.controller.capture.image.video import read_image
+from snakewalk.controller.localization.lens import Lens
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
     LineDetection,
@@ -111,7 +112,8 @@ def overhead_detector(run: RunConfig, robot: RobotConfig) -> OverheadDetector:
     """Build the detector of a real camera from its table in the run.
 
     Raises:
-        InputError: no background image, of another size, or corners that fix no plane.
+        InputError: no background image, of another size, no lens in its file, or corners that fix
+            no plane.
 
     """
     camera = run.camera
@@ -121,10 +123,17 @@ def overhead_detector(run: RunConfig, robot: RobotConfig) -> OverheadDetector:
             f"{camera.background}: is {ground.shape[1]} x {ground.shape[0]} pixels, the camera "
             f"{camera.width_px} x {camera.height_px}"
         )
+    lens = None if camera.lens is None else Lens.read(Path(camera.lens))
+    if lens is not None and lens.size_px != (camera.width_px, camera.height_px):
+        raise InputError(
+            f"{camera.lens}: is of pictures of {lens.size_px[0]} x {lens.size_px[1]} pixels, the "
+            f"camera has {camera.width_px} x {camera.height_px}: calibrate in the size of the run"
+        )
     centre_m = centre_of(run)
     corners = camera.corners_px is not None
     make = CameraModel.from_corners if corners else CameraModel.straight_down
-    return OverheadDetector(make(camera, centre_m), ground, robot.body_radius_m, camera.shade)
+    model = make(camera, centre_m, lens)
+    return OverheadDetector(model, ground, robot.body_radius_m, camera.shade)
 
 
 def open_device(camera: CameraConfig) -> cv2.VideoCapture:

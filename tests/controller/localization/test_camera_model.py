@@ -6,6 +6,7 @@ from pydantic import ValidationError
 
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
+from snakewalk.controller.localization.lens import Lens
 from snakewalk.controller.localization.overhead_camera import CameraModel
 
 
@@ -31,6 +32,24 @@ def test_a_point_above_the_floor_is_seen_too_far_out_and_brought_back() -> None:
     px = model.in_image(np.array([1.5, 0.0]), 1.0)
     np.testing.assert_allclose(model.on_plane(px, 0.0), (2.0, 0.0), atol=1e-12)
     np.testing.assert_allclose(model.on_plane(px, 1.0), (1.5, 0.0), atol=1e-12)
+
+
+def test_a_lens_that_distorts_is_undone_with_corners_and_without() -> None:
+    """Where the pinhole without distortion is known, the distorted picture means the same."""
+    config = CameraConfig(height_m=4.0, field_width_m=6.4)
+    plain = CameraModel.straight_down(config, (0.3, 0.1))
+    matrix = np.array([[400.0, 0.0, 319.5], [0.0, 400.0, 239.5], [0.0, 0.0, 1.0]])
+    lens = Lens((640, 480), matrix, np.array([-0.3, 0.08, 0.0, 0.0, 0.0]))
+    bent = CameraModel.straight_down(config, (0.3, 0.1), lens)
+    places = np.array([[0.3, 0.1], [2.4, 1.5], [-1.9, -1.6]])
+    px = bent.in_image(places, 0.03)
+    assert np.hypot(*(px - plain.in_image(places, 0.03)).T)[1:].min() > 10.0
+    np.testing.assert_allclose(bent.on_plane(px, 0.03), places, atol=1e-6)
+    corners = ((-1.0, -1.0), (2.0, -1.0), (2.0, 1.5), (-1.0, 1.5))
+    seen = tuple((float(x), float(y)) for x, y in bent.in_image(np.array(corners), 0.0))
+    given = config.model_copy(update={"corners_m": corners, "corners_px": seen})
+    found = CameraModel.from_corners(given, (0.3, 0.1), lens)
+    np.testing.assert_allclose(found.on_plane(px, 0.03), places, atol=1e-4)
 
 
 @pytest.mark.parametrize("z_m", [0.0, 0.03])

@@ -195,6 +195,7 @@ def _gone(camera: DeviceCamera) -> str:
     [
         ({"device": "/nowhere/camera"}, "OpenCV cannot open it"),
         ({"background": "/nowhere/floor.png"}, "No such file"),
+        ({"lens": "/nowhere/lens.yml"}, "lens.yml"),
         ({"width_px": 320}, "is 640 x 480 pixels, the camera 320 x 480"),
     ],
 )

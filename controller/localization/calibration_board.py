@@ -1,0 +1,121 @@
+"""The printed board of a calibration: a chessboard, or a ChArUco board, which may be cut off."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import Any, Final
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Image, Ints
+from snakewalk.config.errors import InputError
+
+DICTIONARY: Final = "DICT_5X5_250"
+"""Of the markers on a ChArUco board; those on the floor are of another."""
+_MARKER: Final = 0.75  # of a square's side
+_MOST_SQUARES: Final = 20
+_INCH_M: Final = 0.0254
+
+
+class BoardPattern(StrEnum):
+    """What is printed."""
+
+    CHARUCO = "charuco"
+    CHESSBOARD = "chessboard"
+
+
+def read_pattern(text: str) -> BoardPattern:
+    """Return the pattern of this name.
+
+    Raises:
+        InputError: there is none.
+
+    """
+    try:
+        return BoardPattern(text)
+    except ValueError:
+        raise InputError(f"--pattern {text}: is none of {', '.join(BoardPattern)}") from None
+
+
+@dataclass(frozen=True)
+class BoardView:
+    """The corners found in one picture."""
+
+    corners_px: Floats
+    """(N, 2) x, y."""
+    corners_m: Floats
+    """(N, 2) the same on the board."""
+
+
+@dataclass(frozen=True)
+class CalibrationBoard:
+    """A board of squares.
+
+    Raises:
+        InputError: too few or too many squares, or a side that is none.
+
+    """
+
+    pattern: BoardPattern = BoardPattern.CHARUCO
+    squares: tuple[int, int] = (7, 5)
+    """Across, down; also of a chessboard, whose inner corners are one fewer each way."""
+    square_m: float = 0.036
+
+    def __post_init__(self) -> None:
+        across, down = self.squares
+        if not (min(across, down) >= 4 and max(across, down) <= _MOST_SQUARES) or across == down:
+            raise InputError(
+                f"a board of {across} x {down} squares: must be 4 to {_MOST_SQUARES} each way, and "
+                "not as many down as across"
+            )
+        if not 0.001 <= self.square_m <= 1.0:
+            raise InputError(f"a board's square of {self.square_m:g} m: must be 0.001 to 1 m")
+
+    @cached_property
+    def _charuco(self) -> Any:
+        words = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARY))
+        return cv2.aruco.CharucoBoard(self.squares, self.square_m, _MARKER * self.square_m, words)
+
+    @cached_property
+    def _detector(self) -> Any:
+        return cv2.aruco.CharucoDetector(self._charuco)
+
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """Width and height of the squares together."""
+        return self.squares[0] * self.square_m, self.squares[1] * self.square_m
+
+    def picture(self, dots_per_inch: float) -> Image:
+        """(H, W) the board without a margin, as it is printed."""
+        side = max(8, round(self.square_m / _INCH_M * dots_per_inch))
+        across, down = self.squares
+        if self.pattern is BoardPattern.CHARUCO:
+            drawn = self._charuco.generateImage((across * side, down * side), None, 0, 1)
+            return np.asarray(drawn, dtype=np.uint8)
+        x, y = np.meshgrid(np.arange(across * side) // side, np.arange(down * side) // side)
+        return np.where((x + y) % 2, 255, 0).astype(np.uint8)
+
+    def find(self, picture: Image) -> BoardView | None:
+        """Find the corners in a picture (H, W[, 3]); None where there are too few."""
+        grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+        places = np.asarray(self._charuco.getChessboardCorners(), dtype=float)[:, :2]
+        if self.pattern is BoardPattern.CHARUCO:
+            corners, ids, _, _ = self._detector.detectBoard(grey)
+            if ids is None:
+                return None
+            seen: Ints = np.asarray(ids, dtype=int).ravel()
+            places = places[seen]
+        else:
+            inner = self.squares[0] - 1, self.squares[1] - 1
+            found, corners = cv2.findChessboardCornersSB(grey, inner, flags=cv2.CALIB_CB_ACCURACY)
+            if not found:
+                return None
+        if len(places) < 6 or _on_a_line(places):
+            return None
+        return BoardView(np.asarray(corners, dtype=float).reshape(-1, 2), places)
+
+
+def _on_a_line(places: Floats) -> bool:
+    """Corners of one row fix no plane."""
+    return bool(np.linalg.svd(places - places.mean(axis=0), compute_uv=False)[1] < 1e-6)

@@ -1,0 +1,100 @@
+"""The lens of a camera: its matrix and distortion as OpenCV's calibration has them, and its file.
+
+The file is one of OpenCV's FileStorage with the names of its calibration sample: ``image_width``,
+``image_height``, ``camera_matrix``, ``distortion_coefficients``.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Self
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+
+_MOST_BYTES: Final = 1_000_000
+_ENDINGS: Final = (".yml", ".yaml", ".xml", ".json")
+_COEFFICIENTS: Final = (4, 5, 8, 12, 14)
+_STEPS: Final = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-9)
+
+
+@dataclass(frozen=True, slots=True)
+class Lens:
+    """A pinhole with distortion."""
+
+    size_px: tuple[int, int]
+    """Width, height of its pictures."""
+    matrix: Floats
+    """(3, 3) camera matrix, pixels."""
+    distortion: Floats
+    """(4, 5, 8, 12 or 14) coefficients in OpenCV's order."""
+
+    def undistorted(self, points_px: Floats) -> Floats:
+        """(..., 2) where pixels (..., 2) would be without distortion."""
+        flat = np.ascontiguousarray(points_px, dtype=float).reshape(-1, 1, 2)
+        found = cv2.undistortImagePoints(flat, self.matrix, self.distortion, arg1=_STEPS)
+        return np.asarray(found, dtype=float).reshape(points_px.shape)
+
+    def distorted(self, points_px: Floats) -> Floats:
+        """(..., 2) pixels of the picture for places (..., 2) of one without distortion."""
+        flat = np.asarray(points_px, dtype=float).reshape(-1, 2)
+        rays = np.linalg.solve(self.matrix, np.column_stack([flat, np.ones(len(flat))]).T).T
+        none = np.zeros(3)
+        found, _ = cv2.projectPoints(
+            np.ascontiguousarray(rays), none, none, self.matrix, self.distortion
+        )
+        return np.asarray(found, dtype=float).reshape(points_px.shape)
+
+    @classmethod
+    def read(cls, file: Path) -> Self:
+        """Read the file of ``snakewalk camera calibrate``, or another of OpenCV's calibration.
+
+        Raises:
+            InputError: there is none, it is of another kind, or its numbers describe no lens.
+
+        """
+        if file.suffix.lower() not in _ENDINGS:
+            raise InputError(f"{file}: the file of a lens ends in {', '.join(_ENDINGS)}")
+        if not file.is_file():
+            raise InputError(f"{file}: no such file")
+        if file.stat().st_size > _MOST_BYTES:
+            raise InputError(f"{file}: is too large for the file of a lens")
+        try:
+            store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
+            size = [store.getNode(f"image_{side}").real() for side in ("width", "height")]
+            names = "camera_matrix", "distortion_coefficients"
+            held = [store.getNode(name).mat() for name in names]
+            store.release()
+        except (cv2.error, SystemError) as error:
+            raise InputError(f"{file}: is no file of OpenCV's FileStorage: {error}") from None
+        faults = [
+            f"{file}: holds no {name}" for name, value in zip(names, held, strict=True)
+            if value is None
+        ]  # fmt: skip
+        if not all(1.0 <= side <= 100_000.0 for side in size):
+            faults.append(f"{file}: image_width and image_height are needed, whole and above 0")
+        if faults:
+            raise InputError(faults)
+        matrix, distortion = (np.asarray(value, dtype=float) for value in held)
+        if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+            faults.append(f"{file}: camera_matrix is not 3 x 3 numbers")
+        elif min(matrix[0, 0], matrix[1, 1]) <= 0.0 or abs(np.linalg.det(matrix)) < 1e-9:
+            faults.append(f"{file}: camera_matrix has no focal length above 0")
+        if distortion.size not in _COEFFICIENTS or not np.isfinite(distortion).all():
+            faults.append(f"{file}: distortion_coefficients are not 4, 5, 8, 12 or 14 numbers")
+        if faults:
+            raise InputError(faults)
+        return cls((int(size[0]), int(size[1])), matrix, distortion.ravel())
+
+    def write(self, file: Path, rms_px: float, views: int) -> None:
+        """Write the file, with how well it was found; its ending says the format."""
+        store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_WRITE)
+        store.write("image_width", self.size_px[0])
+        store.write("image_height", self.size_px[1])
+        store.write("camera_matrix", self.matrix)
+        store.write("distortion_coefficients", self.distortion.reshape(1, -1))
+        store.write("avg_reprojection_error", rms_px)
+        store.write("nframes", views)
+        store.release()
