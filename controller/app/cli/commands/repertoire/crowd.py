@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from snakewalk.config.errors import InputError
@@ -55,7 +54,7 @@ def crowd(
             on_frame=bar.update,
         )
     costs = scene.costs
-    hidden, far, middle, near = np.round(costs.levels / costs.frames, 1).tolist()
+    hidden, far, middle, near = (round(float(of), 1) for of in costs.levels / costs.frames)
     show(
         {
             "film": str(out),
