@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from snakewalk.config.errors import InputError
@@ -61,6 +60,8 @@ def play_actions(
     as_json: Json = False,
 ) -> None:
     """Play recorded actions on servos or in the simulator, as wanted speed and turn ask for."""
+    import numpy as np  # noqa: PLC0415  --help stays quick
+
     from snakewalk.config.playback import ScheduleConfig  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415
