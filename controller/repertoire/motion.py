@@ -142,3 +142,32 @@ class RepertoireMotion:
             self.action, self._ends = chosen, 1
             self._cycle = SegmentCycle(self._repertoire.segments[chosen], self._robot)
             self._switch.join(self._cycle)
+
+
+class ActionsInForce:
+    """What a motion by recorded actions tells of itself: part of ``MotionSource``."""
+
+    def __init__(self, motion: RepertoireMotion) -> None:
+        self._motion = motion
+
+    @property
+    def needs(self) -> Needs:
+        """What the action in force asks of the robot."""
+        return self._motion.needs
+
+    @property
+    def done(self) -> bool:
+        """Whether the motion has come to rest."""
+        return self._motion.done
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return self._motion.goal_rad()
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        return self._motion.velocity_rad_s()
+
+    def pace(self) -> Pace:
+        """The robot's limits: actions follow each other."""
+        return self._motion.pace()

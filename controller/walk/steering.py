@@ -108,11 +108,7 @@ class Steering:
             without slip.
 
         """
-        return self.cost_of(self.roll_out(pose, pieces_rad))
-
-    def cost_of(self, rolled: Rolled) -> tuple[Floats, Floats]:
-        """Cost (C,) in square metres, and progress (C,), of what became of the body."""
-        weights = self._weights
+        weights, rolled = self._weights, self.roll_out(pose, pieces_rad)
         progress = rolled.along_m / (rolled.time_s * self._cruise * self._rollout.segment_m)
         cost = (
             weights.off_path * rolled.off_path_m**2

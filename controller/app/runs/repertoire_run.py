@@ -13,12 +13,10 @@ from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.runs.execute import Finished, execute
 from snakewalk.controller.app.runs.prepared_run import pose_with
-from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.frame import Frame, body_frame
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.motion.path_progress import Decision
-from snakewalk.controller.motion.source import Pace
-from snakewalk.controller.repertoire.motion import RepertoireMotion
+from snakewalk.controller.repertoire.motion import ActionsInForce, RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.route import RouteFollower
 from snakewalk.controller.repertoire.search import MotionPrimitives, Route
@@ -76,7 +74,7 @@ class RepertoireRun:
         return RouteMotion(self, on_event)
 
 
-class RouteMotion:
+class RouteMotion(ActionsInForce):
     """Plays the actions and counts waypoints; comes to rest when all are reached."""
 
     missed = 0
@@ -99,35 +97,13 @@ class RouteMotion:
         self._path_m = route.pose[:, :2]
         self._on_event = on_event
         first = route.actions[0]
-        self._motion = RepertoireMotion(prepared.repertoire, prepared.robot, first, self._choose)
+        super().__init__(RepertoireMotion(prepared.repertoire, prepared.robot, first, self._choose))
         on_event("action", self._names[first])
-
-    @property
-    def needs(self) -> Needs:
-        """What the action in force asks of the robot."""
-        return self._motion.needs
-
-    @property
-    def done(self) -> bool:
-        """Whether the motion has come to rest."""
-        return self._motion.done
 
     @property
     def reached(self) -> int:
         """Number of waypoints reached."""
         return self.follower.reached
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self._motion.goal_rad()
-
-    def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
-        return self._motion.velocity_rad_s()
-
-    def pace(self) -> Pace:
-        """The robot's limits: actions follow each other."""
-        return self._motion.pace()
 
     def path_m(self, count: int) -> Floats:
         """(count, 2) points along the route as planned."""

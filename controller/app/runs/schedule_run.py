@@ -15,12 +15,10 @@ from snakewalk.config.loader import checked, load
 from snakewalk.config.playback import RepertoireConfig, ScheduleConfig
 from snakewalk.config.synthesis import curve_at
 from snakewalk.controller.app.runs.prepared_run import PathlessRun, plan_without_path, pose_with
-from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.frame import body_frame
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.rotations import wrap
-from snakewalk.controller.motion.source import Pace
-from snakewalk.controller.repertoire.motion import RepertoireMotion
+from snakewalk.controller.repertoire.motion import ActionsInForce, RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire, load_repertoire
 from snakewalk.controller.repertoire.search import plane_pose
 from snakewalk.controller.repertoire.secondary import SecondaryController
@@ -145,7 +143,7 @@ class PlayedAction:
     """The same of the body, over the time that the action and the join to it took."""
 
 
-class ScheduleMotion:
+class ScheduleMotion(ActionsInForce):
     """Asks the secondary controller for an action at the end of each, and comes to rest in time."""
 
     def __init__(self, prepared: ScheduleRun, on_event: OnEvent) -> None:
@@ -157,30 +155,8 @@ class ScheduleMotion:
         """So far."""
         self._requested = prepared.requested(0.0)
         first = self._controller.choose(*self._requested)
-        self._motion = RepertoireMotion(prepared.repertoire, prepared.robot, first, self._choose)
+        super().__init__(RepertoireMotion(prepared.repertoire, prepared.robot, first, self._choose))
         on_event("action", self._name(first))
-
-    @property
-    def needs(self) -> Needs:
-        """What the action in force asks of the robot."""
-        return self._motion.needs
-
-    @property
-    def done(self) -> bool:
-        """Whether the motion has come to rest."""
-        return self._motion.done
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self._motion.goal_rad()
-
-    def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
-        return self._motion.velocity_rad_s()
-
-    def pace(self) -> Pace:
-        """The robot's limits: actions follow each other."""
-        return self._motion.pace()
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""
