@@ -23,6 +23,8 @@ from snakewalk.sim.line.wire import Wire
 
 IDLE_S = 0.02
 """How often physics catches up while no client talks."""
+SPIN_S = 1e-3
+"""What is due sooner is awaited without sleep: on a busy machine a sleeper is woken 10 ms late."""
 LATE_S = 0.1
 """Real time that one step may make up for; what is beyond it is left out."""
 CHUNK_BYTES = 4096
@@ -98,10 +100,7 @@ class PtyServer:
                 line.openPort()
                 self._open()
             return
-        due_s = line.next_event_s()
-        if due_s is not None:
-            wait_s = min(wait_s, max(0.0, due_s - self._now_s()) / self._pace)
-        ready, _, _ = select.select([self._master], [], [], wait_s)
+        ready = self._wait(wait_s)
         self._catch_up()
         if line.disconnected:
             self.close()
@@ -116,6 +115,20 @@ class PtyServer:
                 os.write(self._master, arrived)
             except BlockingIOError:  # no client reads: a UART's buffer would overrun, too
                 self.overrun_bytes += len(arrived)
+
+    def _wait(self, wait_s: float) -> bool:
+        """Wait for a client, an event on the line or ``wait_s``; whether a client has sent."""
+        until_s, due_s = self._clock.now_s() + wait_s, self._line.next_event_s()
+        if due_s is not None:
+            until_s = min(until_s, (due_s - self._offset_s) / self._pace)
+        left_s = until_s - self._clock.now_s()
+        nap_s = left_s if left_s > SPIN_S else 0.0
+        while not select.select([self._master], [], [], nap_s)[0]:
+            before_s, left_s = left_s, until_s - self._clock.now_s()
+            if nap_s > 0.0 or left_s <= 0.0:
+                return False
+            nap_s = left_s if left_s == before_s else 0.0  # a clock that somebody moves by hand
+        return True
 
     def _open(self) -> None:
         self._master, self._slave = os.openpty()

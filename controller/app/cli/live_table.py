@@ -30,8 +30,8 @@ _SHOWN: Final = 8
 """Packets in words below the table."""
 _END_S: Final = 2.0
 """How long the drawing process may take to end."""
-_NICE: Final = 10
-"""Its niceness: the servos come first."""
+_NICE: Final = 20
+"""Added to the niceness of the server, whose priority may be raised: the servos come first."""
 
 
 @dataclass(frozen=True, slots=True)

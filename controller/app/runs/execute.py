@@ -22,6 +22,7 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord, Winding
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outcome
+from snakewalk.drivers.priority import raised_priority
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
@@ -143,7 +144,8 @@ def execute(
                 on_event=on_event,
             )
             try:
-                outcome = drive.run()
+                with raised_priority() if port is not None else nullcontext():
+                    outcome = drive.run()
                 if button is not None:
                     button.end(outcome.tripped or "it had come to its end")
             except (KeyboardInterrupt, SystemExit) as stop:  # a signal: the link is closed by now

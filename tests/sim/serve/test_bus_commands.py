@@ -12,6 +12,7 @@ import dynamixel_sdk as sdk
 import pytest
 
 from snakewalk.sim.line.clock import SimClock
+from snakewalk.sim.serve import pty
 from snakewalk.sim.serve.pty import LATE_S, PtyServer
 from snakewalk.sim.serve.servo_bus import ServoBus
 from tests.helpers.bus import a_line, serve_for
@@ -165,3 +166,10 @@ def test_the_fixture_takes_servos_of_protocol_1(
     assert handler.ping(bus.line, 2)[1] == sdk.COMM_RX_TIMEOUT
     assert bus["LED"].tolist() == [1, 0, 0]
     assert (bus["Present Position"] > 600).all()
+
+
+def test_a_pace_that_the_machine_cannot_keep_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ("bus", "serve", "--servos", "1", "--for", "0.05")
+    assert "too slow" not in snakewalk(*words).stderr
+    monkeypatch.setattr(pty, "LATE_S", -0.02)  # as if each step came 20 ms late
+    assert "% slower than --pace: this machine is too slow" in snakewalk(*words).stderr

@@ -1,8 +1,10 @@
 """The servos behind a pseudo-terminal: by hand with a simulated clock, and in real time."""
 
 import os
+import select
 import threading
 from pathlib import Path
+from typing import Any
 
 import dynamixel_sdk as sdk
 import pytest
@@ -35,6 +37,36 @@ def test_answers_come_when_their_bytes_are_due() -> None:
             assert len(os.read(client, 99)) == 9
         finally:
             os.close(client)
+
+
+class CountingClock(SimClock):
+    """Ten microseconds pass between two looks at it."""
+
+    def now_s(self) -> float:
+        self.advance(1e-5)
+        return super().now_s()
+
+
+def test_a_reply_that_is_due_soon_is_awaited_without_sleep(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, naps = CountingClock(), list[float]()
+    with PtyServer(a_line(1), clock) as server:
+        client = os.open(server.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        look = select.select
+
+        def sleep(*ends_and_wait: Any) -> Any:
+            naps.append(ends_and_wait[3])
+            return look(*ends_and_wait[:3], 0.0)
+
+        try:
+            os.write(client, PING)
+            server.step(1e-3)
+            monkeypatch.setattr(select, "select", sleep)
+            for _ in range(9):
+                server.step(1e-3)
+            assert os.read(client, 99)[:5] == b"\xff\xff\xfd\x00\x01"
+        finally:
+            os.close(client)
+    assert set(naps) == {0.0}
 
 
 def test_physics_runs_on_while_nobody_talks_and_clients_come_and_go() -> None:

@@ -16,6 +16,7 @@ from rich.table import Table
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force, Json, Port, console, show
+from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 REFRESH_S = 0.25
 """Time between two drawings of the live table."""
 STEP_S = 0.02
+LATE_SHARE = 0.05
+"""Of the time served: who left more of it out is told so at the end."""
 
 
 def serve(
@@ -59,6 +62,7 @@ def serve(
 ) -> None:
     """Serve simulated servos at a serial device, in real time, with a live table."""
     from snakewalk.drivers.clock import WallClock  # noqa: PLC0415  --help stays quick
+    from snakewalk.drivers.priority import raised_priority  # noqa: PLC0415
     from snakewalk.sim.serve.pty import PtyServer  # noqa: PLC0415
     from snakewalk.sim.sniff.trace import TraceWriter  # noqa: PLC0415
 
@@ -73,7 +77,7 @@ def serve(
     line.taps.append(traffic)
     clock = WallClock()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the link goes, the record is whole
-    with PtyServer(line, clock, pace=pace, link=link) as server:
+    with raised_priority(), PtyServer(line, clock, pace=pace, link=link) as server:
         out = record.open("w", encoding="utf-8") if record is not None else None
         if out is not None:
             line.taps.append(TraceWriter(out))
@@ -86,6 +90,11 @@ def serve(
         finally:
             if out is not None:
                 out.close()
+        late_share = server.missed_s / max(clock.now_s() * pace, 1e-9)
+        if late_share > LATE_SHARE and not as_json:
+            LOGGER.warning(
+                "time ran %.0f %% slower than --pace: this machine is too slow", late_share * 100
+            )
     if as_json:
         done = {"questions": traffic.questions, "answers": traffic.answers, "bytes": traffic.bytes}
         rest = {"missed_s": server.missed_s, "servos": traffic.registers()}
