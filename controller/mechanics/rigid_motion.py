@@ -16,6 +16,7 @@ from snakewalk.drivers.least_squares import solve_positive_definite
 
 _STILL_M_S = 1e-4  # smooths the kink of |v| at rest
 _STEPS = 50
+_ROUNDING = 1e-14
 _NONE = np.zeros((3, 3))
 
 
@@ -158,7 +159,7 @@ def _solved(
     """``balance`` of arrays of any layout."""
     return balance(
         np.ascontiguousarray(points_m, dtype=float),
-        np.ascontiguousarray(headings_rad, dtype=float),
+        np.stack([np.cos(headings_rad), np.sin(headings_rad)], axis=-1),
         np.ascontiguousarray(shape_m_s, dtype=float),
         friction.along,
         friction.across,
@@ -170,48 +171,75 @@ def _solved(
 
 
 @compiled(
-    "float64(float64[:, ::1], float64[:, ::1], float64, float64[::1], float64[:, ::1],"
-    " float64[::1])"
+    "UniTuple(float64, 2)(float64[:, ::1], float64, float64[::1], float64[:, ::1], float64[::1],"
+    " float64[::1], float64[:, ::1])"
 )
 def _power(
-    rows: Floats, start: Floats, still: float, linear: Floats, quadratic: Floats, w: Floats
-) -> float:
-    """Power that all links dissipate, less gravity's; arguments as in ``balance``."""
-    power = 0.0
+    slides: Floats,
+    still: float,
+    linear: Floats,
+    quadratic: Floats,
+    w: Floats,
+    gradient: Floats,
+    hessian: Floats,
+) -> tuple[float, float]:
+    """Power that all links dissipate, less gravity's; and what they would if the shape stood still.
+
+    Args:
+        slides: (L, 14) of each link, weighted: how its velocity along and across itself grow with
+            (vx, vy, omega), three numbers each; what the change of the shape makes of the two; and
+            the lower triangle of the product of what comes first with its transpose.
+        still: as ``_STILL_M_S``, weighted.
+        linear: as in ``balance``.
+        quadratic: likewise.
+        w: (3,) where.
+        gradient: (3,) written.
+        hessian: (3, 3) its lower triangle is written.
+
+    """
+    x, y, turn = w[0], w[1], w[2]
+    power = rigid = 0.0
+    g0, g1, g2 = -linear[0], -linear[1], -linear[2]
+    h00, h10, h11 = quadratic[0, 0], quadratic[1, 0], quadratic[1, 1]
+    h20, h21, h22 = quadratic[2, 0], quadratic[2, 1], quadratic[2, 2]
+    for k in range(len(slides)):
+        link = slides[k]
+        u = link[0] * x + link[1] * y + link[2] * turn
+        v = link[3] * x + link[4] * y + link[5] * turn
+        rigid += np.sqrt(u * u + v * v)
+        u, v = u + link[6], v + link[7]
+        size = np.sqrt(u * u + v * v + still * still)
+        power += size
+        inverse = 1.0 / size
+        u, v = u * inverse, v * inverse
+        d0 = u * link[0] + v * link[3]
+        d1 = u * link[1] + v * link[4]
+        d2 = u * link[2] + v * link[5]
+        g0, g1, g2 = g0 + d0, g1 + d1, g2 + d2
+        h00 += (link[8] - d0 * d0) * inverse
+        h10 += (link[9] - d1 * d0) * inverse
+        h11 += (link[10] - d1 * d1) * inverse
+        h20 += (link[11] - d2 * d0) * inverse
+        h21 += (link[12] - d2 * d1) * inverse
+        h22 += (link[13] - d2 * d2) * inverse
+    hessian[0, 0], hessian[1, 0], hessian[1, 1] = h00, h10, h11
+    hessian[2, 0], hessian[2, 1], hessian[2, 2] = h20, h21, h22
+    gradient[0], gradient[1], gradient[2] = g0, g1, g2
     for i in range(3):
         power -= linear[i] * w[i]
         for j in range(3):
+            gradient[i] += quadratic[i, j] * w[j]
             power += 0.5 * quadratic[i, j] * w[i] * w[j]
-    for k in range(len(start)):
-        u, v = start[k, 0], start[k, 1]
-        for i in range(3):
-            u += rows[2 * k, i] * w[i]
-            v += rows[2 * k + 1, i] * w[i]
-        power += np.sqrt(u * u + v * v + still * still)
-    return power
-
-
-@compiled("boolean(float64[:, ::1], float64[::1], float64[::1])")
-def _is_unbounded(rows: Floats, linear: Floats, w: Floats) -> bool:
-    """Whether gravity outdoes friction ever faster in the direction ``w``: no minimum."""
-    power = 0.0
-    for k in range(len(rows) // 2):
-        u, v = 0.0, 0.0
-        for i in range(3):
-            u += rows[2 * k, i] * w[i]
-            v += rows[2 * k + 1, i] * w[i]
-        power += np.sqrt(u * u + v * v)
-    gain = linear[0] * w[0] + linear[1] * w[1] + linear[2] * w[2]
-    return bool(power < (1.0 - 1e-9) * gain)
+    return power, rigid
 
 
 @compiled(
-    "boolean(float64[:, ::1], float64[::1], float64[:, ::1], float64, float64, float64[::1],"
+    "boolean(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, float64, float64[::1],"
     " float64[::1], float64[:, ::1], float64[::1])"
 )
 def balance(
     points_m: Floats,
-    headings_rad: Floats,
+    forward: Floats,
     shape_m_s: Floats,
     along: float,
     across: float,
@@ -222,67 +250,52 @@ def balance(
 ) -> bool:
     """Newton's method on the power, from ``w`` (3,) on, which is written; whether it has a minimum.
 
-    ``linear`` (3,) is gravity's power per (vx, vy, omega), ``quadratic`` (3, 3) that of inertia.
+    ``forward`` (L, 2) are unit vectors along the links; ``linear`` (3,) is gravity's power per (vx,
+    vy, omega), ``quadratic`` (3, 3) that of inertia.
     """
     links = len(points_m)
-    # weighted along and across velocity of each link as a linear map of (vx, vy, omega)
-    rows, start = np.empty((2 * links, 3)), np.empty((links, 2))
+    slides = np.empty((links, 14))
     for k in range(links):
-        c, s = np.cos(headings_rad[k]), np.sin(headings_rad[k])
+        link = slides[k]
+        c, s = forward[k, 0], forward[k, 1]
         x, y = points_m[k, 0], points_m[k, 1]
-        along_k, across_k = along * normal[k], across * normal[k]
-        rows[2 * k, 0], rows[2 * k, 1], rows[2 * k, 2] = (
-            c * along_k,
-            s * along_k,
-            (s * x - c * y) * along_k,
-        )
-        rows[2 * k + 1, 0], rows[2 * k + 1, 1] = -s * across_k, c * across_k
-        rows[2 * k + 1, 2] = (c * x + s * y) * across_k
         u, v = shape_m_s[k, 0], shape_m_s[k, 1]
-        start[k, 0], start[k, 1] = (c * u + s * v) * along_k, (c * v - s * u) * across_k
-    still = _STILL_M_S * across
-    gradient, step, direction, trial = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    hessian = np.empty((3, 3))
-    may_slide = not quadratic.any() and (linear[0] != 0.0 or linear[1] != 0.0 or linear[2] != 0.0)
-    best = _power(rows, start, still, linear, quadratic, w)
-    for _ in range(_STEPS):
+        along_k, across_k = along * normal[k], across * normal[k]
+        link[0], link[1], link[2] = c * along_k, s * along_k, (s * x - c * y) * along_k
+        link[3], link[4], link[5] = -s * across_k, c * across_k, (c * x + s * y) * across_k
+        link[6], link[7] = (c * u + s * v) * along_k, (c * v - s * u) * across_k
+        at = 8
         for i in range(3):
-            gradient[i] = (
-                quadratic[i, 0] * w[0] + quadratic[i, 1] * w[1] + quadratic[i, 2] * w[2] - linear[i]
-            )
-        hessian[:] = quadratic
-        for k in range(links):
-            u, v = start[k, 0], start[k, 1]
-            for i in range(3):
-                u += rows[2 * k, i] * w[i]
-                v += rows[2 * k + 1, i] * w[i]
-            size = np.sqrt(u * u + v * v + still * still)
-            for i in range(3):
-                direction[i] = (u * rows[2 * k, i] + v * rows[2 * k + 1, i]) / size
-                gradient[i] += direction[i]
-            for i in range(3):
-                for j in range(i + 1):
-                    stiff = rows[2 * k, i] * rows[2 * k, j]
-                    stiff += rows[2 * k + 1, i] * rows[2 * k + 1, j]
-                    hessian[i, j] += (stiff - direction[i] * direction[j]) / size
+            for j in range(i + 1):
+                link[at] = link[i] * link[j] + link[3 + i] * link[3 + j]
+                at += 1
+    still = _STILL_M_S * across
+    work = np.empty((6, 3))
+    gradient, step, trial, hessian = work[0], work[1], work[2], work[3:]
+    may_slide = not quadratic.any() and (linear[0] != 0.0 or linear[1] != 0.0 or linear[2] != 0.0)
+    best, _ = _power(slides, still, linear, quadratic, w, gradient, hessian)
+    for _ in range(_STEPS):
         steepest = max(abs(gradient[0]), abs(gradient[1]), abs(gradient[2]))
         if steepest < 1e-9 * links * across:
             break
         for i in range(3):
             hessian[i, i] += 1e-9
-        solve_positive_definite(hessian, -gradient, step)
-        slope = gradient[0] * step[0] + gradient[1] * step[1] + gradient[2] * step[2]
-        scale = 1.0
-        trial[:] = w + step
-        now = _power(rows, start, still, linear, quadratic, trial)
-        while now > best + 1e-4 * scale * slope and scale > 1e-9:
+        solve_positive_definite(hessian, gradient, step)
+        fall = gradient[0] * step[0] + gradient[1] * step[1] + gradient[2] * step[2]
+        if fall < _ROUNDING * abs(best):  # no power could tell whether a step is a better one
+            w[:] = w - step
+            break
+        now, scale = np.inf, 2.0
+        while now > best - 1e-4 * scale * fall and scale > 1e-9:
             scale *= 0.5
-            trial[:] = w + scale * step
-            now = _power(rows, start, still, linear, quadratic, trial)
+            for i in range(3):
+                trial[i] = w[i] - scale * step[i]
+            now, rigid = _power(slides, still, linear, quadratic, trial, gradient, hessian)
         if now >= best:
             break
         w[:] = trial
         best = now
-        if may_slide and _is_unbounded(rows, linear, w):
-            return False
+        gain = linear[0] * w[0] + linear[1] * w[1] + linear[2] * w[2]
+        if may_slide and rigid < (1.0 - 1e-9) * gain:
+            return False  # gravity outdoes friction ever faster in this direction
     return True

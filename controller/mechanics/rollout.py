@@ -7,6 +7,7 @@ except where nothing holds the body and it slides with inertia.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,8 @@ _BACK, _FORTH = 5, 40
 """Points of the path among which a place is looked for after a step."""
 _AHEAD = 30
 """Points of the path from the centre to where its direction is compared."""
+_STATE = 10
+"""Numbers of a body between two steps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +106,10 @@ class Rollout:
         field = ground or HeightField(np.zeros((2, 2)), 1.0, 0.0, 0.0)
         self._field = np.ascontiguousarray(field.z_m), field.x0_m, field.y0_m, field.spacing_m
         retarget = Retarget(robot, points)
-        self._edges, self._group = retarget.edges, retarget.group_of_link
+        shares = half_lengths_m(robot), link_weights(robot)
+        self._links = (*shares, retarget.edges, retarget.group_of_link)
         self.segment_m = robot.length_m / points
         """Length of a segment."""
-        self._half_m, self._weight = half_lengths_m(robot), link_weights(robot)
         self._body = np.array(
             [
                 friction.along,
@@ -115,43 +118,84 @@ class Rollout:
             ]
         )
 
-    def __call__(
+    def begin(
         self,
         samples_rad: Floats,
-        pieces_rad: Floats,
         head: float,
         start: PlanarPose,
         path: PathTable,
         path_at: int,
         cruise_segments_s: float,
         drift: Drift,
-        until: float | None = None,
-    ) -> Rolled:
-        """Roll a body out over each piece.
+    ) -> "RolloutTree":
+        """Where every rollout of a decision begins.
 
         Args:
             samples_rad: (M,) of the track, from at least a body before ``head``.
-            pieces_rad: (C, n) that would be appended.
             head: segments from the first sample to where the head is.
             start: where the body is.
             path: to measure by.
             path_at: index of its point nearest to the centre.
             cruise_segments_s: wanted speed of the pulse; joints at their speed limit slow it.
             drift: added to the balance.
-            until: where the head ends; None is the end of the pieces.
+
+        """
+        given = (
+            *(np.array([*start.centre_m, start.offset_rad]), *self._field, *self._links),
+            *(self._body, path.points_m, path_at, cruise_segments_s),
+            np.array([drift.ahead_m, drift.left_m, drift.turn_rad]),
+        )
+        return RolloutTree(samples_rad, head, len(self._links[0]), given)
+
+
+class RolloutTree:
+    """Rollouts from one pose on one track: what pieces have in common is rolled out once."""
+
+    def __init__(
+        self, samples_rad: Floats, head: float, links: int, given: tuple[Any, ...]
+    ) -> None:
+        """Of ``Rollout.begin``; ``given`` are arguments of ``_roll``."""
+        self._samples, self._head, self._given = samples_rad, head, given
+        self._count = 0
+        self._pieces = np.empty((0, 0))
+        self._states, self._moving = np.empty((0, 0, _STATE)), np.empty((0, 0, links, 2))
+
+    def roll(self, pieces_rad: Floats, pulse: float | None = None) -> Rolled:
+        """Roll a body out over each piece.
+
+        Args:
+            pieces_rad: (C, n) that would be appended.
+            pulse: segments that the head travels; None is to the end of the pieces.
 
         """
         count, length = pieces_rad.shape
-        pulse = (len(samples_rad) + length if until is None else until) - head
+        if pulse is None:
+            pulse = len(self._samples) + length - self._head
         steps = max(1, round(pulse / _STEP_SEGMENTS))
+        before = self._make_room(count, length, steps)
+        self._pieces[before : self._count] = pieces_rad
         out = np.empty((count, 9))
         _roll(
-            samples_rad, np.ascontiguousarray(pieces_rad), head, steps, pulse / steps,
-            np.array([*start.centre_m, start.offset_rad]), *self._field, self._edges, self._group,
-            self._half_m, self._weight, self._body, path.points_m, path_at, cruise_segments_s,
-            np.array([drift.ahead_m, drift.left_m, drift.turn_rad]), out,
-        )  # fmt: skip
+            *(self._samples, self._pieces[: self._count], before, self._head, pulse / steps),
+            *(*self._given, self._states, self._moving, out),
+        )
         return Rolled(out[:, :2], *out.T[2:])
+
+    def _make_room(self, count: int, length: int, steps: int) -> int:
+        """Make room for so many more pieces; the place of the first."""
+        if (length, steps + 1) != (self._pieces.shape[1], self._states.shape[1]):
+            self._count = 0
+        before = self._count
+        self._count += count
+        if before == 0 or self._count > len(self._pieces):
+            room, links = 2 * self._count, self._moving.shape[2]
+            pieces, states = np.empty((room, length)), np.empty((room, steps + 1, _STATE))
+            moving = np.empty((room, steps + 1, links, 2))
+            if before > 0:
+                pieces[:before], states[:before] = self._pieces[:before], self._states[:before]
+                moving[:before] = self._moving[:before]
+            self._pieces, self._states, self._moving = pieces, states, moving
+        return before
 
 
 @compiled("float64(float64[::1], float64[::1], float64)")
@@ -178,10 +222,11 @@ def _lay(
     groups: Floats,
 ) -> None:
     """Write headings of the links and their centres about that of mass, in the track's frame."""
+    ahead = _area(total, track, head - edges[0])
     for g in range(len(groups)):
-        width = edges[g + 1] - edges[g]
-        ahead = _area(total, track, head - edges[g])
-        groups[g] = (ahead - _area(total, track, head - edges[g + 1])) / width
+        behind = _area(total, track, head - edges[g + 1])
+        groups[g] = (ahead - behind) / (edges[g + 1] - edges[g])
+        ahead = behind
     x = y = sum_x = sum_y = whole = 0.0
     links = len(headings)
     for i in range(links):
@@ -216,7 +261,7 @@ def _nearest(path: Floats, at: int, x: float, y: float) -> tuple[float, float]:
 
 @compiled(
     "float64(float64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64, float64,"
-    " float64[::1], float64[:, ::1], float64[:, ::1])"
+    " float64[:, ::1], float64[:, ::1], float64[:, ::1])"
 )
 def _turned(
     here_rad: Floats,
@@ -225,20 +270,21 @@ def _turned(
     next_m: Floats,
     offset_rad: float,
     step_s: float,
-    headings: Floats,
+    forward: Floats,
     points: Floats,
     shape: Floats,
 ) -> float:
     """Write the body between two steps in the world, and how its links move; its mean heading."""
     c, s = np.cos(offset_rad), np.sin(offset_rad)
-    mean, links = 0.0, len(headings)
+    mean, links = 0.0, len(forward)
     for i in range(links):
         x, y = 0.5 * (here_m[i, 0] + next_m[i, 0]), 0.5 * (here_m[i, 1] + next_m[i, 1])
         points[i, 0], points[i, 1] = c * x - s * y, s * x + c * y
         x, y = (next_m[i, 0] - here_m[i, 0]) / step_s, (next_m[i, 1] - here_m[i, 1]) / step_s
         shape[i, 0], shape[i, 1] = c * x - s * y, s * x + c * y
-        headings[i] = offset_rad + 0.5 * (here_rad[i] + next_rad[i])
-        mean += headings[i] / links
+        heading = offset_rad + 0.5 * (here_rad[i] + next_rad[i])
+        forward[i, 0], forward[i, 1] = np.cos(heading), np.sin(heading)
+        mean += heading / links
     return float(mean)
 
 
@@ -282,65 +328,171 @@ def _pull(
 
 
 @compiled(
-    f"void({readonly_array(layout='C')}, float64[:, ::1], float64, int64, float64, float64[::1],"
-    f" {FIELD}, float64[::1], int64[::1], {readonly_array()}, {readonly_array()}, float64[::1],"
-    " float64[:, ::1], int64, float64, float64[::1], float64[:, ::1])"
+    "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1],"
+    " float64[::1], float64, float64[:, ::1], float64[::1])"
+)
+def _slide(
+    points: Floats,
+    forward: Floats,
+    shape: Floats,
+    body: Floats,
+    normal: Floats,
+    linear: Floats,
+    step_s: float,
+    moving: Floats,
+    velocity: Floats,
+) -> None:
+    """Balance friction, with inertia where nothing holds the body; write how body and links move.
+
+    ``velocity`` (3,) and ``moving`` (L, 2) are those of the step before.
+    """
+    quadratic = np.zeros((3, 3))
+    held = balance(points, forward, shape, body[0], body[1], normal, linear, quadratic, velocity)
+    if not held:
+        add_inertia(points, shape, moving, step_s, linear, quadratic)
+        balance(points, forward, shape, body[0], body[1], normal, linear, quadratic, velocity)
+    for i in range(len(points)):
+        moving[i, 0] = shape[i, 0] + velocity[0] - velocity[2] * points[i, 1]
+        moving[i, 1] = shape[i, 1] + velocity[1] + velocity[2] * points[i, 0]
+
+
+@compiled(
+    "void(float64[::1], int64, float64[::1], float64[:, ::1], float64[:, ::1], int64, float64[::1])"
+)
+def _write_result(
+    state: Floats,
+    steps: int,
+    headings: Floats,
+    points: Floats,
+    path: Floats,
+    path_at: int,
+    row: Floats,
+) -> None:
+    """Write the columns of ``Rolled`` (9,) from the state (10,) after all steps."""
+    x, y, phi, place = state[0], state[1], state[2], state[3]
+    k = min(int(place) + _AHEAD, len(path) - 2)
+    error = phi + headings.mean()
+    error -= np.arctan2(path[k + 1, 1] - path[k, 1], path[k + 1, 0] - path[k, 0])
+    head_x = x + np.cos(phi) * points[0, 0] - np.sin(phi) * points[0, 1]
+    head_y = y + np.sin(phi) * points[0, 0] + np.cos(phi) * points[0, 1]
+    row[0], row[1], row[2] = x, y, phi
+    row[3], row[4] = np.sqrt(state[5] / steps), state[4]
+    row[5] = _nearest(path, k, head_x, head_y)[1]
+    row[6] = error - 2.0 * np.pi * np.floor(error / (2.0 * np.pi) + 0.5)
+    row[7], row[8] = PATH_STEP_M * (place - path_at), state[6]
+
+
+@compiled("UniTuple(int64, 2)(float64[:, ::1], int64)")
+def _alike(pieces: Floats, piece: int) -> tuple[int, int]:
+    """Which earlier piece begins like a piece for longest, and for how many samples; -1 is none.
+
+    Of several that do for as long it is the first: what that shares with others is known of it.
+    """
+    best, longest = -1, -1
+    for other in range(piece):
+        same = 0
+        while same < pieces.shape[1] and pieces[other, same] == pieces[piece, same]:
+            same += 1
+        if same > longest:
+            best, longest = other, same
+    return best, longest
+
+
+@compiled(
+    f"void({readonly_array(layout='C')}, float64[:, ::1], int64, float64, float64, float64[::1],"
+    f" {FIELD}, {readonly_array()}, {readonly_array()}, float64[::1], int64[::1], float64[::1],"
+    " float64[:, ::1], int64, float64, float64[::1], float64[:, :, ::1], float64[:, :, :, ::1],"
+    " float64[:, ::1])"
 )
 def _roll(
     samples: Floats,
     pieces: Floats,
+    before: int,
     head: float,
-    steps: int,
     step: float,
     start: Floats,
     z_m: Floats,
     x0: float,
     y0: float,
     spacing: float,
-    edges: Floats,
-    group: Ints,
     half_m: Floats,
     weight: Floats,
+    edges: Floats,
+    group: Ints,
     body: Floats,
     path: Floats,
     path_at: int,
     cruise: float,
     drift: Floats,
+    states: Floats,
+    movings: Floats,
     out: Floats,
 ) -> None:
-    """Roll out pieces (C, n); ``out`` (C, 9) are the columns of ``Rolled``."""
-    along, across, limit = body[0], body[1], body[2]
-    known, new, links = len(samples), pieces.shape[1], len(group)
+    """Roll out pieces (P, n) from number ``before`` on; ``out`` (C, 9) are columns of ``Rolled``.
+
+    Args:
+        samples: as in ``Rollout.begin``, and so on.
+        pieces: those before, too.
+        before: how many have been rolled out before.
+        head: place on the track.
+        step: of the head.
+        start: (3,) place of the body, and turn of the track.
+        z_m: the ground.
+        x0: its corner.
+        y0: likewise.
+        spacing: of its samples.
+        half_m: (L,) half lengths of the links.
+        weight: (L,)
+        edges: of the groups of links.
+        group: (L,) of each link.
+        body: (3,) friction along and across; speed limit of the joints.
+        path: (m, 2) points.
+        path_at: place on it.
+        cruise: wanted segments a second.
+        drift: (3,) added to each step.
+        states: (P, steps + 1, 10) of each piece before each step, and at its end: the body's place
+            (2) and turn, place on the path, distance from it, sum of its squares, time, velocity
+            (3).
+        movings: (P, steps + 1, L, 2) velocities of the links; kept as ``states`` are.
+        out: written.
+
+    """
+    known, new, links, steps = len(samples), pieces.shape[1], len(group), states.shape[1] - 1
     track, total = np.empty(known + new), np.zeros(known + new + 1)
     here_g, next_g = np.empty(len(edges) - 1), np.empty(len(edges) - 1)
-    here_h, next_h, heading = np.empty(links), np.empty(links), np.empty(links)
+    here_h, next_h = np.empty(links), np.empty(links)
     here_p, next_p, points = np.empty((links, 2)), np.empty((links, 2)), np.empty((links, 2))
     shape, moving, normal = np.empty((links, 2)), np.empty((links, 2)), weight.copy()
-    linear, velocity = np.empty(3), np.empty(3)
-    inertia, none = np.empty((3, 3)), np.zeros((3, 3))
+    forward, velocity, linear = np.empty((links, 2)), np.empty(3), np.empty(3)
     level = z_m.min() == z_m.max()
-    for c in range(len(pieces)):
-        track[:known], track[known:] = samples, pieces[c]
+    track[:known] = samples
+    for c in range(before, len(pieces)):
+        track[known:] = pieces[c]
         for k in range(known + new):
             total[k + 1] = total[k] + track[k]
-        x, y, phi = start[0], start[1], start[2]
-        at, place, off, square, time = head, float(path_at), 0.0, 0.0, 0.0
-        velocity[:], moving[:] = 0.0, 0.0
+        at, begin = head, 0
+        like, same = _alike(pieces, c)
+        if like < 0:
+            states[c, 0, :3], states[c, 0, 3], states[c, 0, 4:] = start, path_at, 0.0
+            movings[c, 0] = 0.0
+        else:
+            while begin < steps and at + step <= known + same:
+                at, begin = at + step, begin + 1
+            states[c, begin], movings[c, begin] = states[like, begin], movings[like, begin]
+        state = states[c, begin]
+        x, y, phi = state[0], state[1], state[2]
+        place, off, square, time = state[3], state[4], state[5], state[6]
+        velocity[:], moving[:] = state[7:], movings[c, begin]
         _lay(total, track, at, edges, group, half_m, weight, here_h, here_p, here_g)
-        for _ in range(steps):
+        for n in range(begin, steps):
             at += step
             _lay(total, track, at, edges, group, half_m, weight, next_h, next_p, next_g)
-            dt = step / _pulse_rate(here_g, next_g, step, cruise, limit)
-            mean = _turned(here_h, here_p, next_h, next_p, phi, dt, heading, points, shape)
+            dt = step / _pulse_rate(here_g, next_g, step, cruise, body[2])
+            mean = _turned(here_h, here_p, next_h, next_p, phi, dt, forward, points, shape)
             linear[:] = 0.0
             if not level:
                 _pull(z_m, x0, y0, spacing, x, y, points, weight, normal, linear)
-            if not balance(points, heading, shape, along, across, normal, linear, none, velocity):
-                add_inertia(points, shape, moving, dt, linear, inertia)
-                balance(points, heading, shape, along, across, normal, linear, inertia, velocity)
-            for i in range(links):
-                moving[i, 0] = shape[i, 0] + velocity[0] - velocity[2] * points[i, 1]
-                moving[i, 1] = shape[i, 1] + velocity[1] + velocity[2] * points[i, 0]
+            _slide(points, forward, shape, body, normal, linear, dt, moving, velocity)
             ahead, left = step * np.cos(mean), step * np.sin(mean)
             x += velocity[0] * dt + ahead * drift[0] - left * drift[1]
             y += velocity[1] * dt + left * drift[0] + ahead * drift[1]
@@ -351,13 +503,8 @@ def _roll(
             here_g, next_g = next_g, here_g
             place, off = _nearest(path, int(place), x, y)
             square += off * off
-        k = min(int(place) + _AHEAD, len(path) - 2)
-        error = phi + here_h.mean()
-        error -= np.arctan2(path[k + 1, 1] - path[k, 1], path[k + 1, 0] - path[k, 0])
-        head_x = x + np.cos(phi) * here_p[0, 0] - np.sin(phi) * here_p[0, 1]
-        head_y = y + np.sin(phi) * here_p[0, 0] + np.cos(phi) * here_p[0, 1]
-        out[c, 0], out[c, 1], out[c, 2] = x, y, phi
-        out[c, 3], out[c, 4] = np.sqrt(square / steps), off
-        out[c, 5] = _nearest(path, k, head_x, head_y)[1]
-        out[c, 6] = error - 2.0 * np.pi * np.floor(error / (2.0 * np.pi) + 0.5)
-        out[c, 7], out[c, 8] = PATH_STEP_M * (place - path_at), time
+            state, movings[c, n + 1] = states[c, n + 1], moving
+            state[0], state[1], state[2] = x, y, phi
+            state[3], state[4], state[5], state[6] = place, off, square, time
+            state[7:] = velocity
+        _write_result(state, steps, here_h, here_p, path, path_at, out[c - before])

@@ -11,7 +11,14 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.rotations import wrap
-from snakewalk.controller.mechanics.rollout import Drift, PathTable, PlanarPose, Rolled, Rollout
+from snakewalk.controller.mechanics.rollout import (
+    Drift,
+    PathTable,
+    PlanarPose,
+    Rolled,
+    Rollout,
+    RolloutTree,
+)
 from snakewalk.controller.walk.angle_track import AngleTrack
 
 
@@ -68,12 +75,14 @@ class Steering:
         self._cruise = cruise_segments_s
         self._weights = SteeringWeights()
         self._past: deque[PathPose] = deque()
+        self._tree: RolloutTree | None = None
+        self._tree_of: PathPose | None = None
         self.drift = Drift()
         """Identified so far."""
 
     def observe(self, pose: PathPose) -> None:
         """Compare what the body did over the last span of pulse with its prediction."""
-        past = self._past
+        past, self._tree = self._past, None
         past.append(pose)
         while len(past) > 2 and past[1].head <= pose.head - _SPAN_SEGMENTS:
             past.popleft()
@@ -81,7 +90,7 @@ class Steering:
         pulse = pose.head - before.head
         if pulse < 0.5 * _SPAN_SEGMENTS:
             return
-        made = self._roll(before, np.empty((1, 0)), Drift(), until=pose.head)
+        made = self._begin(before, Drift()).roll(np.empty((1, 0)), pulse)
         gap_m = pose.centre_m - made.centre_m[0]
         mean = pose.offset_rad + float(self._track.body_rad(pose.head).mean())
         c, s = np.cos(mean), np.sin(mean)
@@ -93,8 +102,13 @@ class Steering:
         )
 
     def roll_out(self, pose: PathPose, pieces_rad: Floats) -> Rolled:
-        """What becomes of the body on pieces (C, n) that would be appended to the track."""
-        return self._roll(pose, pieces_rad, self.drift)
+        """What becomes of the body on pieces (C, n) that would be appended to the track.
+
+        What pieces have in common is rolled out once for a pose, until another one is observed.
+        """
+        if self._tree is None or self._tree_of is not pose:
+            self._tree, self._tree_of = self._begin(pose, self.drift), pose
+        return self._tree.roll(pieces_rad)
 
     def forget(self) -> None:
         """Leave out what came before: the body has moved otherwise than by its track."""
@@ -119,18 +133,14 @@ class Steering:
         )
         return np.asarray(cost), np.asarray(progress)
 
-    def _roll(
-        self, pose: PathPose, pieces_rad: Floats, drift: Drift, until: float | None = None
-    ) -> Rolled:
-        start = max(int(pose.head) - self._track.points - 1, 0)
-        return self._rollout(
-            self._track.samples(start),
-            pieces_rad,
-            pose.head - start,
+    def _begin(self, pose: PathPose, drift: Drift) -> RolloutTree:
+        first = max(int(pose.head) - self._track.points - 1, 0)
+        return self._rollout.begin(
+            self._track.samples(first),
+            pose.head - first,
             PlanarPose(pose.centre_m, pose.offset_rad),
             pose.path,
             pose.path_at,
             self._cruise,
             drift,
-            None if until is None else until - start,
         )

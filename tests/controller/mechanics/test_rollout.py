@@ -1,5 +1,7 @@
 """Rollouts: what they predict of bodies whose motion is known in closed form or by the forecast."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -43,7 +45,8 @@ def roll(
     start: PlanarPose = START,
 ) -> Rolled:
     known = sine(0, 102) if samples is None else samples
-    return rollout(known, pieces, 101.0, start, STRAIGHT, 0, 25.0, drift or Drift())
+    tree = rollout.begin(known, 101.0, start, STRAIGHT, 0, 25.0, drift or Drift())
+    return tree.roll(pieces)
 
 
 def rollout(ground: HeightField | None = None, friction: FrictionConfig = SNAKE) -> Rollout:
@@ -92,6 +95,28 @@ def test_pieces_do_not_influence_each_other_and_rolling_twice_is_the_same() -> N
         alone = roll(rollout(plane(0.05, 0.1)), pieces[k : k + 1])
         assert alone.centre_m[0].tobytes() == together.centre_m[k].tobytes()
         assert alone.heading_rad[0] == together.heading_rad[k]
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.1, 0.8])  # on the last a body slides with inertia
+def test_pieces_that_begin_alike_are_rolled_out_apart_as_each_alone(slope: float) -> None:
+    ground, start = rollout(plane(slope, 0.3 * slope)), (101.0, START, STRAIGHT, 0, 25.0, Drift())
+    rng, pieces = np.random.default_rng(1), [sine(102, 80)]
+    for _ in range(14):  # a tree of pieces: each leaves an earlier one somewhere
+        piece, at = pieces[rng.integers(len(pieces))].copy(), rng.integers(80)
+        piece[at:] += rng.uniform(-0.01, 0.01) * np.arange(80 - at)
+        pieces.append(piece)
+    pieces.append(pieces[3])
+    together = ground.begin(sine(0, 102), *start)
+    for batch in np.split(np.array(pieces), 4):
+        rolled = together.roll(batch)
+        for k, piece in enumerate(batch):
+            alone = ground.begin(sine(0, 102), *start).roll(piece[None])
+            for one, all_of_it in zip(vars_of(alone), vars_of(rolled), strict=True):
+                assert one[0].tobytes() == all_of_it[k].tobytes()
+
+
+def vars_of(rolled: Rolled) -> list[np.ndarray]:
+    return [getattr(rolled, field.name) for field in fields(rolled)]
 
 
 def test_a_side_slope_carries_the_body_down_and_a_climb_slows_it() -> None:
@@ -157,10 +182,9 @@ def test_a_path_goes_on_straight_beyond_its_end() -> None:
 def test_links_spelt_out_roll_the_same_to_the_digit() -> None:
     slope = plane(0.1, 0.05)
     one, other = (
-        Rollout(robot, SNAKE, slope, 100)(sine(0, 102), sine(102, 40)[None], 101.0, START, STRAIGHT,
-                                          0, 25.0, Drift())
+        roll(Rollout(robot, SNAKE, slope, 100), sine(102, 40)[None])
         for robot in (ROBOT, spelt_out(ROBOT))
-    )  # fmt: skip
+    )
     np.testing.assert_array_equal(one.centre_m, other.centre_m)
     np.testing.assert_array_equal(one.offset_rad, other.offset_rad)
 

@@ -8,7 +8,13 @@ from hypothesis import strategies as st
 from snakewalk.config.loader import load_robot
 from snakewalk.config.run import WalkConfig
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.mechanics.rollout import PATH_STEP_M, PathTable, Rollout
+from snakewalk.controller.mechanics.rollout import (
+    PATH_STEP_M,
+    Drift,
+    PathTable,
+    PlanarPose,
+    Rollout,
+)
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker
 from snakewalk.controller.walk.serpenoid import SERPENOID
@@ -114,10 +120,10 @@ def test_the_drift_is_what_the_body_does_beside_the_prediction() -> None:
     left_m = 0.0005
     for k in range(30):  # a body that slides to its left by half a millimetre a segment
         head = 150.0 + 10.0 * k
-        before = steering._roll(
-            PathPose(150.0, 0.0, np.zeros(2), 0.0, STRAIGHT, 0), np.empty((1, 0)),
-            type(steering.drift)(left_m=left_m), until=head,
-        ) if k else None  # fmt: skip
+        before = ROLLOUT.begin(
+            track.samples(0), 150.0, PlanarPose(np.zeros(2), 0.0), STRAIGHT, 0, 25.0,
+            Drift(left_m=left_m),
+        ).roll(np.empty((1, 0)), head - 150.0) if k else None  # fmt: skip
         centre = np.zeros(2) if before is None else before.centre_m[0]
         offset = 0.0 if before is None else float(before.offset_rad[0])
         steering.observe(PathPose(head, offset, centre, 0.0, STRAIGHT, 0))
