@@ -57,8 +57,7 @@ class JointTrack:
         """Take in what was appended to the track; true if anything was."""
         if self.track.end == self.last:
             return False
-        heads = range(self.last + 1, self.track.end + 1)
-        bodies = np.stack([self.track.body_rad(float(head)) for head in heads])
+        bodies = self.track.bodies_rad(self.last + 1, self.track.end)
         self._q = np.concatenate([self._q, self._joints_of(bodies)])
         return True
 
