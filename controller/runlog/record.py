@@ -1,6 +1,6 @@
 """A run as its log tells it: one table a topic, rows in order of time, NaN where nothing is known.
 
-T, S, P, W count the rows of a topic; J joints, L links.
+T, S, H, P, W count the rows of a topic; J joints, L links.
 """
 
 from collections.abc import Mapping
@@ -136,6 +136,18 @@ class SlowTable:
 
 
 @dataclass(frozen=True, slots=True)
+class ShadowTable:
+    """What a simulated chain answered to the same goals; no rows where none ran beside."""
+
+    time_s: Floats
+    """(H,) those of the cycles"""
+    position_rad: Floats
+    """(H, J)"""
+    current_a: Floats
+    """(H, J)"""
+
+
+@dataclass(frozen=True, slots=True)
 class PoseTable:
     """Where the body was."""
 
@@ -211,6 +223,7 @@ class RunRecord:
     pose: PoseTable
     walk: WalkTable
     qpos: QposTable
+    shadow: ShadowTable
     paths: tuple[tuple[float, Floats], ...]
     """Paths in force from a time on; the first is the plan's, at 0."""
     events: tuple[Event, ...]

@@ -66,6 +66,11 @@ TOPICS: Final[dict[str, Json]] = {
         "voltage_v": _list("(J,)"),
         "hardware_error": _list("(J,) register 70", "integer"),
     },
+    "/shadow": {
+        "time_s": _TIME,
+        "position_rad": _list("(J,) of a simulated chain that gets the same goals"),
+        "current_a": _list("(J,) of it"),
+    },
     "/pose": {
         "time_s": _TIME,
         "head_m": _list("(3,) centre of the head link in the world"),

@@ -19,6 +19,7 @@ from snakewalk.controller.runlog.record import (
     PoseTable,
     QposTable,
     RunRecord,
+    ShadowTable,
     SlowTable,
     WalkTable,
     Winding,
@@ -50,6 +51,7 @@ def record_of(
         pose=_pose(rows.get("/pose", ()), header.robot.link_count),
         walk=_walk(rows.get("/walk", ())),
         qpos=_qpos(rows.get("/qpos", ())),
+        shadow=_shadow(rows.get("/shadow", ()), joints),
         paths=((0.0, header.plan.path_m), *replanned),
         events=tuple(
             Event(float(r["time_s"]), r["level"], r["kind"], r["text"])
@@ -122,6 +124,14 @@ def _slow(rows: Sequence[Row], joints: int) -> SlowTable:
         temperature_c=_floats(rows, "temperature_c", joints),
         voltage_v=_floats(rows, "voltage_v", joints),
         hardware_error=_ints(rows, "hardware_error", joints),
+    )
+
+
+def _shadow(rows: Sequence[Row], joints: int) -> ShadowTable:
+    return ShadowTable(
+        time_s=_floats(rows, "time_s"),
+        position_rad=_floats(rows, "position_rad", joints),
+        current_a=_floats(rows, "current_a", joints),
     )
 
 

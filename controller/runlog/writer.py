@@ -196,6 +196,12 @@ class RunLog:
         )
         self._add_text("/pose", time_s, row)
 
+    def shadow(self, time_s: float, position_rad: Floats, current_a: Floats) -> None:
+        """What a simulated chain answers to the goals of the same cycle; (J,) each."""
+        position, current = rounded_texts((position_rad, current_a))
+        row = f'{{"time_s":{text(time_s)},"position_rad":{position},"current_a":{current}}}'
+        self._add_text("/shadow", time_s, row)
+
     def path_replanned(self, time_s: float, points_m: ArrayLike) -> None:
         """Log a path (n, 2) or (n, 3) that replaces the plan's."""
         self._add("/path", time_s, {"time_s": time_s, "points_m": floats(points_m)})

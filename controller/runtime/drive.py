@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -86,6 +86,18 @@ class Outcome:
         return self.reached == waypoints and self.tripped is None
 
 
+class CycleObserver(Protocol):
+    """Follows a run from cycle to cycle; it steers nothing."""
+
+    def begin(self, state: JointState) -> None:
+        """Take the state in which the run begins, before its first cycle."""
+        ...
+
+    def step(self, deadline_s: float, sent_rad: Floats, state: JointState) -> None:
+        """Take a cycle: when it was due, the goals (J,) that safety let through, what was read."""
+        ...
+
+
 class Drive:
     """Runs a motion on a link; construct, then ``run()`` once."""
 
@@ -102,9 +114,11 @@ class Drive:
         gain: float,
         wire_busy_s: Callable[[], float] = lambda: float("nan"),
         energy: Callable[[], MotorEnergy] = MotorEnergy,
+        observer: CycleObserver | None = None,
         on_progress: OnProgress = lambda progress: None,
         on_event: OnEvent = lambda kind, text: None,
     ) -> None:
+        self._observer = observer
         self._link, self._clock, self._pose = link, clock, pose
         self._motion, self._path = motion, path_progress(motion)
         self._log, self._robot, self._run = log, robot, run
@@ -128,6 +142,8 @@ class Drive:
         with self._link:
             state = self._link.enable()
             self._wire_s = self._wire_busy_s()
+            if self._observer is not None:
+                self._observer.begin(state)
             view = body_in_world(self._robot, self._pose(state), state.position_rad)
             ramp = Ramp(
                 state.position_rad,
@@ -216,10 +232,11 @@ class Drive:
         verdict = self._link.last_verdict
         self._wire_s = self._wire_busy_s()
         clamped = () if verdict is None else verdict.clamped.nonzero()[0].tolist()
+        sent_rad = state.position_rad if verdict is None else verdict.goal_rad
         self._log.cycle(
             tick.deadline_s,
             goal,
-            state.position_rad if verdict is None else verdict.goal_rad,
+            sent_rad,
             state,
             deadline_s=tick.deadline_s,
             lateness_s=tick.lateness_s,
@@ -230,6 +247,8 @@ class Drive:
             reason=self._link.tripped or "",
             joints=clamped,
         )
+        if self._observer is not None and not self._link.tripped:
+            self._observer.step(tick.deadline_s, sent_rad, state)
         self._measure_speed()
         path = self._path
         pulse_m_s, along_m = path.pulse_m_s, path.along_m

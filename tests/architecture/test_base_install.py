@@ -72,6 +72,8 @@ NEEDY = [
     (("gait", "run", "lateral-undulation"), "sim"),
     (("play", "worm-like"), "sim"),
     (("replay", "log.mcap"), "sim"),
+    (("shadow", "log.mcap"), "sim"),
+    (("gait", "run", "lateral-undulation", "--shadow", "--port", "/dev/null"), "sim"),
     (("bus", "serve", "--robot", "yaw16"), "sim"),
     (("sweep", "rolling", "--points", "1"), "sim"),
     (("sweep", "rolling", "--points", "1", "--dask", "tcp://localhost:1"), "sweep"),

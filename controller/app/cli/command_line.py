@@ -48,6 +48,7 @@ from snakewalk.controller.app.cli.commands.logs.export import export
 from snakewalk.controller.app.cli.commands.logs.identify import identify
 from snakewalk.controller.app.cli.commands.logs.replay import replay
 from snakewalk.controller.app.cli.commands.logs.report import report
+from snakewalk.controller.app.cli.commands.logs.shadow import shadow
 from snakewalk.controller.app.cli.commands.logs.view import view
 from snakewalk.controller.app.cli.commands.plan import plan
 from snakewalk.controller.app.cli.commands.play import play
@@ -196,6 +197,13 @@ app.command(epilog=_examples("report runs/flat-square-walk-seed0/log.mcap"), ric
 app.command(
     epilog=_examples("replay runs/flat-square-walk-seed0/log.mcap --json"), rich_help_panel=_JOB
 )(replay)
+app.command(
+    epilog=_examples(
+        "shadow runs/gait-lateral-undulation-yaw16/log.mcap",
+        "gait run lateral-undulation --port /dev/ttyUSB0 --shadow",
+    ),
+    rich_help_panel=_JOB,
+)(shadow)
 
 app.command(
     epilog=_examples(

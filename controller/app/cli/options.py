@@ -65,6 +65,10 @@ Compliant = Annotated[
         show_default=False,
     ),
 ]
+Shadow = Annotated[
+    bool,
+    typer.Option("--shadow", help="run the simulator beside it, and say what differs and why"),
+]
 View = Annotated[bool, typer.Option("--view", help="show the run in a browser while it lasts")]
 ViewAt = Annotated[
     str,

@@ -12,6 +12,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.app.shadow.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
@@ -43,6 +44,7 @@ def simulated(
     world: WorldConfig,
     ground: HeightField | None,
     initial_pose: InitialPose,
+    deviation: Deviation = NO_DEVIATION,
 ) -> Backend:
     """Servos on a simulated line that turn a MuJoCo body with its head at the start.
 
@@ -51,24 +53,25 @@ def simulated(
         robot: the body and its servos.
         world: friction and ground.
         ground: the world's height field, where it has one.
-        initial_pose: heading of the head link, and joint angles to begin with.
+        initial_pose: heading of the head link, and joint angles to begin with, as servos say them.
+        deviation: in what the simulated robot and its ground differ from ``robot`` and ``world``.
 
     """
     require_extra("simulated runs need", "mujoco")
     from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
     from snakewalk.sim.physics.plant import MujocoPlant  # noqa: PLC0415
-    from snakewalk.sim.plant import Mounting  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
     from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
-    plant = MujocoPlant(robot, world, ground, run.physics_step_s)
-    plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
+    plant = MujocoPlant(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s)
+    joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
+    plant.reset(run.start_m, initial_pose.heading_rad, joint_rad)
     servo = robot.servo
     line = SimLine(
         ServoBank(robot.servo_ids, robot.servo_models, servo.baud),
         plant,
         baud=servo.baud,
-        mounting=Mounting.of(robot),
+        mounting=deviation.mounting(robot),
         supply_and_ambient=SupplyAndAmbient(supply_v=servo.supply_v),
     )
     chain = ServoChain(
@@ -78,6 +81,8 @@ def simulated(
         rate_hz=run.cycle_hz,
     )
     drive = line.firmware.drive
+    if deviation.torque is not None:
+        drive.torque_constant_n_m_a[:] *= deviation.torque
     return Backend(
         "sim",
         chain,

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.app.messages import LOGGER
@@ -14,12 +16,14 @@ from snakewalk.controller.app.report.artifacts import write_summary
 from snakewalk.controller.app.result_files import LOG, clear_run, refuse_another_run
 from snakewalk.controller.app.runs.backend import metal, simulated
 from snakewalk.controller.app.runs.pose_provider import PoseProvider, pose_faults, pose_provider
-from snakewalk.controller.app.runs.prepared_run import PreparedRun
+from snakewalk.controller.app.runs.prepared_run import PreparedRun, pose_with
+from snakewalk.controller.app.shadow.diagnosis import check_level
+from snakewalk.controller.app.shadow.run_shadow import RunShadow
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.reader import read_log
-from snakewalk.controller.runlog.record import RunRecord, Winding
+from snakewalk.controller.runlog.record import InitialPose, RunRecord, Winding
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outcome
 from snakewalk.drivers.priority import raised_priority
@@ -55,6 +59,7 @@ def execute(
     force: bool = False,
     stoppable: bool = True,
     view: "LiveView | None" = None,
+    shadow: bool = False,
     confirm: Callable[[str], bool] | None = None,
     on_progress: OnProgress = lambda progress: None,
     on_event: OnEvent = lambda kind, text: None,
@@ -63,20 +68,20 @@ def execute(
 
     The folder is made; one that holds a run's files is refused without ``force``, which deletes
     them when the new log begins. A ``stoppable`` run has a button that ``snakewalk stop`` presses;
-    the simulated runs of a study have none. ``view`` is a page that shows the run. ``confirm`` asks
-    an operator whether an interrupted chain may go on (``safety.recovery``); ``on_progress`` is
-    called after each cycle, ``on_event`` with what the motion decides by itself: a slower rate, an
-    operator's change.
+    the simulated runs of a study have none. ``view`` is a page that shows the run. With
+    ``shadow`` a simulated chain follows the same goals, and log and ``on_event`` tell what differs.
+    ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``);
+    ``on_progress`` is called after each cycle, ``on_event`` with what the motion decides by itself:
+    a slower rate, an operator's change.
 
     Raises:
         InputError: the plan breaks a limit, the port is not there, the servos are not the robot's,
-            or the folder holds a run.
+            the folder holds a run, or a shadow is asked for on ground where it means nothing.
         KeyboardInterrupt: of an operator; its notes tell what became of torque, and the log's path.
 
     """
     refuse_another_run(folder, force)
-    pose_faults(prepared.run, prepared.robot, prepared.world, metal=port is not None)
-    check_compliance(prepared.run, prepared.robot)
+    _check(prepared, metal=port is not None, shadow=shadow)
     plan = prepared.check_plan()
     initial_pose = prepared.initial_pose() if port is None else None
     if initial_pose is not None:
@@ -124,11 +129,16 @@ def execute(
             log.event(clock.now_s(), kind, text)
             on_event(kind, text)
 
-        limits = SafetyLimits.from_config(prepared.robot, safety)
         with pose_provider(prepared, backend, log_event) as pose:
             source = prepared.make_source(log_event)
-            pressed = button.pressed if button is not None else lambda: None
-            link = SafeLink(backend.chain, limits, clock, recovery, pressed)
+            link = SafeLink(
+                backend.chain,
+                SafetyLimits.from_config(prepared.robot, safety),
+                clock,
+                recovery,
+                button.pressed if button is not None else lambda: None,
+            )
+            beside = _shadow(prepared, initial_pose, log, on_event) if shadow else None
             drive = Drive(
                 link=link,
                 clock=clock,
@@ -140,6 +150,7 @@ def execute(
                 gain=prepared.gain,
                 wire_busy_s=backend.wire_busy_s,
                 energy=backend.energy,
+                observer=beside,
                 on_progress=on_progress,
                 on_event=on_event,
             )
@@ -148,6 +159,8 @@ def execute(
                     outcome = drive.run()
                 if button is not None:
                     button.end(outcome.tripped or "it had come to its end")
+                if beside is not None:
+                    beside.end(clock.now_s())
             except (KeyboardInterrupt, SystemExit) as stop:  # a signal: the link is closed by now
                 torque = "torque is off" if link.was_enabled else "torque was not switched on"
                 failed = getattr(stop, "__notes__", [])
@@ -160,6 +173,29 @@ def execute(
     record = read_log(log_path)
     numbers = write_summary(summary(record), folder)
     return Finished(outcome, log_path, record, numbers, pose, source)
+
+
+def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:
+    """Refuse what no plan shows: a pose that nothing measures, compliance, a shadow's ground."""
+    pose_faults(prepared.run, prepared.robot, prepared.world, metal=metal)
+    check_compliance(prepared.run, prepared.robot)
+    if shadow:
+        require_extra("a shadow needs", "mujoco")
+        check_level(prepared.world)
+
+
+def _shadow(
+    prepared: PreparedRun, initial_pose: InitialPose | None, log: RunLog, on_event: OnEvent
+) -> RunShadow:
+    """Return the shadow of a run; on servos it begins at the angles that are measured first."""
+
+    def pose(measured_rad: Floats) -> InitialPose:
+        if initial_pose is not None:
+            return initial_pose
+        return pose_with(prepared.robot, prepared.start_heading_rad, measured_rad)
+
+    run, robot, world = prepared.run, prepared.robot, prepared.world
+    return RunShadow(run, robot, world, prepared.ground, pose, log, on_event)
 
 
 def check_compliance(run: RunConfig, robot: RobotConfig) -> None:

@@ -48,6 +48,10 @@ class Dashboard:
             self.joint = gui.add_dropdown("joint", tuple(self._names))
             self._angle = _plot(gui, "angle, rad", ("goal", "measured"))
             self._current = _plot(gui, "current of all joints, A", tuple(self._names), legend=False)
+            self._apart = _plot(
+                gui, "current less its shadow's, A", tuple(self._names), legend=False
+            )
+            self._apart.visible = False
             self._speed = _plot(gui, "speed, m/s", ("measured", "predicted"))
             self._supply = _plot(gui, "lowest supply, V", ("V",))
             self._heat = _plot(gui, "hottest servo, °C", ("°C",))
@@ -113,6 +117,9 @@ class Dashboard:
         joint = self._names.index(self.joint.value)
         self._angle.data = (time_s, rows.sent_rad[pick, joint], rows.measured_rad[pick, joint])
         self._current.data = (time_s, *rows.current_a[pick].T)
+        if len(record.shadow.time_s):
+            self._apart.visible = True
+            self._apart.data = (time_s, *_apart_a(record, pick).T)
         self._late.data = (time_s, rows.lateness_s[pick] * 1e3)
         begin = int(np.searchsorted(where.time_s, time_s[0]))
         at = _spread(begin, pose)
@@ -147,6 +154,14 @@ def _plot(
         axes=(uplot.Axis(), uplot.Axis(space=18)),
         aspect=2.2,
     )
+
+
+def _apart_a(record: RunRecord, rows: np.ndarray) -> Floats:
+    """Currents (n, J) of some cycles less those of the shadow; NaN where it has no row."""
+    time_s, shadow = record.cycle.time_s[rows], record.shadow
+    at = np.minimum(np.searchsorted(shadow.time_s, time_s), len(shadow.time_s) - 1)
+    same = (shadow.time_s[at] == time_s)[:, np.newaxis]
+    return np.where(same, record.cycle.current_a[rows] - shadow.current_a[at], np.nan)
 
 
 def _spread(first: int, last: int) -> np.ndarray:

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 KEPT: Final = frozenset({"/config", "/path", "/event", "/button"})
 """Topics of which every row is sent, in order; of others the newest."""
-SENT: Final = KEPT | {"/cycle", "/pose", "/slow"}
+SENT: Final = KEPT | {"/cycle", "/shadow", "/pose", "/slow"}
 _KEPT_MAX: Final = 1000
 _HEAD: Final = 4
 READY: Final = b"\n"

@@ -21,6 +21,7 @@ from snakewalk.controller.app.cli.options import (
     RunFolder,
     RunPort,
     Set,
+    Shadow,
     View,
     ViewAt,
     World,
@@ -64,6 +65,7 @@ def run_gait(
     ] = None,
     port: RunPort = None,
     compliance: Compliant = None,
+    shadow: Shadow = False,
     view: View = False,
     view_at: ViewAt = VIEW_AT,
     film: Film = True,
@@ -109,6 +111,7 @@ def run_gait(
             port,
             force=force,
             view=page,
+            shadow=shadow,
             on_progress=on_progress,
             on_event=bar.on_event,
         )

@@ -1,0 +1,1 @@
+"""The simulator beside the metal on the same goals, and what differs between the two."""
