@@ -49,6 +49,9 @@ class PitchConfig(Strict):
         None, gt=0.0, description="goal current: at least 0.3 A carry a body that rolls"
     )
     lead_s: float | None = Field(None, ge=0.0, le=2.0, description="how early goals are sent")
+    fit_gain: float = Field(
+        1.0, gt=0.0, le=2.0, description="goals over those that fit the body to the ground"
+    )
 
     def set_up(self, robot: RobotConfig) -> RobotConfig:
         """Return the robot with these settings; those of single joints stay."""

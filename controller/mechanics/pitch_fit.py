@@ -39,8 +39,9 @@ class PitchFit:
 class PitchFitter:
     """Pitch goals of one robot on one ground; ``None`` is a level floor."""
 
-    def __init__(self, robot: RobotConfig, ground: HeightField | None) -> None:
-        self._step = GroundStep(ground)
+    def __init__(self, robot: RobotConfig, ground: HeightField | None, gain: float = 1.0) -> None:
+        """Set up for goals ``gain`` times those of the fit."""
+        self._step, self._gain = GroundStep(ground), gain
         self._lengths_m = np.array(robot.link_lengths_m)
         self._link_m = robot.mean_link_length_m
         ends = (end / robot.link_count for end in robot.link_ends)
@@ -81,6 +82,6 @@ class PitchFitter:
         tilt = least_squares(centred, target, np.full(len(mean), _REGULAR * self._link_m))
 
         goal = np.zeros(self._joints)
-        goal[self._pitch] = np.clip(tilt[2:], -self._limit_rad, self._limit_rad)
+        goal[self._pitch] = np.clip(self._gain * tilt[2:], -self._limit_rad, self._limit_rad)
         tilt[2:] = goal[self._pitch]
         return PitchFit(goal, (centred * tilt).sum(axis=1) - target, skeleton.pitch_rad)

@@ -166,11 +166,14 @@ class Join:
 def plan_join(angle_rad: Floats, speed_rad_s: Floats, target: MotionSource, limit: Pace) -> Join:
     """Choose rate and duration of a join from joints at an angle and speed (J,) to ``target``.
 
+    A joint that is faster than its limit is taken to be at it: no join could begin otherwise.
+
     Raises:
         ValueError: the target itself asks for more than ``limit``.
 
     """
     error = angle_rad - target.goal_rad()
+    speed_rad_s = np.clip(speed_rad_s, -limit.speed_rad_s, limit.speed_rad_s)
     velocity, pace = target.velocity_rad_s(), target.pace()
     for rate, longest_s in zip(RATES, LONGEST_JOIN_S, strict=True):
         error_speed = speed_rad_s - rate * velocity

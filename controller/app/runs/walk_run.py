@@ -79,7 +79,7 @@ class WalkRun(PathRun):
     @cached_property
     def pitch_fitter(self) -> PitchFitter:
         """Fits the pitch joints to the ground; on a level floor they stay at 0."""
-        return PitchFitter(self.robot, self.bridged)
+        return PitchFitter(self.robot, self.bridged, self.run.walk.pitch.fit_gain)
 
     @cached_property
     def gain(self) -> float:

@@ -50,6 +50,16 @@ def test_over_a_ridge_the_joints_carry_the_change_of_slope() -> None:
     assert goals.sum() == pytest.approx(change, rel=0.2)
 
 
+def test_a_gain_bends_the_body_by_more_than_fits_up_to_the_joints_limit() -> None:
+    place, along = (0.5, 0.0), headings(BOTH, 0.6)
+    fits = PitchFitter(BOTH, ridge(-0.08))(place, along)
+    more = PitchFitter(BOTH, ridge(-0.08), 1.12)(place, along)
+    np.testing.assert_allclose(more.goal_rad, 1.12 * fits.goal_rad)
+    assert more.residual_m > fits.residual_m
+    most = PitchFitter(BOTH, ridge(-0.08), 100.0)(place, along)
+    assert np.abs(most.goal_rad).max() == BOTH.pitch_limit_rad
+
+
 def test_in_a_valley_the_signs_turn_over() -> None:
     over, under = (
         PitchFitter(BOTH, ridge(h))((0.5, 0.0), np.zeros(17)).goal_rad for h in (0.08, -0.08)

@@ -9,8 +9,9 @@ from snakewalk.controller.gaits.cpg.pattern import Pattern
 from snakewalk.controller.gaits.cpg.trajectory import NEGLIGIBLE
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.gaits.spine import SpineParameters, offset, spine_bends_rad
-from snakewalk.controller.motion.blend import DURATIONS_S, shortest_join_s
+from snakewalk.controller.motion.blend import DURATIONS_S, plan_join, shortest_join_s
 from snakewalk.controller.motion.cpg_motion import TOLERANCE, WIDER, CpgMotion, quickest_change
+from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.source import Pace
 
 ROBOT = load_robot("alternating16")
@@ -49,6 +50,18 @@ def test_an_error_alone_dies_out_as_fast_as_the_quintic_may(error_rad: float) ->
 def test_no_time_is_long_enough_for_a_target_beyond_the_limits() -> None:
     wild = Pace(1.1 * LIMIT.speed_rad_s, LIMIT.acceleration_rad_s2)
     assert all(np.isnan(shortest_join_s(1.0, np.ones(16), np.zeros(16), wild, LIMIT)))
+
+
+def test_a_joint_beyond_its_limit_is_joined_from_the_limit() -> None:
+    """Pitch goals over facets may be faster than the joint: the join begins all the same."""
+    rolling = GaitCycle(GAITS["rolling"](), ROBOT)
+    speed = np.zeros(16)
+    speed[15] = -1.25 * ROBOT.joint_speed_limit_rad_s
+    join = plan_join(np.zeros(16), speed, rolling, LIMIT)
+    assert np.isfinite(join.duration_s)
+    wanted = join.error_rad_s + join.rate * rolling.velocity_rad_s()
+    np.testing.assert_allclose(wanted[15], -ROBOT.joint_speed_limit_rad_s)
+    np.testing.assert_allclose(wanted[:15], 0.0, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", ["sidewinding", "concertina", "subcarangiform"])
