@@ -73,7 +73,8 @@ VARIANTS: dict[str, Gearbox | None] = {
     "without viscous friction": replace(GEAR, viscous_n_m_s=0.0),
     "without Stribeck friction": replace(GEAR, stribeck_n_m=0.0),
     "without friction by motor torque": replace(GEAR, by_motor=0.0),
-    "without friction by load torque": replace(GEAR, by_load=0.0),
+    "without friction by load torque": replace(GEAR, by_load=0.0, by_load_slow=0.0),
+    "the same, of a slow shaft only": replace(GEAR, by_load_slow=0.0),
 }
 
 

@@ -37,7 +37,7 @@ class BenchPlant:
     ) -> None:
         self._step_s = step_s
         self._steps = 0
-        bare = Gearbox(0.0, dry_n_m, viscous_n_m_s, 0.0, 1.0, 0.0, 0.0)
+        bare = Gearbox(0.0, dry_n_m, viscous_n_m_s, 0.0, 1.0, 0.0, 0.0, 0.0)
         gears = [gear] * joints if isinstance(gear, Gearbox) or gear is None else list(gear)
         terms = Gearbox.columns([each or bare for each in gears])
         self._gear = np.array([getattr(terms, each.name) for each in fields(Gearbox)])
@@ -109,7 +109,7 @@ def _step(
 ) -> None:
     """Make ``steps`` steps of ``h`` under a constant load; the columns of a drive in their order.
 
-    ``gear`` (7, J): the fields of ``Gearbox``, the shaft's own inertia added to the rotor's.
+    ``gear`` (8, J): the fields of ``Gearbox``, the shaft's own inertia added to the rotor's.
     """
     for k in range(len(position)):
         inertia, viscous = gear[0, k], gear[2, k]

@@ -34,7 +34,7 @@ def swing(p_gain: int, goal: Goal, off_s: float, weaker: float = 1.0) -> Pendulu
     has = PLANTED
     gear = Gearbox(
         *(has["armature_kg_m2"], has["dry_n_m"], has["viscous_n_m_s"], has["stribeck_n_m"]),
-        *(has["stribeck_rad_s"], 0.0, 0.0),
+        *(has["stribeck_rad_s"], 0.0, 0.0, 0.0),
     )
     time_s = np.arange(0.0, 4.0, 0.005)
     goals = goal(time_s)
