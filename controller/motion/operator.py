@@ -26,6 +26,7 @@ KEYS = {
     "d": "defaults",
     "space": "halt, go on",
     "q": "stop",
+    "t": "torque off",
 }
 HALT_S = 0.5
 
@@ -39,20 +40,25 @@ class Operator:
         robot: RobotConfig,
         keys: Callable[[], Iterable[str]],
         on_event: Callable[[str, str], None],
+        held: Callable[[], bool] = lambda: True,
     ) -> None:
         """Put ``keys`` in charge of ``motion``.
 
         Args:
             motion: the gait to begin with.
             robot: for the gaits to change to.
-            keys: names of ``KEYS`` pressed since the last call; others are ignored.
+            keys: names of ``KEYS`` pressed since the last call; others, and ``t``, which is for
+                whoever owns the torque, are ignored.
             on_event: takes ("operator", text) of what was done or refused.
+            held: whether the dead man's button is held; while it is not, the body stands in its
+                shape, whatever else was pressed.
 
         """
         self.motion = motion
         self._robot, self._keys, self._on_event = robot, keys, on_event
         self._chosen = 0
         self._halted = False
+        self._held, self._was_held = held, True
         self._rate = 1.0
 
     @property
@@ -88,7 +94,12 @@ class Operator:
             self._press(key)
         change = dt_s / HALT_S
         before = self._rate
-        target = 0.0 if self._halted and not self.motion.stopping else 1.0
+        held = self._held()
+        if held != self._was_held:
+            self._was_held = held
+            self._report("held: it moves" if held else "let go: it stands in its shape")
+        halted = self._halted and not self.motion.stopping
+        target = 0.0 if halted or not held else 1.0
         self._rate += min(max(target - self._rate, -change), change)
         return self.motion.step(0.5 * (before + self._rate) * dt_s, view)
 

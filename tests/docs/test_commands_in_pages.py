@@ -14,7 +14,7 @@ from snakewalk.controller.app.cli.command_line import app
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-COMMAND = re.compile(r"^(?:    |\$ )?(snakewalk (?:.*\\\n)*.*)$", re.MULTILINE)
+COMMAND = re.compile(r"^ *(?:\$ )?(snakewalk (?:.*\\\n)*.*)$", re.MULTILINE)
 
 
 def printed(page: Path) -> list[str]:

@@ -15,8 +15,10 @@ from snakewalk.config.errors import InputError
 _EVENT = struct.Struct("<IhBB")
 _BUTTON, _AXIS, _AT_START = 1, 2, 0x80
 _HALF = 16384
-BUTTONS = {0: "n", 1: "m", 2: "p", 3: "d", 6: "space", 7: "q", 8: "space", 9: "q"}
-"""A, B, X, Y, select and start of common pads."""
+BUTTONS = {0: "n", 1: "m", 2: "p", 3: "d", 6: "space", 7: "q", 8: "space", 9: "q", 10: "t"}
+"""A, B, X, Y, select and start of common pads; 10 is the right stick pressed, or the middle one."""
+DEAD_MAN = (4, 5)
+"""The shoulder buttons, left and right."""
 AXES = {0: ("left", "right"), 1: ("up", "down"), 6: ("left", "right"), 7: ("up", "down")}
 """Left stick and cross: the names at the low and at the high end."""
 
@@ -27,6 +29,12 @@ class Pad:
     def __init__(self) -> None:
         self._rest = b""
         self._out: dict[int, int] = {}
+        self._down: set[int] = set()
+
+    @property
+    def held(self) -> bool:
+        """Whether one of the dead man's buttons is down."""
+        return bool(self._down)
 
     def keys(self, data: bytes) -> list[str]:
         """Names of the keys that ``data`` (any number of bytes) means."""
@@ -35,7 +43,9 @@ class Pad:
         whole = len(data) - len(data) % _EVENT.size
         self._rest = data[whole:]
         for _, value, kind, number in _EVENT.iter_unpack(data[:whole]):
-            if kind == _BUTTON and value and number in BUTTONS:
+            if kind & ~_AT_START == _BUTTON and number in DEAD_MAN:
+                (self._down.add if value else self._down.discard)(number)
+            elif kind == _BUTTON and value and number in BUTTONS:
                 found.append(BUTTONS[number])
             elif kind & ~_AT_START == _AXIS and number in AXES:
                 side = int(value > _HALF) - int(value < -_HALF)
@@ -54,6 +64,12 @@ class Gamepad:
         except OSError as error:
             raise InputError(f"{path}: {error.strerror or error}: no gamepad to read") from None
         self._pad = Pad()
+        self._gone = False
+
+    @property
+    def held(self) -> bool:
+        """Whether a shoulder button is held; a pad that is gone holds none."""
+        return self._pad.held and not self._gone
 
     def __enter__(self) -> Self:
         return self
@@ -74,4 +90,6 @@ class Gamepad:
                 data += more
         except BlockingIOError:
             return self._pad.keys(data)
+        except OSError:  # unplugged, or its radio is out of reach
+            self._gone = True
         return self._pad.keys(data)

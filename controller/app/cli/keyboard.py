@@ -36,6 +36,9 @@ def names(text: str) -> list[str]:
 class Keyboard:
     """A terminal in cbreak mode; use as a context manager, which restores it."""
 
+    held = True
+    """A keyboard has no dead man's button."""
+
     def __init__(self, descriptor: int | None = None) -> None:
         self._file = sys.stdin.fileno() if descriptor is None else descriptor
         if not os.isatty(self._file):

@@ -61,6 +61,7 @@ def execute(
     view: "LiveView | None" = None,
     shadow: bool = False,
     confirm: Callable[[str], bool] | None = None,
+    stop_requested: Callable[[], str | None] = lambda: None,
     on_progress: OnProgress = lambda progress: None,
     on_event: OnEvent = lambda kind, text: None,
 ) -> Finished:
@@ -71,6 +72,7 @@ def execute(
     the simulated runs of a study have none. ``view`` is a page that shows the run. With
     ``shadow`` a simulated chain follows the same goals, and log and ``on_event`` tell what differs.
     ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``);
+    ``stop_requested``, asked in every read and write, why torque goes off, or None;
     ``on_progress`` is called after each cycle, ``on_event`` with what the motion decides by itself:
     a slower rate, an operator's change.
 
@@ -136,7 +138,7 @@ def execute(
                 SafetyLimits.from_config(prepared.robot, safety),
                 clock,
                 recovery,
-                button.pressed if button is not None else lambda: None,
+                lambda: stop_requested() or (None if button is None else button.pressed()),
             )
             beside = _shadow(prepared, initial_pose, log, on_event) if shadow else None
             drive = Drive(

@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.app.cli.main import main
+from snakewalk.controller.app.progress import TimeBar
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait, prepare_run, prepare_walk
 from snakewalk.controller.app.runs.gait_run import GaitRun
@@ -189,6 +191,7 @@ def test_live_from_a_terminal(tmp_path: Path) -> None:
         shown += line
     assert "space: halt, go on" in shown
     assert "m: mirror" in shown, "no key breaks inside its words"
+    assert "t: torque off" in shown
     os.write(ours, b"mq")
     printed, said = process.communicate()
     os.close(ours)
@@ -197,6 +200,41 @@ def test_live_from_a_terminal(tmp_path: Path) -> None:
     found = json.loads(printed.splitlines()[-1])
     assert found["duration_s"] < 5.0
     assert "mirror = True" in said
+
+
+@pytest.mark.parametrize("columns", [80, 120])
+def test_a_key_and_a_pads_button_switch_torque_off(
+    columns: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """In the cycle in which it is pressed, during the ramp as well."""
+    pad = tmp_path / "js0"
+    os.mkfifo(pad)
+    monkeypatch.setenv("COLUMNS", str(columns))
+    words = ["gait", "run", "rolling", "--gamepad", str(pad), "--no-film", "--json"]
+    monkeypatch.setattr("sys.argv", ["snakewalk", *words, "--out", str(tmp_path / "run")])
+    reader = os.open(pad, os.O_RDONLY | os.O_NONBLOCK)
+    writer = os.open(pad, os.O_WRONLY)
+    monkeypatch.setattr(  # at the first cycle's end
+        TimeBar, "on_progress", lambda *_: os.write(writer, struct.pack("<IhBB", 0, 1, 1, 10))
+    )
+    with pytest.raises(SystemExit) as ended:
+        main()
+    os.close(reader)
+    os.close(writer)
+    printed, said = capsys.readouterr()
+    assert ended.value.code == 1
+    found = json.loads(printed.splitlines()[-1])
+    assert found["tripped"] == "the operator switched torque off"
+    assert found["duration_s"] < 0.1
+    for told in (
+        "hold LB or RB: it moves",
+        "right stick pressed: torque off",
+        "Ctrl-C: torque off",
+    ):
+        assert told in said, "no line breaks inside words"
 
 
 def test_the_main_job_sends_gaits_to_their_own_command() -> None:

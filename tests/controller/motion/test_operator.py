@@ -1,5 +1,6 @@
 """A live operator: keys from a terminal or a gamepad change what runs, and nothing steps."""
 
+import errno
 import os
 import pty
 import struct
@@ -157,3 +158,50 @@ def test_a_gamepad_is_read_without_waiting_and_a_missing_one_refused(tmp_path: P
             assert pad.pressed() == ["m"]
     with pytest.raises(InputError, match="no gamepad"):
         Gamepad(tmp_path / "none")
+
+
+def test_a_body_moves_only_while_the_dead_mans_button_is_held() -> None:
+    hands, held = Hands(), [False]
+    robot, motion = hands.robot, hands.operator.motion
+    hands.operator = Operator(motion, robot, hands._take, hands._hear, lambda: held[0])
+    hands.press(seconds=1.0)
+    still = hands.seen[-1]
+    hands.press("q", seconds=1.0)
+    assert np.array_equal(hands.seen[-1], still), "nothing moves it but the button"
+    assert hands.said == ["let go: it stands in its shape", "stop"]
+    held[0] = True
+    hands.press(seconds=0.3)
+    assert np.abs(hands.seen[-1] - still).max() > 1e-3
+    held[0] = False
+    hands.press(seconds=1.0)
+    assert not hands.operator.done
+    assert np.array_equal(hands.seen[-1], hands.seen[-20])
+    steps = np.abs(np.diff(hands.seen, axis=0)).max()
+    assert steps < 0.02 * robot.joint_speed_limit_rad_s, "letting go makes no step"
+
+
+def test_a_pad_tells_whether_a_shoulder_is_held_and_one_that_is_gone_holds_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pad = Pad()
+    assert not pad.held
+    assert pad.keys(event(1, 0x81, 4)) == [], "held when the device was opened"
+    assert pad.held
+    assert pad.keys(event(1, 1, 5) + event(0, 1, 4)) == []
+    assert pad.held
+    assert pad.keys(event(0, 1, 5) + event(1, 1, 10)) == ["t"]
+    assert not pad.held
+    fifo = tmp_path / "js0"
+    os.mkfifo(fifo)
+
+    def unplugged(*_: int) -> bytes:
+        raise OSError(errno.ENODEV, "No such device")
+
+    with Gamepad(fifo) as device, fifo.open("wb", buffering=0) as file:
+        file.write(event(1, 1, 4))
+        assert device.pressed() == []
+        assert device.held
+        with monkeypatch.context() as gone:
+            gone.setattr(os, "read", unplugged)
+            assert device.pressed() == []
+        assert not device.held

@@ -32,7 +32,12 @@ from snakewalk.controller.app.cli.options import (
 from snakewalk.controller.app.result_files import run_folder
 
 if TYPE_CHECKING:
-    from snakewalk.controller.app.runs.gait_run import MakeOperator
+    from snakewalk.config.robot import RobotConfig
+    from snakewalk.controller.app.cli.gamepad import Gamepad
+    from snakewalk.controller.app.cli.keyboard import Keyboard
+    from snakewalk.controller.motion.gait_motion import GaitMotion
+    from snakewalk.controller.motion.operator import Operator
+    from snakewalk.controller.runtime.drive import OnEvent
 
 
 def run_gait(
@@ -85,6 +90,7 @@ def run_gait(
         raise InputError(f"--by {by}: expected blend or cpg")
     with ExitStack() as stack:
         page = stack.enter_context(open_view(view, view_at))
+        hands = _hands(stack, live, gamepad)
         prepared = prepare_gait(
             name,
             robot=robot,
@@ -94,7 +100,7 @@ def run_gait(
             seed=seed,
             look_heading_rad=look_heading_rad,
             look_at_m=_point(look_at),
-            make_operator=_operator(stack, live, gamepad),
+            make_operator=None if hands is None else hands.operator,
             then=[_change(text) for text in then or []],
             by="cpg" if by == "cpg" else "blend",
             keys=key_values("--set", set_),
@@ -112,6 +118,7 @@ def run_gait(
             force=force,
             view=page,
             shadow=shadow,
+            stop_requested=lambda: None if hands is None else hands.torque_off(),
             on_progress=on_progress,
             on_event=bar.on_event,
         )
@@ -152,8 +159,40 @@ def run_gait(
         raise SystemExit(1)
 
 
-def _operator(stack: ExitStack, live: bool, gamepad: Path | None) -> "MakeOperator | None":
-    """Open the keyboard or gamepad of an operator; None without one."""
+class _Hands:
+    """An operator's keyboard and gamepad."""
+
+    def __init__(self, devices: "list[Keyboard | Gamepad]") -> None:
+        self._devices = devices
+        self._waiting: list[str] = []
+        self._off = False
+
+    def torque_off(self) -> str | None:
+        """Why torque goes off, asked by the safe link in every read and write; it stays so."""
+        for device in self._devices:
+            self._waiting += device.pressed()
+        self._off = self._off or "t" in self._waiting
+        return "the operator switched torque off" if self._off else None
+
+    def operator(
+        self, motion: "GaitMotion", robot: "RobotConfig", on_event: "OnEvent"
+    ) -> "Operator":
+        """Put the keys that were pressed in charge of a motion."""
+        from snakewalk.controller.motion.operator import Operator  # noqa: PLC0415
+
+        return Operator(motion, robot, self._take, on_event, self._held)
+
+    def _take(self) -> list[str]:
+        taken, self._waiting = self._waiting, []
+        return taken
+
+    def _held(self) -> bool:
+        """Whether nobody who has a dead man's button has let it go."""
+        return all(device.held for device in self._devices)
+
+
+def _hands(stack: ExitStack, live: bool, gamepad: Path | None) -> _Hands | None:
+    """Open the keyboard or gamepad of an operator, and say what they do; None without one."""
     if not live and gamepad is None:
         return None
     from rich.columns import Columns  # noqa: PLC0415
@@ -161,18 +200,18 @@ def _operator(stack: ExitStack, live: bool, gamepad: Path | None) -> "MakeOperat
 
     from snakewalk.controller.app.cli.gamepad import Gamepad  # noqa: PLC0415
     from snakewalk.controller.app.cli.keyboard import Keyboard  # noqa: PLC0415
-    from snakewalk.controller.motion.operator import KEYS, Operator  # noqa: PLC0415
+    from snakewalk.controller.motion.operator import KEYS  # noqa: PLC0415
 
-    hands: list[Keyboard | Gamepad] = []
+    devices: list[Keyboard | Gamepad] = []
+    keys: list[str] = []
     if live:
-        hands.append(stack.enter_context(Keyboard()))
+        devices.append(stack.enter_context(Keyboard()))
+        keys += [f"{key}: {what}" for key, what in KEYS.items()]
     if gamepad is not None:
-        hands.append(stack.enter_context(Gamepad(gamepad)))
-    keys = [f"{key}: {what}" for key, what in KEYS.items()]
+        devices.append(stack.enter_context(Gamepad(gamepad)))
+        keys += ["hold LB or RB: it moves", "right stick pressed: torque off"]
     Console(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
-    return lambda motion, robot, on_event: Operator(
-        motion, robot, lambda: [key for hand in hands for key in hand.pressed()], on_event
-    )
+    return _Hands(devices)
 
 
 def _change(text: str) -> tuple[float, str, dict[str, Any]]:

@@ -28,10 +28,12 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
     for panel in axes.flat[len(gaits) :]:
         panel.axis("off")
     for panel, gait in zip(axes.flat, gaits, strict=False):
+        measured = False
         for colour, robot in zip(_COLOURS, robots, strict=False):
             some = [r for r in rows if (r["gait"], r["robot"]) == (gait, robot) and r["cycles"]]
             paces = [pace(row) for row in some]
             cost = [number(r, "cost_of_transport") for r in some]
+            measured = measured or any(value > 0.0 for value in cost)
             panel.scatter(paces, cost, s=9, color=colour, alpha=0.75, linewidths=0, label=robot)
             for r, x, y in zip(some, paces, cost, strict=True):
                 if r["number"] == "0":
@@ -39,7 +41,7 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
         panel.set_title(gait, fontsize=10)
         panel.set_xlabel(UNITS[GAITS[gait].aim], fontsize=8)
         panel.xaxis.set_major_locator(MaxNLocator(4))
-        panel.set_yscale("log")
+        panel.set_yscale("log" if measured else "linear")  # none moved far enough to have a cost
         panel.tick_params(labelsize=7)
         panel.spines[["top", "right"]].set_visible(False)
     figure.supylabel("cost of transport (log); rings: defaults", fontsize=9)

@@ -1,6 +1,7 @@
 """The table of a sweep survives a kill: no finished row is lost, none is run twice."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.report.plots.sweep import draw_sweep
 from snakewalk.controller.app.studies.sweep_measure import Measurement
 from snakewalk.controller.app.studies.sweep_points import Point
 from snakewalk.controller.app.studies.sweep_table import COLUMNS, Table, digest, read_table
@@ -23,6 +25,15 @@ def row(forward_bl: float) -> Measurement:
     ones: dict[str, Any] = dict.fromkeys((field.name for field in fields(Measurement)), 1.0)
     given = {"ended": "ran to its end", "cycles": 5, "forward_bl_cycle": forward_bl}
     return Measurement(**ones | given)
+
+
+def test_a_sweep_in_which_no_body_moved_has_a_picture(tmp_path: Path) -> None:
+    """Costs of transport that are unknown have no place on a logarithmic scale: a traceback."""
+    table, picture = tmp_path / "sweep.csv", tmp_path / "sweep.png"
+    with Table(table) as rows:
+        rows.add(POINTS[0], replace(row(0.0), cost_of_transport=nan))
+    draw_sweep(read_table(table), picture)
+    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_columns_are_unique() -> None:
