@@ -27,6 +27,8 @@ MODULES = tuple(
         "joins",
         "capture",
         "overhead",
+        "disturbed_views",
+        "camera_run",
         "repertoire",
         "support",
     )

@@ -40,7 +40,7 @@ class CameraConfig(Strict):
         "undone; default: none",
     )
     shade: float = Field(
-        0.35, ge=0.0, le=0.9, description="part of the floor's light that a shadow may take away"
+        0.5, ge=0.0, le=0.9, description="part of the floor's light that a shadow may take away"
     )
     device: str | None = Field(
         None, description="of a real camera: a number, a device or an address that OpenCV opens"

@@ -5,7 +5,7 @@ by dead reckoning. So the pose is a frame that drifts, placed anew in the world 
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,9 +14,11 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.localization.dead_reckoning import DeadReckoning
 from snakewalk.controller.localization.overhead_camera import LineDetection
 from snakewalk.controller.localization.pose_fit import PoseFit, fit_both_ends
+from snakewalk.controller.localization.pose_tracking import BodyPrior, TrackedPose
 from snakewalk.drivers.types import BodyPose, JointState
 
 MISFIT = 0.5
@@ -29,6 +31,10 @@ HISTORY_S = 2.0
 """How far back a late frame may date."""
 
 
+PriorAt = Callable[[float], BodyPrior | None]
+"""Where the body is believed to be at a time (s); None where it was lost."""
+
+
 class Camera(Protocol):
     """Where frames come from, as detections."""
 
@@ -36,8 +42,11 @@ class Camera(Protocol):
         """Take a frame now and wait for its detection; the body lies still."""
         ...
 
-    def arrived(self, now_s: float) -> list[LineDetection]:
-        """Return what has come in since the last call, in order of time."""
+    def arrived(self, now_s: float, prior_at: PriorAt) -> Sequence[LineDetection | TrackedPose]:
+        """Return what has come in since the last call, in order of time.
+
+        With a prior the body is looked for only near to it.
+        """
         ...
 
 
@@ -72,6 +81,7 @@ class CameraPose:
         self._fixed_s: float | None = None
         self._reason = ""
         self._gap = False
+        self._moved_px = (0.0, 0.0)
         self.frames = 0
         """Frames taken in so far."""
         self.used = 0
@@ -87,10 +97,42 @@ class CameraPose:
         if self._fixed_s is None:
             self._fixed_s = state.time_s
             self._update(self._camera.first())
-        for detection in self._camera.arrived(state.time_s):
-            self._update(detection)
+        for detection in self._camera.arrived(state.time_s, self._prior_at):
+            if isinstance(detection, TrackedPose):
+                self._follow(detection)
+            else:
+                self._update(detection)
         self._report_gap(state.time_s)
         return self._pose(_in_world(self._offset, place), state.time_s)
+
+    def _prior_at(self, time_s: float) -> BodyPrior | None:
+        if self._gap:
+            return None
+        then = self._at(time_s)
+        believed = self._pose(_in_world(self._offset, then.place), time_s)
+        body = body_in_world(self._robot, believed, then.joint_rad)
+        return BodyPrior(body.link_m[:, :2], body.forward[:, :2])
+
+    def _follow(self, found: TrackedPose) -> None:
+        self.frames += 1
+        if found.moved_px != self._moved_px:
+            self._moved_px = found.moved_px
+            away = float(np.hypot(*found.moved_px))
+            self._on_event(
+                f"the camera was bumped: its picture has moved by {away:.1f} px, which is undone"
+            )
+        if found.fault:
+            self._reason = found.fault
+            return
+        self._place(found.time_s, found.head_m, found.heading_rad)
+
+    def _place(self, time_s: float, head_m: Floats, heading_rad: float) -> None:
+        """Put the drifting frame where a camera saw the head."""
+        then = self._at(time_s)
+        self.used += 1
+        self._fixed_s = time_s
+        turn = heading_rad - then.place[2]
+        self._offset = np.append(head_m - _turned(then.place[:2], turn), turn)
 
     def _update(self, detection: LineDetection) -> None:
         self.frames += 1
@@ -102,10 +144,7 @@ class CameraPose:
         if fit.error_m > MISFIT * self._robot.mean_link_length_m:
             self._reason = f"what is seen lies {fit.error_m * 1e3:.0f} mm off the measured joints"
             return
-        self.used += 1
-        self._fixed_s = detection.time_s
-        turn = fit.heading_rad - then.place[2]
-        self._offset = np.append(fit.head_m - _turned(then.place[:2], turn), turn)
+        self._place(detection.time_s, fit.head_m, fit.heading_rad)
 
     def _head_end(self, fits: tuple[PoseFit, PoseFit], then: _Moment) -> PoseFit:
         """Which end is the head: by the joints' shape; where both fit, by the last estimate."""

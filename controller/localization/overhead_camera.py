@@ -5,7 +5,8 @@ as high as its axis; seen from a lens at height ``h`` above the foot ``f``, a po
 covers the floor further out, at ``g = f + (p - f) h / (h - z)``, and that is undone.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Self
 
 import cv2
@@ -15,11 +16,28 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.capture.body_detector import BodyDetector, Detection
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.silhouette import Polarity
+from snakewalk.controller.localization.floor_light import lit_floor, unexplained
 from snakewalk.controller.localization.lens import Lens
+from snakewalk.controller.localization.pose_tracking import (
+    REACH_M,
+    BodyPrior,
+    StandingOut,
+    TrackedPose,
+    track_pose,
+)
 
+_SURROUNDINGS = 0.25  # of the picture's width: the square in which the body is a small part
+_CALM_PX = 200  # fewest pixels away from the body that tell the noise
+_MOVED_PX, _FURTHEST_PX = 0.5, 24  # of a bumped camera's picture
+_HALF = 2  # the floor is matched on a picture so many times smaller
+_PARTS = 6, 4  # of a picture, across and down
+_BETTER = 0.8  # of the square of what is left in a part, where a move explains it (ours)
+_LEAST_PARTS = 3
+_LIKE = 0.2  # correlation of two pictures of the floor, noise and robot included (ours)
 _LEAST_AREA = 0.01  # of the image: four corners that span less fix no plane
 
 
@@ -35,6 +53,8 @@ class CameraModel:
     """Of the lens above the floor."""
     lens: Lens | None = None
     """Where it distorts, the homography is of pixels without distortion."""
+    moved_px: tuple[float, float] = (0.0, 0.0)
+    """x, y by which the picture has moved since the homography was measured."""
 
     @classmethod
     def straight_down(
@@ -76,16 +96,29 @@ class CameraModel:
 
     def on_plane(self, points_px: Floats, z_m: float) -> Floats:
         """(..., 2) world places of pixels (..., 2) of what is ``z_m`` above the floor."""
-        plain = points_px if self.lens is None else self.lens.undistorted(points_px)
+        plain = points_px - self.moved_px
+        if self.lens is not None:
+            plain = self.lens.undistorted(plain)
         floor = _projected(self.floor_from_px, plain)
         return np.asarray(self.foot_m + (floor - self.foot_m) * (1.0 - z_m / self.height_m))
 
     def in_image(self, points_m: Floats, z_m: float) -> Floats:
         """(..., 2) pixels of world places (..., 2) that are ``z_m`` above the floor."""
-        floor = self.foot_m + (points_m - self.foot_m) / (1.0 - z_m / self.height_m)
-        back = np.asarray(np.linalg.inv(self.floor_from_px), dtype=float)
-        plain = _projected(back, floor)
-        return plain if self.lens is None else self.lens.distorted(plain)
+        return self.projection(z_m)(points_m)
+
+    def projection(self, z_m: float) -> Callable[[Floats], Floats]:
+        """``in_image`` of one height, for many calls."""
+        grow = 1.0 / (1.0 - z_m / self.height_m)
+        onto_floor = np.diag([grow, grow, 1.0])  # what is higher covers the floor further out
+        onto_floor[:2, 2] = self.foot_m * (1.0 - grow)
+        back = np.asarray(np.linalg.inv(self.floor_from_px) @ onto_floor, dtype=float)
+        lens, moved_px = self.lens, np.array(self.moved_px)
+
+        def project(points_m: Floats) -> Floats:
+            plain = _projected(back, points_m)
+            return np.asarray((plain if lens is None else lens.distorted(plain)) + moved_px)
+
+        return project
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +154,102 @@ class OverheadDetector:
         line = self.model.on_plane(skeleton.points_px, self.axis_height_m)
         return LineDetection(time_s, line, skeleton.status)
 
+    def registered(self, image: Image) -> Self:
+        """Return the detector for a camera that was bumped; itself where the floor has not moved.
+
+        The floor's own texture is matched: tiles, joints, printed markers. A floor without any
+        tells nothing. What moves in the picture covers parts of it; so the move must explain
+        three parts more than it spoils.
+
+        Raises:
+            InputError: the frame is not as large as the background.
+
+        """
+        self._check_size(image)
+        floor, now = (_texture(one) for one in (self.background, image))
+        far = _FURTHEST_PX // _HALF
+        likeness = cv2.matchTemplate(now, floor[far:-far, far:-far], cv2.TM_CCOEFF_NORMED)
+        _, best, _, (column, row) = cv2.minMaxLoc(likeness)
+        if best < _LIKE or not (0 < column < 2 * far and 0 < row < 2 * far):
+            return self
+        x, y = (
+            _HALF * (k - far + _peak(np.asarray(line[k - 1 : k + 2], dtype=float)))
+            for k, line in ((column, likeness[row]), (row, likeness[:, column]))
+        )
+        if np.hypot(x, y) < _MOVED_PX:
+            return self
+        old = self.model.moved_px
+        columns, rows = image.shape[1], image.shape[0]
+        moved = np.asarray(
+            cv2.warpAffine(
+                self.background, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]), (columns, rows),
+                flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE,
+            ),
+            dtype=np.uint8,
+        )  # fmt: skip
+        if _parts_explained(now, floor, _texture(moved)) < _LEAST_PARTS:
+            return self
+        model = replace(self.model, moved_px=(old[0] + x, old[1] + y))
+        return replace(self, model=model, background=moved)
+
+    def track(
+        self, image: Image, time_s: float, prior: BodyPrior, robot: RobotConfig
+    ) -> TrackedPose:
+        """Find the robot in one frame near to where it is believed; nothing else is looked at.
+
+        Raises:
+            InputError: the frame is not as large as the background.
+
+        """
+        self._check_size(image)
+        seen = self._standing_out(image, prior, robot)
+        found = track_pose(robot, seen, prior, time_s)
+        px = self.model.in_image(prior.links_m, self.axis_height_m)
+        within = (px >= 0.0) & (px <= np.array(image.shape[1::-1]) - 1.0)
+        fault = str(FrameStatus.CUT) if found.fault and not within.all() else found.fault
+        return replace(found, fault=fault, moved_px=self.model.moved_px)
+
+    def _standing_out(self, image: Image, prior: BodyPrior, robot: RobotConfig) -> StandingOut:
+        to_px = self.model.projection(self.axis_height_m)
+        reach_m = REACH_M + 3.0 * robot.body_radius_m
+        around = reach_m * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+        px = to_px((prior.links_m[:, None] + around).reshape(-1, 2))
+        rows, columns = image.shape[:2]
+        left, top = np.clip(np.floor(px.min(axis=0)).astype(int), 0, (columns - 1, rows - 1))
+        right, low = np.clip(np.ceil(px.max(axis=0)).astype(int) + 1, 1, (columns, rows))
+        window = slice(top, max(low, top + 1)), slice(left, max(right, left + 1))
+        frame, floor = np.ascontiguousarray(image[window]), self.background[window]
+        line = to_px(prior.links_m) - (left, top)
+        metre = float(np.hypot(*np.diff(line, axis=0).T).sum()) / (
+            robot.link_length_m * (len(line) - 1)
+        )
+        radius = robot.body_radius_m * metre
+        area = 2.0 * radius * robot.length_m * metre
+        lit = cv2.GaussianBlur(lit_floor(frame, floor, area), (3, 3), 0.0)
+        now = cv2.GaussianBlur(frame, (3, 3), 0.0)
+        apart = unexplained(np.asarray(now, np.uint8), np.asarray(lit, np.uint8), self.shade)
+        near = np.zeros(apart.shape, dtype=np.uint8)
+        spots = np.rint(line).astype(np.int32).reshape(-1, 1, 2)
+        cv2.polylines(near, [spots], False, 255, max(1, round(2.0 * reach_m * metre)))
+        away = apart[near == 0]
+        some = away if away.size > _CALM_PX else apart.ravel()
+        middle = float(np.median(some))
+        above = some[some > middle] - middle
+        spread = (1.4826 * float(np.median(above)) if above.size else 0.0) + 0.5
+        clear = middle + 4.0 * spread
+        body = apart[(near > 0) & (apart > clear)]
+        level = float(np.median(body)) if body.size > 0.2 * area else 255.0
+        low_level = middle + 2.0 * spread
+        share = (apart - low_level) / max(0.7 * level - low_level, spread)
+        share = np.clip(share, 0.0, 1.0) * (near > 0)
+        return StandingOut(share.astype(np.float32), np.array([left, top], dtype=float), to_px)
+
+    def _check_size(self, image: Image) -> None:
+        floor = self.background
+        if image.shape != floor.shape:
+            sizes = " and ".join(f"{one.shape[1]} x {one.shape[0]}" for one in (image, floor))
+            raise InputError(f"frame and background must be alike, they are {sizes} pixels")
+
     def detect_px(self, image: Image) -> Detection:
         """Silhouette and skeleton of a frame, in pixels.
 
@@ -128,13 +257,10 @@ class OverheadDetector:
             InputError: the frame is not as large as the background.
 
         """
+        self._check_size(image)
         floor = self.background
-        if image.shape != floor.shape:
-            sizes = " and ".join(f"{one.shape[1]} x {one.shape[0]}" for one in (image, floor))
-            raise InputError(f"frame and background must be alike, they are {sizes} pixels")
-        dark = cv2.convertScaleAbs(floor, alpha=1.0 - self.shade)
-        brighter, darker = cv2.subtract(image, floor), cv2.subtract(dark, image)
-        apart: Image = np.asarray(cv2.max(brighter, darker), dtype=np.uint8)
+        lit = lit_floor(image, floor, 0.5 * (_SURROUNDINGS * image.shape[1]) ** 2)
+        apart = np.minimum(unexplained(image, lit, self.shade), 255.0).astype(np.uint8)
         return BodyDetector(np.zeros_like(apart), Polarity.BOTH, "given").detect(apart)
 
 
@@ -142,6 +268,35 @@ def _projected(matrix: Floats, points: Floats) -> Floats:
     x, y = points[..., 0], points[..., 1]
     moved = [row[0] * x + row[1] * y + row[2] for row in matrix]
     return np.stack([moved[0] / moved[2], moved[1] / moved[2]], axis=-1)
+
+
+def _texture(image: Image) -> NDArray[np.float32]:
+    """(H / 2, W / 2) edges of a picture: light that changes slowly is not among them."""
+    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    half = grey.shape[1] // _HALF, grey.shape[0] // _HALF
+    small = cv2.resize(grey, half, interpolation=cv2.INTER_AREA).astype(np.float32)
+    fine, coarse = (cv2.GaussianBlur(small, (0, 0), reach) for reach in (1.0, 4.0))
+    return np.asarray(np.clip(fine - coarse, -8.0, 8.0), dtype=np.float32)
+
+
+def _parts_explained(
+    now: NDArray[np.float32], floor: NDArray[np.float32], moved: NDArray[np.float32]
+) -> int:
+    """How many more parts of the picture are like the moved floor than like the one before."""
+    far = _FURTHEST_PX // _HALF
+    before, after = (
+        cv2.resize(
+            ((now - one) ** 2)[far:-far, far:-far], _PARTS, interpolation=cv2.INTER_AREA
+        ) for one in (floor, moved)
+    )  # fmt: skip
+    better, worse = after < _BETTER * before, before < _BETTER * after
+    return int(better.sum()) - int(worse.sum())
+
+
+def _peak(values: Floats) -> float:
+    """Place of the top of the parabola through three values, from the middle one."""
+    bend = float(values[0] - 2.0 * values[1] + values[2])
+    return 0.0 if bend >= 0.0 else 0.5 * float(values[0] - values[2]) / bend
 
 
 def _least_triangle(corners: NDArray[np.float32]) -> float:

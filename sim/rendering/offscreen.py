@@ -40,21 +40,30 @@ class Offscreen:
         """Free the frame buffer; safe to call twice."""
         self.close.atexit = False  # EGL may be gone by then
 
-    def draw(self, scene: mujoco.MjvScene, caption: str = "") -> Image:
-        """Draw one frame, (height, width, 3), top row first; valid until the next one."""
+    def draw(
+        self, scene: mujoco.MjvScene, caption: str = "", size_px: tuple[int, int] | None = None
+    ) -> Image:
+        """Draw one frame, (height, width, 3), top row first; valid until the next one.
+
+        ``size_px`` is the width and height of a smaller frame; its view is that of the scene's
+        cameras.
+        """
+        width, height = size_px or (self._view.width, self._view.height)
+        view = mujoco.MjrRect(0, 0, width, height)
+        pixels = self._pixels.ravel()[: height * width * 3].reshape(height, width, 3)
         self._gl.make_current()
-        mujoco.mjr_render(self._view, scene, self._mjr)
+        mujoco.mjr_render(view, scene, self._mjr)
         if caption:
             mujoco.mjr_overlay(
                 mujoco.mjtFont.mjFONT_NORMAL,
                 mujoco.mjtGridPos.mjGRID_TOPLEFT,
-                self._view,
+                view,
                 caption,
                 "",
                 self._mjr,
             )
-        mujoco.mjr_readPixels(self._pixels, None, self._view, self._mjr)
-        return self._pixels[::-1]
+        mujoco.mjr_readPixels(pixels, None, view, self._mjr)
+        return pixels[::-1]
 
     def __enter__(self) -> Self:
         return self

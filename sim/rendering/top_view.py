@@ -15,13 +15,14 @@ from snakewalk.sim.rendering.shade import add_shade
 
 NOISE = 3.0
 """Standard deviation of the sensor's noise, of 255."""
-_FIELDS = 8
+_FIELDS, _SLACK = 8, 128  # of noise, and by how many pixels a field is larger than a picture
 
 
 class TopView:
     """Draws ``MujocoPlant.qpos`` from above; ``close`` it.
 
-    Level floors only. The same seed gives the same noise.
+    Level floors only. The floor is drawn once, and of each picture only the part round the robot.
+    The same seed gives the same noise.
 
     Raises:
         OffscreenError: nothing here draws without a screen.
@@ -52,8 +53,13 @@ class TopView:
         self._view.azimuth = 90.0 + math.degrees(camera.turn_rad)
         self._screen = Offscreen(model, *size)
         self._random = np.random.default_rng(seed)
-        shape = (_FIELDS, size[1], size[0], 3)
+        shape = (_FIELDS, size[1] + _SLACK, size[0] + _SLACK, 3)
         self._noise = np.rint(self._random.normal(0.0, NOISE, shape)).astype(np.int16)
+        self._camera, self._centre_m = camera, np.array(centre_m)
+        option = mujoco.MjvOption()
+        option.geomgroup[1] = 0  # the skin
+        self._update(option)
+        self._floor = self._screen.draw(self._scene).copy()
 
     def picture(self, qpos: Floats) -> Image:
         """(H, W, 3) the robot at ``qpos`` (7 + J,)."""
@@ -68,14 +74,17 @@ class TopView:
             self._robot,
             None,
         )
-        return self._drawn()
+        left, right, top, low = self._window(np.array(data.xipos[spine]))
+        self._look_at(left, right, top, low)
+        grey = self._floor.copy()
+        grey[top:low, left:right] = self._screen.draw(
+            self._scene, size_px=(right - left, low - top)
+        )
+        return self._sensed(grey)
 
     def empty_floor(self) -> Image:
         """(H, W, 3) the same without the robot."""
-        option = mujoco.MjvOption()
-        option.geomgroup[1] = 0  # the skin
-        self._update(option)
-        return self._drawn()
+        return self._sensed(self._floor)
 
     def close(self) -> None:
         """Free the frame buffer."""
@@ -89,9 +98,34 @@ class TopView:
         everything = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(model, data, option, None, self._view, everything, self._scene)
 
-    def _drawn(self) -> Image:
-        """Draw, and add the sensor's noise: one of a few fields, shifted by chance."""
+    def _window(self, links_m: Floats) -> tuple[int, int, int, int]:
+        """Columns and rows, first and behind the last, that hold the robot and its shade."""
+        camera, robot = self._camera, self._robot
+        c, s = math.cos(camera.turn_rad), math.sin(camera.turn_rad)
+        nearest = camera.height_m - float(links_m[:, 2].max()) - robot.body_radius_m
+        scale = camera.width_px / camera.field_width_m * camera.height_m / nearest
+        east, north = (links_m[:, :2] - self._centre_m).T
+        x = 0.5 * camera.width_px + scale * (c * east + s * north)
+        y = 0.5 * camera.height_px - scale * (c * north - s * east)
+        beyond = scale * (max(robot.link_lengths_m) + 4.0 * robot.body_radius_m)
+        span = []
+        for values, side in ((x, camera.width_px), (y, camera.height_px)):
+            first = min(max(math.floor(float(values.min()) - beyond), 0), side - 1)
+            span += [first, min(max(math.ceil(float(values.max()) + beyond), first + 1), side)]
+        return span[0], span[1], span[2], span[3]
+
+    def _look_at(self, left: int, right: int, top: int, low: int) -> None:
+        """Narrow the updated scene's cameras to these columns and rows."""
+        for camera in self._scene.camera:
+            half = camera.frustum_top
+            pixel = 2.0 * half / self._camera.height_px
+            camera.frustum_center = pixel * 0.5 * (left + right - self._camera.width_px)
+            camera.frustum_top, camera.frustum_bottom = half - pixel * top, half - pixel * low
+
+    def _sensed(self, grey: Image) -> Image:
+        """Add the sensor's noise: one of a few fields, a part of it by chance."""
         field = self._noise[self._random.integers(_FIELDS)]
-        down, right = (int(self._random.integers(side)) for side in field.shape[:2])
-        grey = self._screen.draw(self._scene) + np.roll(field, (down, right), axis=(0, 1))
-        return np.asarray(np.clip(grey, 0, 255), dtype=np.uint8)
+        down, right = (int(k) for k in self._random.integers(_SLACK, size=2))
+        rows, columns = grey.shape[:2]
+        noisy = grey + field[down : down + rows, right : right + columns]
+        return np.asarray(np.clip(noisy, 0, 255, out=noisy), dtype=np.uint8)

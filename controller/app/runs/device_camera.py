@@ -16,18 +16,26 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.controller.app.runs.rendered_camera import centre_of, require_whole_body
+from snakewalk.controller.app.runs.rendered_camera import (
+    CHECK_FRAMES,
+    centre_of,
+    require_whole_body,
+)
 from snakewalk.controller.capture.image.video import read_image
+from snakewalk.controller.localization.camera_pose import PriorAt
 from snakewalk.controller.localization.lens import Lens
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
     LineDetection,
     OverheadDetector,
 )
+from snakewalk.controller.localization.pose_tracking import BodyPrior, TrackedPose
 from snakewalk.drivers.clock import Clock
 
 PATIENCE_S = 5.0
 """How long the first frame is waited for."""
+ANSWER_S = 0.1
+"""How long the loop may take to say where the body is believed to be."""
 
 
 class DeviceCamera:
@@ -46,7 +54,12 @@ class DeviceCamera:
         self.detector = overhead_detector(run, robot)
         self._name = f"camera {camera.device}"
         self._device = open_device(camera)
-        self._found: queue.SimpleQueue[LineDetection | InputError] = queue.SimpleQueue()
+        self._robot = robot
+        self._found: queue.SimpleQueue[LineDetection | TrackedPose | InputError] = (
+            queue.SimpleQueue()
+        )
+        self._asked: queue.SimpleQueue[float] = queue.SimpleQueue()
+        self._answers: queue.SimpleQueue[BodyPrior | None] = queue.SimpleQueue()
         self._gone: InputError | None = None
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="overhead camera", daemon=True)
@@ -66,7 +79,7 @@ class DeviceCamera:
             InputError: none comes.
 
         """
-        self.arrived(self._clock.now_s())
+        self._collect(self._clock.now_s())
         if self._gone is not None:
             raise self._gone
         try:
@@ -76,11 +89,18 @@ class DeviceCamera:
         if isinstance(found, InputError):
             self._gone = found
             raise found
+        if isinstance(found, TrackedPose):
+            return self.first()
         return found
 
-    def arrived(self, now_s: float) -> list[LineDetection]:
+    def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection | TrackedPose]:
         """Return what has been seen since the last call, up to ``now_s``."""
-        found: list[LineDetection] = []
+        while not self._asked.empty():
+            self._answers.put(prior_at(self._asked.get_nowait()))
+        return self._collect(now_s)
+
+    def _collect(self, now_s: float) -> list[LineDetection | TrackedPose]:
+        found: list[LineDetection | TrackedPose] = []
         while not self._found.empty():
             one = self._found.get_nowait()
             if isinstance(one, InputError):
@@ -95,14 +115,32 @@ class DeviceCamera:
         self._thread.join(timeout=PATIENCE_S)
         self._device.release()
 
+    def _look(self, frame: Image, time_s: float) -> LineDetection | TrackedPose:
+        """Look near to where the loop believes the body; anywhere while no loop answers."""
+        while not self._answers.empty():  # to a frame that was given up
+            self._answers.get_nowait()
+        self._asked.put(time_s)
+        try:
+            prior = self._answers.get(timeout=ANSWER_S)
+        except queue.Empty:
+            prior = None
+        if prior is None:
+            return self.detector.detect(frame, time_s)
+        return self.detector.track(frame, time_s, prior, self._robot)
+
     def _watch(self) -> None:
+        taken = 0
         while not self._stop.is_set():
             whole, frame = self._device.read()
             if not whole:
                 self._found.put(InputError(f"{self._name}: hands over no more frames"))
                 return
+            taken += 1
             try:
-                self._found.put(self.detector.detect(in_colour(frame), self._clock.now_s()))
+                picture, time_s = in_colour(frame), self._clock.now_s()
+                if taken % CHECK_FRAMES == 0:
+                    self.detector = self.detector.registered(picture)
+                self._found.put(self._look(picture, time_s))
             except InputError as fault:
                 self._found.put(InputError(f"{self._name}: {fault}"))
                 return

@@ -11,12 +11,17 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.localization.camera_pose import PriorAt
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
     LineDetection,
     OverheadDetector,
 )
+from snakewalk.controller.localization.pose_tracking import BodyPrior, TrackedPose
 from snakewalk.drivers.clock import Clock
+
+CHECK_FRAMES = 15
+"""After so many frames each it is looked whether the camera was bumped."""
 
 
 def centre_of(run: RunConfig) -> tuple[float, float]:
@@ -69,20 +74,22 @@ class RenderedCamera:
         self._qpos, self._clock = qpos, clock
         self._period_s = 1.0 / run.camera.rate_hz
         self._next_s = clock.now_s()
-        self._coming: deque[LineDetection] = deque()
+        self._coming: deque[LineDetection | TrackedPose] = deque()
+        self._robot = robot
+        self._taken = 0
         require_whole_body(self.first(), "the simulated camera")
 
     def first(self) -> LineDetection:
         """Look now."""
         return self._detect(self._clock.now_s())
 
-    def arrived(self, now_s: float) -> list[LineDetection]:
+    def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection | TrackedPose]:
         """Take a frame if one is due; return those that have arrived."""
         if now_s >= self._next_s - 1e-9:
-            self._coming.append(self._detect(now_s))
+            self._coming.append(self._track(now_s, prior_at(now_s)))
             missed = int((now_s - self._next_s) / self._period_s + 1e-9)
             self._next_s += (missed + 1) * self._period_s
-        found = []
+        found: list[LineDetection | TrackedPose] = []
         while self._coming and self._coming[0].time_s + self._period_s <= now_s + 1e-9:
             found.append(self._coming.popleft())
         return found
@@ -90,6 +97,15 @@ class RenderedCamera:
     def close(self) -> None:
         """Free the frame buffer."""
         self._view.close()
+
+    def _track(self, now_s: float, prior: BodyPrior | None) -> LineDetection | TrackedPose:
+        picture = self._view.picture(self._qpos())
+        self._taken += 1
+        if self._taken % CHECK_FRAMES == 0:
+            self.detector = self.detector.registered(picture)
+        if prior is None:
+            return self.detector.detect(picture, now_s)
+        return self.detector.track(picture, now_s, prior, self._robot)
 
     def _detect(self, now_s: float) -> LineDetection:
         return self.detector.detect(self._view.picture(self._qpos()), now_s)

@@ -10,7 +10,7 @@ from snakewalk.config.loader import load_robot
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
-from snakewalk.controller.localization.camera_pose import CameraPose
+from snakewalk.controller.localization.camera_pose import CameraPose, PriorAt
 from snakewalk.controller.localization.dead_reckoning import DeadReckoning
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
@@ -98,7 +98,7 @@ class ScriptedCamera:
     def first(self) -> LineDetection:
         return self.start or self.frames[0]
 
-    def arrived(self, now_s: float) -> list[LineDetection]:
+    def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection]:
         due = [one for one in self.frames if one.time_s + self.delay_s <= now_s]
         new = due[self.handed :]
         self.handed = len(due)

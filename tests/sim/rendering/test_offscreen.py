@@ -42,3 +42,24 @@ def test_two_views_draw_by_turns_and_one_outlives_the_other(closed_first: int) -
     views.pop(closed_first).close()
     assert shows_the_body(views[0])
     views[0].close()
+
+
+@pytest.mark.parametrize("start_m", [(0.4, 0.3), (2.6, 0.2), (9.0, 0.0)])
+def test_the_part_round_the_robot_is_drawn_as_in_the_whole_picture(
+    start_m: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the middle, over an edge, out of view; the camera turned and near."""
+    monkeypatch.setattr("snakewalk.sim.rendering.top_view.NOISE", 0.0)
+    camera = CameraConfig(width_px=320, height_px=240, turn_rad=0.3, height_m=3.0)
+    try:
+        top = TopView(ROBOT, WORLD, camera, (0.0, 0.0))
+    except OffscreenError as error:
+        pytest.skip(str(error))
+    bend = 0.4 * np.sin(0.6 * np.arange(16))
+    qpos = np.concatenate([[*start_m], AT_REST[2:7], bend])
+    part = top.picture(qpos)
+    monkeypatch.setattr(TopView, "_window", lambda self, links: (0, 320, 0, 240))
+    whole = top.picture(qpos)
+    assert cv2.absdiff(part, whole).max() <= 2
+    assert (cv2.absdiff(whole, top.empty_floor()).max() > 100) == (start_m[0] < 9.0)
+    top.close()

@@ -1,0 +1,220 @@
+"""The overhead camera under faults of light and view: rendered frames, 16 poses each.
+
+``python -m benchmarks disturbed_views``; ``SEED=n`` takes other poses and noise.
+"""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from benchmarks.rows import Row
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.camera import CameraConfig
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.controller.kinematics.links import body_in_world, pose_at
+from snakewalk.controller.localization.lens import Lens
+from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadDetector
+from snakewalk.controller.localization.pose_tracking import BodyPrior
+from snakewalk.sim.physics.plant import MujocoPlant
+from snakewalk.sim.rendering.top_view import TopView
+
+TITLE = "Overhead camera, rendered views with faults: 16 poses each, wrong is over 5 mm and used"
+
+POSES = 16
+WRONG_M = 0.005
+CAMERA = CameraConfig()
+Effect = Callable[[Floats, np.random.Generator, Floats], Floats]
+"""(H, W, 3) frame, chance, (2,) pixel of the body's middle -> (H, W, 3) frame."""
+
+
+def _gain(by: float) -> Effect:
+    return lambda frame, chance, at: frame * by
+
+
+def _gradient(frame: Floats, chance: np.random.Generator, at: Floats) -> Floats:
+    """From 0.7 to 1.3 across the picture, in any direction."""
+    turn = chance.uniform(0.0, 2.0 * np.pi)
+    v, u = np.mgrid[-1.0 : 1.0 : frame.shape[0] * 1j, -1.0 : 1.0 : frame.shape[1] * 1j]
+    along = (np.cos(turn) * u + np.sin(turn) * v) / (abs(np.cos(turn)) + abs(np.sin(turn)))
+    return np.asarray(frame * (1.0 + 0.3 * along)[..., None])
+
+
+def _sun(frame: Floats, chance: np.random.Generator, at: Floats) -> Floats:
+    """A window's patch, 1.4 times as bright, whose edge crosses the body."""
+    patch = np.zeros(frame.shape[:2], np.float32)
+    turn = chance.uniform(0.0, 2.0 * np.pi)
+    ahead, side = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+    near = at + chance.uniform(-20.0, 20.0, 2)
+    corners = [near - 90 * side, near + 90 * side, near + 90 * side + 200 * ahead]
+    corners.append(near - 90 * side + 200 * ahead)
+    cv2.fillPoly(patch, [np.rint(corners).astype(np.int32)], 1.0)
+    return frame * (1.0 + 0.4 * cv2.GaussianBlur(patch, (0, 0), 2.0))[..., None]
+
+
+def _noise(frame: Floats, chance: np.random.Generator, at: Floats) -> Floats:
+    """15 grey levels in all: the view has 3 of them already."""
+    return frame + chance.normal(0.0, np.sqrt(15.0**2 - 3.0**2), frame.shape)
+
+
+def _person(frame: Floats, chance: np.random.Generator, at: Floats) -> Floats:
+    """Head, shoulders and an arm from an edge, larger than the robot, with a soft shadow."""
+    high, wide = frame.shape[:2]
+    left = chance.random() < 0.5
+    foot = np.array([0.0 if left else wide - 1.0, chance.uniform(0.2, 0.8) * high])
+    inward = 1.0 if left else -1.0
+    reach = foot + np.array([inward * 110.0, chance.uniform(-60.0, 60.0)])
+    away = at - reach
+    if np.hypot(*away) < 90.0:  # a hand that does not cover the robot
+        reach = at - 90.0 * away / max(float(np.hypot(*away)), 1.0)
+    shapes = [(foot, (40, 70)), (foot + np.array([18.0 * inward, 0.0]), (16, 16))]
+    shade = np.zeros((high, wide), np.float32)
+    out = frame.copy()
+    for (x, y), axes in shapes:
+        cv2.ellipse(shade, (int(x + 12), int(y + 8)), axes, 0, 0, 360, 1.0, -1)
+    out *= 1.0 - 0.3 * cv2.GaussianBlur(shade, (0, 0), 6.0)[..., None]
+    for ((x, y), axes), colour in zip(shapes, ((60, 80, 140), (60, 45, 35)), strict=True):
+        cv2.ellipse(out, (int(x), int(y)), axes, 0, 0, 360, colour, -1)
+    hand = tuple(np.rint(reach).astype(int).tolist())
+    cv2.line(out, tuple(np.rint(foot).astype(int).tolist()), hand, (205, 160, 135), 12)
+    return out
+
+
+def _shift(frame: Floats, chance: np.random.Generator, at: Floats) -> Floats:
+    turn = chance.uniform(0.0, 2.0 * np.pi)
+    move = np.array([[1.0, 0.0, 4.0 * np.cos(turn)], [0.0, 1.0, 4.0 * np.sin(turn)]])
+    return np.asarray(
+        cv2.warpAffine(frame, move, frame.shape[1::-1], borderMode=cv2.BORDER_REPLICATE)
+    )
+
+
+EFFECTS: dict[str, Effect] = {
+    "as it is": _gain(1.0),
+    "light x 0.65": _gain(0.65),
+    "light x 0.9": _gain(0.9),
+    "light x 1.1": _gain(1.1),
+    "light x 1.5": _gain(1.5),
+    "gradient of 30 %": _gradient,
+    "sun patch": _sun,
+    "noise of 15": _noise,
+    "person at the edge": _person,
+    "shift of 4 px": _shift,
+}
+
+
+@dataclass(frozen=True)
+class Scene:
+    picture: Image
+    qpos: Floats
+    joint_rad: Floats
+    head_m: Floats
+    heading_rad: float
+
+
+@dataclass(frozen=True)
+class Found:
+    used: int
+    wrong: int
+    head_max_m: float
+
+
+def scenes(seed: int) -> tuple[list[Scene], Image]:
+    """Poses of a walk's shapes anywhere in the view, and the empty floor."""
+    robot, world = load_robot("yaw16"), load_world("flat")
+    chance = np.random.default_rng(seed)
+    view = TopView(robot, world, CAMERA, (0.0, 0.0), seed)
+    plant = MujocoPlant(robot, world)
+    found = []
+    for _ in range(POSES):
+        bend = chance.uniform(0.15, 0.5) * np.sin(
+            chance.uniform(0.0, 6.3) + chance.uniform(0.4, 0.8) * np.arange(robot.joint_count)
+        ) + chance.uniform(-0.05, 0.05)
+        heading = float(chance.uniform(-np.pi, np.pi))
+        where = chance.uniform((-1.9, -1.2), (1.9, 1.2))
+        back = 0.5 * robot.length_m * np.array([np.cos(heading), np.sin(heading)])
+        start = where + back
+        plant.reset((float(start[0]), float(start[1])), heading, bend)
+        pose = plant.head_pose()
+        body = body_in_world(robot, pose, bend)
+        found.append(
+            Scene(
+                view.picture(plant.qpos).copy(),
+                plant.qpos.copy(),
+                bend,
+                pose.head_in_world_m[:2].copy(),
+                float(body.headings_rad[0]),
+            )
+        )
+    floor = view.empty_floor().copy()
+    view.close()
+    return found, floor
+
+
+def run() -> list[Row]:
+    """Measure."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        drawn, floor = scenes(int(os.environ.get("SEED", "1000")))
+        rows = []
+        for name, effect in EFFECTS.items():
+            rows += _told(name, measure(drawn, floor, effect, None))
+        for k1 in (-0.1, -0.3):
+            rows += _told(f"k1 = {k1:g}", measure(drawn, floor, _gain(1.0), _lens(k1)))
+        return rows
+    finally:
+        cv2.setNumThreads(threads)
+
+
+def _lens(k1: float) -> Lens:
+    focal = CAMERA.width_px * CAMERA.height_m / CAMERA.field_width_m
+    middle = 0.5 * (CAMERA.width_px - 1), 0.5 * (CAMERA.height_px - 1)
+    matrix = np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
+    return Lens((CAMERA.width_px, CAMERA.height_px), matrix, np.array([k1, 0.0, 0.0, 0.0, 0.0]))
+
+
+def _bent(frame: Image, lens: Lens | None) -> Image:
+    """The frame as the lens would have made it."""
+    if lens is None:
+        return frame
+    u, v = np.meshgrid(*(np.arange(side, dtype=float) for side in frame.shape[1::-1]))
+    at = lens.undistorted(np.stack([u, v], axis=-1)).astype(np.float32)
+    bent = cv2.remap(
+        frame, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+    return np.asarray(bent, dtype=np.uint8)
+
+
+def measure(drawn: list[Scene], floor: Image, effect: Effect, lens: Lens | None) -> Found:
+    """Track each pose from a belief that is off by up to 40 mm each way and 0.1 rad."""
+    robot = load_robot("yaw16")
+    model = CameraModel.straight_down(CAMERA, (0.0, 0.0), lens)
+    detector = OverheadDetector(model, _bent(floor, lens), robot.body_radius_m, CAMERA.shade)
+    off_m = []
+    for k, scene in enumerate(drawn):
+        chance = np.random.default_rng((k, 7))
+        body = body_in_world(robot, pose_at(scene.head_m, scene.heading_rad), scene.joint_rad)
+        at = model.in_image(body.link_m[:, :2].mean(axis=0), robot.body_radius_m)
+        frame = effect(_bent(scene.picture, lens).astype(float), chance, at)
+        image = np.clip(np.rint(frame), 0.0, 255.0).astype(np.uint8)
+        believed = pose_at(
+            scene.head_m + chance.uniform(-0.04, 0.04, 2),
+            scene.heading_rad + float(chance.uniform(-0.1, 0.1)),
+        )
+        guess = body_in_world(robot, believed, scene.joint_rad)
+        prior = BodyPrior(guess.link_m[:, :2], guess.forward[:, :2])
+        found = detector.registered(image).track(image, 0.0, prior, robot)
+        if not found.fault:
+            off_m.append(float(np.hypot(*(found.head_m - scene.head_m))))
+    return Found(len(off_m), sum(d > WRONG_M for d in off_m), max(off_m, default=float("nan")))
+
+
+def _told(name: str, found: Found) -> list[Row]:
+    return [
+        Row(f"{name}: used, of {POSES}", found.used, "frames", "15", 15 / max(found.used, 1), 1.0),
+        Row(f"{name}: used and wrong", found.wrong, "frames", "none", float(found.wrong), 0.0),
+        Row(f"{name}: head, worst", 1e3 * found.head_max_m, "mm", "5 mm",
+            found.head_max_m / WRONG_M, 1.0),
+    ]  # fmt: skip

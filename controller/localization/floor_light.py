@@ -1,0 +1,59 @@
+"""The light on a floor, and what is not explained by it.
+
+The ratio of a frame to the picture of the empty floor is smooth or has edges (gain, a gradient, a
+patch of sun), and the robot is thin: the median of the ratio over a square of twice the body's area
+never shows the body.
+"""
+
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Image
+
+_ONE: Final = 100.0  # of 255: a ratio of 1; up to 2.5 times the light is told
+_DARKEST: Final = np.uint8(8)  # grey levels: a ratio to less than this says nothing
+_GLARE: Final = 0.3  # by how much light may grow beyond that of the surroundings: soft edges (ours)
+
+
+def lit_floor(image: Image, floor: Image, body_area_px: float) -> Image:
+    """(H, W[, 3]) the empty floor in the light of a frame.
+
+    Args:
+        image: (H, W[, 3]) the frame.
+        floor: (H, W[, 3]) the same without the robot, in another light.
+        body_area_px: that the robot covers.
+
+    """
+    ratio = cv2.divide(_grey(image), np.maximum(_grey(floor), _DARKEST), scale=_ONE)
+    side = int(np.sqrt(2.0 * body_area_px)) + 1
+    light = cv2.medianBlur(np.asarray(ratio, dtype=np.uint8), min(side | 1, 255))
+    spread = light if floor.ndim == 2 else cv2.merge([light] * 3)
+    return np.asarray(cv2.multiply(floor, spread, scale=1.0 / _ONE), dtype=np.uint8)
+
+
+def unexplained(image: Image, lit: Image, shade: float) -> NDArray[np.float32]:
+    """(H, W) grey levels by which a frame is off its lit floor, in its strongest channel.
+
+    Shadow and light scale all channels alike: a pixel that is darker by up to ``shade`` or brighter
+    by a little in all of them is floor, and of others this part is taken off.
+    """
+    now, floor = (np.atleast_3d(one).astype(np.float32) for one in (image, lit))
+    ratio = now / np.maximum(floor, 1.0)
+    channels = [ratio[..., k] for k in range(ratio.shape[2])]
+    most, least = channels[0], channels[0]
+    for one in channels[1:]:
+        most, least = np.maximum(most, one), np.minimum(least, one)
+    shadow, glare = np.clip(most, 1.0 - shade, 1.0), np.clip(least, 1.0, 1.0 + _GLARE)
+    apart = np.zeros(most.shape, dtype=np.float32)
+    for k in range(ratio.shape[2]):
+        here, ground = now[..., k], floor[..., k]
+        np.maximum(apart, np.maximum(shadow * ground - here, here - glare * ground), out=apart)
+    return apart
+
+
+def _grey(image: Image) -> Image:
+    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    return np.asarray(grey, dtype=np.uint8)
