@@ -126,7 +126,7 @@ class Pilot(OnCourse):
         self._feedback = feedback
         self._aim_at_waypoint = aim_at_waypoint
         self._start: tuple[Floats, float] | None = None
-        self._at_rest = False
+        self._at_rest = True
         self._decides = True
         self.decision: Decision | None = None
         """Made in the last step, if one was."""

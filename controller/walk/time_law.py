@@ -43,7 +43,7 @@ class TimeLaw:
         """Segments travelled."""
         self.speed_segments_s = 0.0
         self._first = self.joints.first
-        self._allowed = np.array([self._cruise])
+        self._allowed = np.zeros(1)  # nothing is known of what comes
         self._slope = np.zeros(1)
 
     def restart(self) -> None:

@@ -69,6 +69,17 @@ def test_on_a_straight_track_the_head_ramps_up_and_then_keeps_the_wanted_speed()
     assert pulse.head - 100.0 == pytest.approx(0.5 * 20.0 * (1.0 + DT))  # sum of an arithmetic row
 
 
+def test_it_sets_off_from_rest_however_long_it_waited_for_a_track() -> None:
+    joints = straight()
+    pulse = timed(joints, wanted=20.0, ramp_s=1.0)
+    for _ in range(50):
+        pulse.advance(DT)
+    assert pulse.speed_segments_s == 0.0
+    joints.track.append(np.zeros(200))
+    pulse.advance(DT)
+    assert pulse.speed_segments_s == pytest.approx(20.0 * DT)
+
+
 def test_a_bend_ahead_is_braked_for_and_the_end_is_never_overrun() -> None:
     joints = straight()
     joints.track.append(
