@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Final, Literal, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticSerializationError, to_json
@@ -15,9 +15,11 @@ from pydantic_core import PydanticSerializationError, to_json
 from snakewalk.config.base import NAME_PATTERN
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.gait import GaitSetConfig
-from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import RunConfig
-from snakewalk.config.world import ElevationGround, MapGround, WorldConfig
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
+    from snakewalk.config.run import RunConfig
+    from snakewalk.config.world import WorldConfig
 
 M = TypeVar("M", bound=BaseModel)
 Kind = Literal["robots", "worlds", "runs", "recordings", "gaits", "skins"]
@@ -108,13 +110,17 @@ def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
     return checked(type(config), data, source)
 
 
-def load_robot(name_or_path: str, beside: Path | None = None) -> RobotConfig:
+def load_robot(name_or_path: str, beside: Path | None = None) -> "RobotConfig":
     """Load a robot by shipped name or path."""
+    from snakewalk.config.robot import RobotConfig  # noqa: PLC0415  slow to build; a list of gaits needs none
+
     return load(locate("robots", name_or_path, beside), RobotConfig)
 
 
-def load_world(name_or_path: str, beside: Path | None = None) -> WorldConfig:
+def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
     """Load a world by shipped name or path."""
+    from snakewalk.config.world import ElevationGround, MapGround, WorldConfig  # noqa: PLC0415
+
     path = locate("worlds", name_or_path, beside)
     world = load(path, WorldConfig)
     if isinstance(world.ground, ElevationGround | MapGround):
@@ -125,8 +131,10 @@ def load_world(name_or_path: str, beside: Path | None = None) -> WorldConfig:
     return world
 
 
-def load_run(name_or_path: str) -> RunConfig:
+def load_run(name_or_path: str) -> "RunConfig":
     """Load a run by shipped name or path."""
+    from snakewalk.config.run import RunConfig  # noqa: PLC0415
+
     return load(locate("runs", name_or_path), RunConfig)
 
 
@@ -137,12 +145,7 @@ def load_gait(name_or_path: str) -> GaitSetConfig:
 
 def known_keys() -> list[str]:
     """Keys of a run, a robot and a world, dotted behind the name of their file."""
-    models: dict[str, type[BaseModel]] = {
-        "run": RunConfig,
-        "robot": RobotConfig,
-        "world": WorldConfig,
-    }
-    found = [key for name, model in models.items() for key in _dotted(name, model)]
+    found = [key for name, model in _files().items() for key in _dotted(name, model)]
     return list(dict.fromkeys(found))
 
 
@@ -199,6 +202,15 @@ def _parts(key: str) -> list[str]:
     return [part.strip(" \"'") for part in key.split(".")]
 
 
+def _files() -> dict[str, type[BaseModel]]:
+    """Schemas of the three files of a run, by their names."""
+    from snakewalk.config.robot import RobotConfig  # noqa: PLC0415
+    from snakewalk.config.run import RunConfig  # noqa: PLC0415
+    from snakewalk.config.world import WorldConfig  # noqa: PLC0415
+
+    return {"run": RunConfig, "robot": RobotConfig, "world": WorldConfig}
+
+
 def _keys(kind: Any) -> Iterator[str]:
     """Keys of a schema and of all tables in it."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
@@ -226,12 +238,7 @@ def _meant(model: type[BaseModel], key: str) -> str:
     near = get_close_matches(key, set(_keys(model)) - {key}, 1, 0.78)
     if near:
         return f"; did you mean {near[0]}?"
-    files: dict[str, type[BaseModel]] = {
-        "run": RunConfig,
-        "robot": RobotConfig,
-        "world": WorldConfig,
-    }
-    owner = next((n for n, m in files.items() if m is not model and key in m.model_fields), None)
+    owner = next((n for n, m in _files().items() if m is not model and key in m.model_fields), None)
     return "" if owner is None else f"; it is a key of a {owner}'s file"
 
 

@@ -11,6 +11,7 @@ chain fitting and keyframe wave extraction, Autonomous Robots 28, 2010.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +20,6 @@ from scipy.spatial import cKDTree
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import (
     BodyView,
     body_in_world,
@@ -30,6 +30,9 @@ from snakewalk.controller.kinematics.links import (
 )
 from snakewalk.controller.kinematics.rotations import rotation_by
 from snakewalk.drivers.types import BodyPose
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 SAMPLES_A_LINK = 24
 """Of the curve, over the length of a mean link."""
@@ -45,7 +48,7 @@ DONE = 1e-7
 class SpaceCurve:
     """A curve by arc length, densely sampled."""
 
-    def __init__(self, robot: RobotConfig, curve_m: ArrayLike) -> None:
+    def __init__(self, robot: "RobotConfig", curve_m: ArrayLike) -> None:
         points = np.asarray(curve_m, dtype=float)
         if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4:
             raise InputError(f"a backbone curve has four points (x, y, z) or more: {points.shape}")
@@ -103,7 +106,7 @@ class BackboneFit:
 
 
 def fit_backbone(
-    robot: RobotConfig, curve_m: ArrayLike, roll_rad: float = 0.0, *, refine: bool = True
+    robot: "RobotConfig", curve_m: ArrayLike, roll_rad: float = 0.0, *, refine: bool = True
 ) -> BackboneFit:
     """Fit the chain to a curve given by points (N, 3) from the head backwards.
 
@@ -156,13 +159,13 @@ def fit_backbone(
     return BackboneFit(joints, tip, rotation, points, away_m)
 
 
-def _body(robot: RobotConfig, joint_rad: Floats, tip_m: Floats, rotation: Floats) -> BodyView:
+def _body(robot: "RobotConfig", joint_rad: Floats, tip_m: Floats, rotation: Floats) -> BodyView:
     """Forward kinematics from the head's tip (3,) and axes (3, 3)."""
     head_m = tip_m - half_lengths_m(robot)[0] * rotation[:, 0]
     return body_in_world(robot, BodyPose(0.0, head_m, rotation), joint_rad)
 
 
-def _seed(robot: RobotConfig, curve: SpaceCurve, roll_rad: float) -> tuple[Floats, Floats]:
+def _seed(robot: "RobotConfig", curve: SpaceCurve, roll_rad: float) -> tuple[Floats, Floats]:
     """Rotation of the head and bends of the joints, from the curve's bends in its own frame."""
     forward = -curve.tangents
     up = np.array([0.0, 0.0, 1.0])

@@ -1,12 +1,16 @@
 """The compound serpenoid: one sine wave for the yaw joints, one for the pitch joints."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import travelling
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 
 class CompoundSerpenoidParameters(GaitParameters):
@@ -36,7 +40,7 @@ class CompoundSerpenoid(Gait):
     needs = Needs(yaw=True, pitch=True)
     model = CompoundSerpenoidParameters
 
-    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p, yaw, pitch = self.params, robot.yaw_joints, robot.pitch_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         lateral = travelling(robot, yaw, phase_rad, p.lateral_waves, 0.0)

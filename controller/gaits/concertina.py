@@ -1,13 +1,17 @@
 """Concertina: a part of the body folds, and the fold runs from the tail to the head."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import TURN, bends_rad, group_places
 from snakewalk.controller.kinematics.smoothstep import cubic
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 EDGE = 0.7
 """Share of the folded part over which the folds grow and vanish."""
@@ -34,7 +38,7 @@ class Concertina(Gait):
     needs = Needs(yaw=True)
     model = ConcertinaParameters
 
-    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p, yaw = self.params, robot.yaw_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         at = group_places(robot, yaw)

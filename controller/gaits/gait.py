@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
@@ -12,7 +12,9 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked
-from snakewalk.config.robot import RobotConfig
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 CYCLE_SAMPLES = 129
 """Phases at which a cycle is sampled; the first and the last are the same."""
@@ -31,7 +33,7 @@ class Needs:
     wheels: bool = False
     """Whether it advances only on a belly that slides along easily and across badly."""
 
-    def check(self, robot: RobotConfig, what: str) -> None:
+    def check(self, robot: "RobotConfig", what: str) -> None:
         """Refuse a robot that lacks the joints.
 
         Raises:
@@ -108,7 +110,7 @@ class Gait(ABC):
         """
         return cls(checked(cls.model, dict(values or {}), source or f"gait {cls.name}"))
 
-    def joints_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def joints_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         """(T, J) joint angles at phases (T,), period 2 pi.
 
         Raises:
@@ -121,7 +123,7 @@ class Gait(ABC):
             joints[:, robot.yaw_joints] *= -1.0
         return joints
 
-    def check(self, robot: RobotConfig) -> None:
+    def check(self, robot: "RobotConfig") -> None:
         """Refuse a robot that lacks joints, or whose joints do not bend so far.
 
         Raises:
@@ -139,7 +141,7 @@ class Gait(ABC):
             )
 
     @abstractmethod
-    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         """(T, J), a fresh array, before mirroring and limits."""
 
 

@@ -8,15 +8,17 @@ slipping on what it holds, a body of radius r goes ``2 pi r cos g`` along the ax
 
 import math
 from abc import abstractmethod
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import places
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 SOURCE = (
     "M. Tesch et al., Parameterized and scripted gaits for modular snake robots, Advanced "
@@ -26,7 +28,7 @@ SOURCE = (
 
 
 def helix_joints_rad(
-    robot: RobotConfig, phase_rad: Floats, radius_m: float, rise_rad: float, hand: int
+    robot: "RobotConfig", phase_rad: Floats, radius_m: float, rise_rad: float, hand: int
 ) -> Floats:
     """(T, J) of a helix about whose line the body has turned by phases (T,).
 
@@ -100,7 +102,7 @@ class _Helix(Gait):
     def _radius_m(self) -> float:
         """Of the centre line."""
 
-    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p = self.params
         hand = -1 if p.left_handed else 1
         direction = hand * (-1 if p.backward else 1) * (-1 if self.inside else 1)

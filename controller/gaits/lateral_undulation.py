@@ -1,12 +1,16 @@
 """Lateral undulation: a serpenoid wave in the plane, which wheels or scales turn into thrust."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import joint_amplitude_rad, travelling
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 
 class LateralUndulationParameters(GaitParameters):
@@ -30,7 +34,7 @@ class LateralUndulation(Gait):
     world = "flat"
     model = LateralUndulationParameters
 
-    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p, yaw = self.params, robot.yaw_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         amplitude = joint_amplitude_rad(robot, yaw, p.winding_rad, p.waves)

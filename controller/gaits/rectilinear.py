@@ -1,12 +1,16 @@
 """Rectilinear motion: a wave in height runs along a body that stays straight in plan."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import TURN, joint_amplitude_rad, places, travelling
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 
 class RectilinearParameters(GaitParameters):
@@ -32,7 +36,7 @@ class Rectilinear(Gait):
     needs = Needs(pitch=True)
     model = RectilinearParameters
 
-    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p, pitch, yaw = self.params, robot.pitch_joints, robot.yaw_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         lift = joint_amplitude_rad(robot, pitch, p.lift_rad, p.waves)

@@ -1,11 +1,15 @@
 """Rolling: the body lies in an arc and turns about its own line."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 
 class RollingParameters(GaitParameters):
@@ -26,7 +30,7 @@ class Rolling(Gait):
     needs = Needs(yaw=True, pitch=True)
     model = RollingParameters
 
-    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         joints = np.zeros((len(phase_rad), robot.joint_count))
         for own, wave in (
             (robot.yaw_joints, np.cos(phase_rad)),

@@ -1,12 +1,16 @@
 """Sidewinding: a wave in the plane and one in height, a quarter apart: the body goes sideways."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import joint_amplitude_rad, travelling
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 
 class SidewindingParameters(GaitParameters):
@@ -33,7 +37,7 @@ class Sidewinding(Gait):
     needs = Needs(yaw=True, pitch=True)
     model = SidewindingParameters
 
-    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p, yaw, pitch = self.params, robot.yaw_joints, robot.pitch_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         plan = joint_amplitude_rad(robot, yaw, p.winding_rad, p.waves)

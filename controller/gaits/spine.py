@@ -6,15 +6,17 @@ modes drives Lighthill's travelling form here, and the printed form stays as the
 Amplitudes are printed without a unit: taken in that of ``u``, of which a body is 2 pi long.
 """
 
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Frequency, Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import TURN, places
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 SAMPLES = 257
 """Of the spine, before it is divided into equal links."""
@@ -82,7 +84,7 @@ class SpineGait(Gait):
     world = "pool"
     vertical: ClassVar[bool] = False
 
-    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p = self.params
         own = robot.pitch_joints if self.vertical else robot.yaw_joints
         edges = np.concatenate([[0.0], places(robot, own), [1.0]])

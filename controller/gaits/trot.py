@@ -9,16 +9,18 @@ take their height from one ``T_y``; here each foot has a phase of its own in hei
 """
 
 from abc import ABC
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Frequency, Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import TURN
 from snakewalk.controller.kinematics import smoothstep
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 
 class LegParameters(GaitParameters):
@@ -49,7 +51,7 @@ class LegGait(Gait, ABC):
     steers = True
     model = LegParameters
 
-    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         joints = np.zeros((len(phase_rad), robot.joint_count))
         self._bend(robot, phase_rad, joints)
         p = self.params
@@ -78,7 +80,7 @@ class LegGait(Gait, ABC):
         air = np.clip((at - self.duty) / (1.0 - self.duty), 0.0, 1.0)
         return np.sin(0.5 * TURN * air) ** 2
 
-    def _bend(self, robot: RobotConfig, phase_rad: Floats, joints: Floats) -> None:
+    def _bend(self, robot: "RobotConfig", phase_rad: Floats, joints: Floats) -> None:
         """Turn the girdles: each is turned furthest when its legs are.
 
         The left front leg is foremost at phase 0 of its offset: the front girdle is then turned to

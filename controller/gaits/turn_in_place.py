@@ -1,12 +1,16 @@
 """Turn in place: sidewinding whose two halves go opposite ways."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import joint_amplitude_rad, places, travelling
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
 
 
 class TurnInPlaceParameters(GaitParameters):
@@ -30,7 +34,7 @@ class TurnInPlace(Gait):
     needs = Needs(yaw=True, pitch=True)
     model = TurnInPlaceParameters
 
-    def _shape_rad(self, robot: RobotConfig, phase_rad: Floats) -> Floats:
+    def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p, yaw, pitch = self.params, robot.yaw_joints, robot.pitch_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         plan = joint_amplitude_rad(robot, yaw, p.winding_rad, p.waves)

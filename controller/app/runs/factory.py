@@ -36,6 +36,7 @@ from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.repertoire.repertoire import load_repertoire
 from snakewalk.drivers.bus.budget import chain_budget
+from snakewalk.sim.servo.models import MODELS
 
 C = TypeVar("C", RunConfig, RobotConfig, WorldConfig)
 _FIELDS = {
@@ -429,13 +430,34 @@ def prepare_source(
     return SourceRun(run, _with_gains(body, pitch=needs.pitch), load_world(run.world), make)
 
 
-def _check_servos(run: RunConfig, robot: RobotConfig) -> None:
-    """Refuse a cycle longer than its period on the wire, and a current that no servo reaches.
+def check_supply(robot: RobotConfig) -> None:
+    """Refuse a supply at which a servo would do nothing but raise its alarm.
 
     Raises:
-        InputError: with the highest rate that fits; with the current at which the model stalls.
+        InputError: with the model's range of voltages, and the one that its page recommends.
 
     """
+    for model in dict.fromkeys(robot.servo_models):
+        facts = MODELS.get(model)
+        if facts is None:  # what another servo takes is not known here
+            continue
+        low_v, high_v = (tenths / 10.0 for tenths in facts.volts)
+        if not low_v <= robot.servo.supply_v <= high_v:
+            raise InputError(
+                f"robot {robot.name}: servo.supply_v = {robot.servo.supply_v:g}: {model} takes "
+                f"{low_v:g} to {high_v:g} V; recommended: supply_v = {facts.nominal_v:g}"
+            )
+
+
+def _check_servos(run: RunConfig, robot: RobotConfig) -> None:
+    """Refuse a wrong supply, a cycle longer than its period, and a current that no servo reaches.
+
+    Raises:
+        InputError: with the model's voltages; with the highest rate that fits; with the current at
+            which the model stalls.
+
+    """
+    check_supply(robot)
     if run.safety.current_limit_a is not None:
         try:
             robot.check_over_current("safety.current_limit_a", run.safety.current_limit_a)

@@ -8,6 +8,7 @@ import numpy as np
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.app.runs.factory import check_supply
 from snakewalk.controller.app.studies.repertoire_physics import FRAME_S, PhysicsBody
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.gaits.wave import TURN
@@ -59,10 +60,11 @@ def record(
     """Record every action; ``on_progress`` takes the name and its share, 0 to 1.
 
     Raises:
-        InputError: joints are missing, or do not bend so far.
+        InputError: joints are missing, or do not bend so far; the supply is not the servos'.
         SafetyTrippedError: the simulated servos were asked too much.
 
     """
+    check_supply(robot)
     segments = tuple(record_action(robot, world, action, on_progress) for action in actions)
     return Repertoire(robot.name, robot.joint_axes, world.name, robot.length_m, segments)
 

@@ -1,19 +1,20 @@
 """Robots of other servos, written from the pages alone, through every command that runs one."""
 
 import re
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.loader import load_robot
+from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import STALL_CURRENT_A, RobotConfig, ServoConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.app.cli.main import main
-from snakewalk.controller.app.runs.factory import prepare_gait, prepare_walk
-from snakewalk.controller.app.studies import tune
+from snakewalk.controller.app.runs.factory import prepare_gait, prepare_playback, prepare_walk
+from snakewalk.controller.app.studies import repertoire_recording, tune
+from snakewalk.controller.app.studies.repertoire_recording import ACTIONS, record
 from snakewalk.controller.app.studies.sweep_measure import Measurement, measure
 from snakewalk.controller.app.studies.sweep_points import Point
 from snakewalk.controller.runlog.reader import read_log
@@ -54,45 +55,69 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name, text in _from_pages().items():
         (tmp_path / name).write_text(text)
     (tmp_path / "short.toml").write_text(_RUN)
+    time_s = np.arange(31) / 30.0
+    wave = 0.2 * np.sin(2.0 * time_s[:, None] + np.arange(12) / 3.0)
+    np.savez(tmp_path / "bends.npz", angles_rad=wave, rate_hz=30.0)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
+@pytest.mark.parametrize("robot", ["xl330.toml", "xl430.toml"])
 @pytest.mark.parametrize(
     "words",
     [
-        "run short.toml --robot xl330.toml --no-film",
-        "run short.toml --robot xl430.toml --no-film",
-        "gait run lateral-undulation --robot xl330.toml --seconds 2 --no-film",
-        "gait run lateral-undulation --robot xl430.toml --seconds 2 --no-film",
-        "play worm-like --robot xl430.toml --no-film",
-        "sweep lateral-undulation --robot xl430.toml --points 1 --seconds 4 -o sweep.csv",
-        "tune lateral-undulation --robot xl430.toml --budget 16 --seconds 4 --seeds 1",
-        "repertoire record --robot xl330.toml",
-        "trials short.toml --robot xl430.toml --motion serpenoid --seeds 1 -o t.csv",
+        "run short.toml --no-film",
+        "gait run lateral-undulation --seconds 2 --no-film",
+        "play bends.npz --no-film",
+        "sweep lateral-undulation --points 1 --seconds 4 -o sweep.csv",
+        "tune lateral-undulation --budget 16 --seconds 4 --seeds 1",
+        "repertoire record",
+        "trials short.toml --motion serpenoid --seeds 1 -o t.csv",
     ],
 )
 def test_a_robot_from_the_pages_goes_through_every_command(
-    words: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    words: str,
+    robot: str,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     @cache
     def measured_once(robot: str) -> Measurement:
         return measure(Point("lateral-undulation", robot, "flat", 0, 0, 4.0))
 
     work_in_this_process(monkeypatch)
+    one = tuple(action for action in ACTIONS if action.name == "forward-fast")
+    monkeypatch.setattr(repertoire_recording, "record", partial(record, actions=one))
     # the search itself is tested elsewhere: here each of its runs is the same one
     monkeypatch.setattr(tune, "measure", lambda point, vary=0: measured_once(point.robot))
-    monkeypatch.setattr("sys.argv", ["snakewalk", *words.split()])
+    monkeypatch.setattr("sys.argv", ["snakewalk", *words.split(), "--robot", robot])
     with pytest.raises(SystemExit) as end:
         main()
     assert not end.value.code, capsys.readouterr().err
     for log in folder.glob("runs/*/log.mcap"):
-        record = read_log(log)
+        log_read = read_log(log)
         assert (
-            np.nanmax(np.abs(record.cycle.current_a)) > 0.01
+            np.nanmax(np.abs(log_read.cycle.current_a)) > 0.01
         )  # of both kinds, something is watched
     for table in folder.glob("*.csv"):
         assert "refused" not in table.read_text()
+
+
+def test_a_supply_that_the_servos_do_not_take_is_refused_with_theirs(folder: Path) -> None:
+    """Without ``supply_v`` it is 12 V: a small servo would answer with its alarm alone."""
+    (folder / "bare.toml").write_text(
+        'name = "bare"\njoint_axes = "yyyyyyyyyyyy"\n[servo]\nmodel = "XL330-M288"\n'
+    )
+    said = r"robot bare: servo\.supply_v = 12: XL330-M288 takes 3\.1 to 7 V; recommended: .* = 5$"
+    for prepare in (
+        lambda: prepare_walk("short.toml", robot="bare.toml"),
+        lambda: prepare_gait("lateral-undulation", robot="bare.toml"),
+        lambda: prepare_playback("worm-like", robot="bare.toml"),
+        lambda: record(load_robot("bare.toml"), load_world("flat")),
+    ):
+        with pytest.raises(InputError, match=said):
+            prepare()
 
 
 def test_a_limit_belongs_to_the_servo_and_can_trip() -> None:
