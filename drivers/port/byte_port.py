@@ -130,6 +130,11 @@ class DescriptorPort(Protocol):
         ...
 
 
+def is_url(device: str) -> bool:
+    """Whether a port's name is that of a line behind a network, and no path."""
+    return "://" in device
+
+
 def reopen(port: BytePort) -> None:
     """Close and open again, after the port was gone.
 

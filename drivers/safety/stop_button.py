@@ -22,6 +22,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from snakewalk.config.errors import InputError
+from snakewalk.drivers.port.byte_port import is_url
 
 _BYTES: Final = 4096
 _PRESSED, _ENDED = 0, 1
@@ -39,7 +40,7 @@ class StoppableRun:
     name: str
     """Of the run, for people."""
     port: str | None
-    """The device, links resolved; None in simulation."""
+    """As ``resolved`` says it; None in simulation."""
     folder: str | None
     """Where its log is; absolute."""
 
@@ -53,7 +54,7 @@ class StopButton:
     """
 
     def __init__(self, name: str, port: str | None = None, folder: Path | None = None) -> None:
-        device = None if port is None else os.path.realpath(port)
+        device = None if port is None else resolved(port)
         where = None if folder is None else str(folder.absolute())
         self.run = StoppableRun(os.getpid(), name, device, where)
         place = button_folder()
@@ -154,6 +155,11 @@ class PressedButton:
         """Have the run's safe link switch torque off and latch, at its next read or write."""
         _write_text(self._map, _WHO, who)
         self._map[_PRESSED] = 1
+
+
+def resolved(port: str) -> str:
+    """Name a port in one way: a device by its path, links resolved; a URL as it is."""
+    return port if is_url(port) else os.path.realpath(port)
 
 
 def button_folder() -> Path:

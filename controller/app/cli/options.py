@@ -42,9 +42,18 @@ Motion = Annotated[
     ),
 ]
 Port = Annotated[
-    str | None, typer.Option(help="serial port; default: the only USB adapter there is")
+    str | None,
+    typer.Option(
+        help="serial port, or a URL such as socket://host:5000; default: the only USB adapter "
+        "there is"
+    ),
 ]
-RunPort = Annotated[str | None, typer.Option(help="serial port; without it, the simulator")]
+RunPort = Annotated[
+    str | None,
+    typer.Option(
+        help="serial port, or a URL such as socket://host:5000; without it, the simulator"
+    ),
+]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
 Look = Annotated[
     str,

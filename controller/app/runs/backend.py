@@ -17,7 +17,7 @@ from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.clock import Clock
-from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.drivers.port.network_port import open_port
 from snakewalk.drivers.types import BodyPose
 
 
@@ -95,13 +95,13 @@ def simulated(
 
 
 def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
-    """Real servos on ``port``; nothing measures the pose.
+    """Real servos on ``port``, a device or a URL; nothing measures the pose.
 
     Raises:
         PortError: the port is not there, is taken, or may not be opened.
 
     """
-    serial = SerialPort(port, robot.servo.baud)
+    serial = open_port(port, robot.servo.baud)
     chain = ServoChain(
         DynamixelBus(serial, robot.models_by_id, latency_s=serial.latency_s),
         robot,

@@ -7,6 +7,7 @@ from pathlib import Path
 from snakewalk.controller.app.service.finding import Finding
 from snakewalk.drivers.bus.budget import WireBudget
 from snakewalk.drivers.errors import PortError
+from snakewalk.drivers.port.byte_port import is_url
 
 _GOOD_LATENCY_MS = 2
 
@@ -18,6 +19,8 @@ def permission(device: str) -> Finding:
         PortError: there is no such device.
 
     """
+    if is_url(device):
+        return Finding("permission", "ok", f"{device} is reached over a network")
     path = Path(device)
     if not path.exists():
         raise PortError(f"{device}: no such port: is it plugged in?")

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Final, Literal
 
 from snakewalk.drivers.clock import WallClock
-from snakewalk.drivers.safety.stop_button import PressedButton, stoppable_runs
+from snakewalk.drivers.safety.stop_button import PressedButton, resolved, stoppable_runs
 
 How = Literal["latched", "terminated", "killed", "torque off"]
 LATCH_S: Final = 1.0
@@ -49,7 +49,7 @@ def runs_of(port: str | None = None, run: str | None = None) -> list[PressedButt
     """Open the buttons of the runs meant, the newest first.
 
     Args:
-        port: the run that holds this device.
+        port: the run that holds this device, or URL.
         run: name, folder, log or process of a run.
 
     With neither: all that hold a port; where none does, the newest in simulation.
@@ -57,7 +57,7 @@ def runs_of(port: str | None = None, run: str | None = None) -> list[PressedButt
     """
     every = list(stoppable_runs())
     if port is not None:
-        meant = [button for button in every if button.run.port == os.path.realpath(port)]
+        meant = [button for button in every if button.run.port == resolved(port)]
     elif run is not None:
         meant = [button for button in every if _is_meant(button, run)]
     else:

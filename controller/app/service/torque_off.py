@@ -7,6 +7,7 @@ from snakewalk.controller.app.service.emergency_stop import StopOutcome
 from snakewalk.controller.app.service.scan import scan
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.errors import BusError, ControlTableError
+from snakewalk.drivers.port.network_port import NetworkPort, open_port
 from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.drivers.protocol.packet import (
     BITS_PER_BYTE,
@@ -41,12 +42,15 @@ def torque_off(
 
     """
     rates = tuple(bauds) or sorted(BAUDS, key=lambda rate: (rate not in _LIKELY, -rate))
-    with SerialPort(device, rates[0]) as port:
+    sent = 0
+    with open_port(device, rates[0]) as port:
+        held_s = max(_USB_S, port.latency_s)
         for rate in rates:
             if port.setBaudRate(rate):
                 port.write(_TORQUE_OFF)
+                sent += 1
                 wire_s = len(_TORQUE_OFF) * BITS_PER_BYTE / rate
-                port.clock.sleep_until_s(port.clock.now_s() + wire_s + _USB_S)
+                port.clock.sleep_until_s(port.clock.now_s() + wire_s + held_s)
         for rate in rates:
             on_progress(f"torque off is sent; who answers at {rate} baud?")
             found = scan(port, [rate])
@@ -64,13 +68,13 @@ def torque_off(
     return StopOutcome(
         device,
         "torque off",
-        f"torque off was sent at {len(rates)} baud rates, and nobody answers: is the power on?",
+        f"torque off was sent at {sent} baud rates, and nobody answers: is the power on?",
         False,
         port=device,
     )
 
 
-def _confirm(port: SerialPort, servo_id: int, model: str) -> str | None:
+def _confirm(port: SerialPort | NetworkPort, servo_id: int, model: str) -> str | None:
     """Read a servo's torque, switch it off once more where it is on; what is wrong, if anything."""
     try:
         bus = DynamixelBus(port, model, latency_s=port.latency_s)

@@ -8,6 +8,7 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
+from snakewalk.controller.app.service.emergency_stop import runs_of
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import SafetyTrippedError
@@ -54,6 +55,17 @@ def test_a_button_is_private_seen_while_it_is_held_and_gone_after(own_folder: Pa
     assert list(stoppable_runs()) == []
     assert list(own_folder.iterdir()) == []
     seen.close()
+
+
+def test_a_url_is_the_same_port_in_every_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with StopButton("far", "socket://snake.example:5000") as button:
+        assert button.run.port == "socket://snake.example:5000"
+        monkeypatch.chdir(tmp_path)
+        (found,) = runs_of(port="socket://snake.example:5000")
+        found.close()
+        assert runs_of(port="socket://snake.example:5001") == []
 
 
 def test_the_newest_comes_first_and_what_a_killed_program_left_is_deleted(own_folder: Path) -> None:

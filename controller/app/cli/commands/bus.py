@@ -266,7 +266,7 @@ def bus_set(
         plan,
     )
     from snakewalk.drivers.errors import ControlTableError  # noqa: PLC0415
-    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
     from snakewalk.drivers.protocol.registers import BAUDS  # noqa: PLC0415
 
     if baud not in BAUDS:
@@ -282,7 +282,7 @@ def bus_set(
         voltage_max_v=voltage_max,
         return_delay_us=return_delay,
     )
-    with SerialPort(pick_port(port), baud) as line:
+    with open_port(pick_port(port), baud) as line:
         bus = open_servo(line, servo_id, line.latency_s)
         changes = plan(bus, servo_id, request)
         if not as_json:
@@ -312,10 +312,10 @@ def backup(
     """Write the EEPROM of all servos on the bus into a file; changes nothing."""
     from snakewalk.controller.app.service.eeprom_backup import back_up, backup_text  # noqa: PLC0415  --help stays quick
     from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
-    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
 
     refuse_to_overwrite([out], force)
-    with SerialPort(pick_port(port), baud) as line:
+    with open_port(pick_port(port), baud) as line:
         found = back_up(line, line.latency_s, lambda step: typer.echo(step, err=True))
     with atomic_write(out) as part:
         part.write_text(backup_text(found), encoding="utf-8")
@@ -335,14 +335,14 @@ def bus_identify(
 ) -> None:
     """Tell who is on the wire: models, IDs, firmware, faults; suggest a robot's file."""
     from snakewalk.controller.app.service import inventory, scan  # noqa: PLC0415  --help stays quick
-    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
 
     if out is not None and out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
     refuse_to_overwrite([out], force)
     scan.check_bauds(baud or ())
     device = scan.pick_port(port)
-    with SerialPort(device, baud[0] if baud else 1_000_000) as line:
+    with open_port(device, baud[0] if baud else 1_000_000) as line:
         entries = inventory.take_inventory(
             line, line.latency_s, baud or (), lambda step: typer.echo(step, err=True)
         )
@@ -385,7 +385,7 @@ def restore(
     from snakewalk.controller.app.service.eeprom_backup import load_backup, plan_restore  # noqa: PLC0415  --help stays quick
     from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
     from snakewalk.controller.app.service.servo_settings import apply, open_servo  # noqa: PLC0415
-    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
 
     servos = {each.id: each for each in load_backup(file).servos}
     wanted = servo_id or list(servos)
@@ -394,7 +394,7 @@ def restore(
         raise InputError(
             f"{file}: has no ID {', '.join(missing)}; it has {', '.join(map(str, servos))}"
         )
-    with SerialPort(pick_port(port), baud) as line:
+    with open_port(pick_port(port), baud) as line:
         buses = {each: open_servo(line, each, line.latency_s) for each in wanted}
         plans = {each: plan_restore(buses[each], servos[each]) for each in wanted}
         changed = {each: changes for each, changes in plans.items() if changes}
@@ -428,10 +428,10 @@ def reboot(
     """Restart servos, which clears their alarms; torque goes off: what they hold falls."""
     from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415  --help stays quick
     from snakewalk.controller.app.service.servo_settings import open_servo, restart  # noqa: PLC0415
-    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
 
     facts: dict[str, object] = {}
-    with SerialPort(pick_port(port), baud) as line:
+    with open_port(pick_port(port), baud) as line:
         buses = {each: open_servo(line, each, line.latency_s) for each in servo_id}
         if yes or _confirmed(
             as_json, "torque goes off: what these servos hold falls; reboot them?"
@@ -454,9 +454,9 @@ def blink(
     """Let the LED of servos blink, to find them; nothing moves."""
     from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415  --help stays quick
     from snakewalk.controller.app.service.servo_settings import open_servo  # noqa: PLC0415
-    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
 
-    with SerialPort(pick_port(port), baud) as line:
+    with open_port(pick_port(port), baud) as line:
         buses = {each: open_servo(line, each, line.latency_s) for each in servo_id}
         try:
             for _ in range(times):

@@ -44,7 +44,7 @@ def calibrate(
     )
     from snakewalk.controller.app.service import chain_calibration  # noqa: PLC0415
     from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
-    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
     from snakewalk.drivers.safety.stop_button import StopButton  # noqa: PLC0415
 
     if out.suffix != ".toml":
@@ -57,7 +57,7 @@ def calibrate(
         raise InputError(f"robot {like.name}: has legs; calibrate knows chains without")
     device = pick_port(port)
     with (
-        SerialPort(device, baud or like.servo.baud) as line,
+        open_port(device, baud or like.servo.baud) as line,
         StopButton(out.stem, device) as button,
     ):
         found = chain_calibration.calibrate(

@@ -35,7 +35,7 @@ def doctor(
     from snakewalk.controller.app.service.doctor import examine  # noqa: PLC0415
     from snakewalk.controller.app.service.finding import worst  # noqa: PLC0415
     from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
-    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
 
     job = load_run(run)
     described = load_robot(robot if robot is not None else job.robot)
@@ -43,7 +43,7 @@ def doctor(
     findings = [permission(device)]
     if findings[0].grade != "fail":
         with (
-            SerialPort(device, described.servo.baud) as line,
+            open_port(device, described.servo.baud) as line,
             stderr_console().status("") as status,
         ):
             findings += examine(

@@ -19,12 +19,12 @@ def scan(
 ) -> None:
     """List the servos on a bus, at every baud rate; changes nothing."""
     from snakewalk.controller.app.service import scan as scanning  # noqa: PLC0415  --help stays quick
-    from snakewalk.drivers.port.serial_port import SerialPort  # noqa: PLC0415
+    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
 
     scanning.check_bauds(baud or ())
     device = scanning.pick_port(port)
     with (
-        SerialPort(device, baud[0] if baud else 1_000_000) as line,
+        open_port(device, baud[0] if baud else 1_000_000) as line,
         stderr_console().status("") as status,
     ):
         results = scanning.scan(line, baud or (), lambda step: status.update(f"{device}: {step}"))

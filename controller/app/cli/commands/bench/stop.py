@@ -25,7 +25,7 @@ def stop(
         ),
     ] = None,
     port: Annotated[
-        str | None, typer.Option(help="what holds this serial port, or the servos on it")
+        str | None, typer.Option(help="what holds this serial port (or URL), or the servos on it")
     ] = None,
     baud: Annotated[
         list[int] | None,
