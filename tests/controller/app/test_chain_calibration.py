@@ -224,7 +224,7 @@ def test_a_person_answers_at_the_terminal(tmp_path: Path, monkeypatch: pytest.Mo
         line.latency_s = 0.0  # type: ignore[attr-defined]
         yield line
 
-    monkeypatch.setattr("snakewalk.drivers.port.serial_port.SerialPort", opened)
+    monkeypatch.setattr("snakewalk.drivers.port.network_port.open_port", opened)
     out = tmp_path / "mine.toml"
     words = ["calibrate", "--port", "/dev/ttyUSB0", "--robot", str(like), "-o", str(out)]
     # ID 4: nonsense, again, then joint 3 to the right; ID 9; ID 30: taken, then joint 2 down

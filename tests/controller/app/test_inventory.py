@@ -27,7 +27,7 @@ def line(monkeypatch: pytest.MonkeyPatch) -> SimLine:
     def opened(device: str, baud: int) -> Iterator[SimLine]:
         yield made
 
-    monkeypatch.setattr("snakewalk.drivers.port.serial_port.SerialPort", opened)
+    monkeypatch.setattr("snakewalk.drivers.port.network_port.open_port", opened)
     return made
 
 
