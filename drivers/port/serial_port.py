@@ -10,26 +10,23 @@ import os
 import select
 import termios
 from contextlib import suppress
-from types import TracebackType
 
 import serial
 from serial.tools import list_ports
 
-from snakewalk.drivers.clock import Clock, WallClock
+from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import PortError
-from snakewalk.drivers.port.byte_port import DRAIN_LIMIT_S
+from snakewalk.drivers.port.line_port import LinePort
 
 _LATENCY_MS = 16.0
 """How long an FTDI adapter holds bytes back by default (its ``latency_timer``)."""
 _PROGRAM_S = 0.02
 """How late a program at the other end of a pseudo-terminal may be: it has to be scheduled."""
-_DEVICE_ERRORS = (serial.SerialException, OSError, termios.error)
-"""What a device that is gone raises; ``termios.error`` is no ``OSError``."""
 _STUCK_S = 1.0
 """After so long a device that takes no more bytes is gone."""
 
 
-class SerialPort:
+class SerialPort(LinePort):
     """A serial device, opened for this program alone; implements ``BytePort``.
 
     Raises:
@@ -37,43 +34,19 @@ class SerialPort:
 
     """
 
+    line_errors = (*LinePort.line_errors, termios.error)  # which is no OSError
+    grace_ms = 2.0 * _LATENCY_MS + 2.0
+
     def __init__(self, device: str, baud: int = 1_000_000, clock: Clock | None = None) -> None:
-        self.is_using = False
-        self._device = device
-        self._baud = baud
-        self._clock: Clock = clock if clock is not None else WallClock()
-        self._timeout_at_s = 0.0
-        self._serial: serial.Serial | None = None
         self._readable, self._writable = select.poll(), select.poll()
         self.descriptor: int | None = None
         """File descriptor while the port is open, for compiled code."""
-        self._open()
-
-    def __enter__(self) -> SerialPort:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.closePort()
-
-    @property
-    def clock(self) -> Clock:
-        """Wall time."""
-        return self._clock
-
-    @property
-    def name(self) -> str:
-        """The device's path."""
-        return self._device
+        super().__init__(device, baud, clock)
 
     @property
     def latency_timer_ms(self) -> int | None:
         """How long the USB adapter's driver may hold bytes back; None where it does not say."""
-        tty = os.path.basename(os.path.realpath(self._device))
+        tty = os.path.basename(os.path.realpath(self._name))
         try:
             with open(f"/sys/bus/usb-serial/devices/{tty}/latency_timer", encoding="ascii") as file:
                 return int(file.read())
@@ -100,7 +73,7 @@ class SerialPort:
                 if sent == len(data):
                     return
                 if not self._writable.poll(_STUCK_S * 1e3):
-                    raise PortError(f"{self._device}: takes no more bytes")
+                    raise PortError(f"{self._name}: takes no more bytes")
         except OSError as error:
             raise self._lost(error) from error
 
@@ -121,84 +94,20 @@ class SerialPort:
             raise self._lost(error) from error
         return got
 
-    def drain_until_quiet(self, quiet_s: float) -> int:
-        """Throw bytes away until none has come for ``quiet_s``, for a limited time."""
-        drained = 0
-        quiet_at_s = self._clock.now_s() + quiet_s
-        limit_s = quiet_at_s + DRAIN_LIMIT_S
-        while self._clock.now_s() < quiet_at_s:
-            waiting = max(1, self.getBytesAvailable())
-            got = len(self.read_until(waiting, quiet_at_s))
-            if got:
-                drained += got
-                quiet_at_s = min(self._clock.now_s() + quiet_s, limit_s)
-        return drained
-
     # what the SDK calls
 
-    def openPort(self) -> bool:
-        if self._serial is None:
-            self._open()
-        return True
-
     def closePort(self) -> None:
+        self.descriptor = None
         if self._serial is not None:
-            device, self._serial, self.descriptor = self._serial, None, None
-            with suppress(*_DEVICE_ERRORS):  # a device that is gone is closed as far as it can be
-                fcntl.ioctl(device.fileno(), termios.TIOCNXCL)
-            with suppress(*_DEVICE_ERRORS):
-                device.close()
-        self.is_using = False
+            with suppress(*self.line_errors):
+                fcntl.ioctl(self._serial.fileno(), termios.TIOCNXCL)
+        super().closePort()
 
     def clearPort(self) -> None:
         try:
             self._line.reset_input_buffer()
-        except _DEVICE_ERRORS as error:
+        except self.line_errors as error:
             raise self._lost(error) from error
-
-    def setBaudRate(self, baudrate: int) -> bool:
-        try:
-            self._line.baudrate = baudrate
-        except (ValueError, *_DEVICE_ERRORS):
-            return False
-        self._baud = baudrate
-        return True
-
-    def getBaudRate(self) -> int:
-        return self._baud
-
-    def getBytesAvailable(self) -> int:
-        try:
-            return int(self._line.in_waiting)
-        except _DEVICE_ERRORS as error:
-            raise self._lost(error) from error
-
-    def readPort(self, length: int) -> bytes:
-        """Up to ``length`` bytes; sleeps for the first one, so that the SDK does not spin."""
-        waiting = self.getBytesAvailable()
-        if waiting:
-            return self.read_until(min(length, waiting), self._clock.now_s())
-        return self.read_until(1, min(self._timeout_at_s, self._clock.now_s() + 0.01))
-
-    def writePort(self, packet: bytes | list[int]) -> int:
-        self.write(bytes(packet))
-        return len(packet)
-
-    def setPacketTimeout(self, packet_length: int) -> None:
-        wire_ms = packet_length * 10_000.0 / self._baud
-        self.setPacketTimeoutMillis(wire_ms + 2.0 * _LATENCY_MS + 2.0)
-
-    def setPacketTimeoutMillis(self, msec: float) -> None:
-        self._timeout_at_s = self._clock.now_s() + msec / 1000.0
-
-    def isPacketTimeout(self) -> bool:
-        return self._clock.now_s() > self._timeout_at_s
-
-    @property
-    def _line(self) -> serial.Serial:
-        if self._serial is None:
-            raise PortError(f"{self._device}: is closed")
-        return self._serial
 
     @property
     def _fileno(self) -> int:
@@ -206,29 +115,25 @@ class SerialPort:
 
     def _open(self) -> None:
         try:
-            self._serial = serial.Serial(self._device, self._baud, timeout=0.0, exclusive=True)
+            self._serial = serial.Serial(self._name, self._baud, timeout=0.0, exclusive=True)
             self._serial.reset_input_buffer()
-        except (ValueError, *_DEVICE_ERRORS) as error:
+        except self._refusals as error:
             raise self._open_error(error) from error
         self.descriptor = int(self._serial.fileno())
         # Programs that ask for no lock can open a locked device all the same. Not on a
         # pseudo-terminal: its other end keeps it open, and with it the flag, after we are killed.
         if not self._is_pseudo_terminal():
-            with suppress(*_DEVICE_ERRORS):
+            with suppress(*self.line_errors):
                 fcntl.ioctl(self.descriptor, termios.TIOCEXCL)
         self._readable, self._writable = select.poll(), select.poll()
         self._readable.register(self._serial.fileno(), select.POLLIN)
         self._writable.register(self._serial.fileno(), select.POLLOUT)
         # asks an FTDI driver for a latency timer of 1 ms instead of 16; others have none to set
-        with suppress(ValueError, NotImplementedError, *_DEVICE_ERRORS):
+        with suppress(ValueError, NotImplementedError, *self.line_errors):
             self._serial.set_low_latency_mode(True)
 
     def _is_pseudo_terminal(self) -> bool:
-        return os.path.realpath(self._device).startswith("/dev/pts/")
-
-    def _lost(self, error: Exception) -> PortError:
-        self.is_using = False
-        return PortError(f"{self._device}: the port is gone: {error}")
+        return os.path.realpath(self._name).startswith("/dev/pts/")
 
     def _open_error(self, error: Exception) -> PortError:
         return PortError(self._open_fault(error))
@@ -237,17 +142,17 @@ class SerialPort:
         number = getattr(error, "errno", None)
         if number == errno.ENOENT:
             there = ", ".join(sorted(port.device for port in list_ports.comports()))
-            return f"{self._device}: no such port; there is {there or 'none: is it plugged in?'}"
+            return f"{self._name}: no such port; there is {there or 'none: is it plugged in?'}"
         if number in (errno.EACCES, errno.EPERM):
-            return f"{self._device}: no permission; join the group that owns it (often 'dialout')"
+            return f"{self._name}: no permission; join the group that owns it (often 'dialout')"
         if number in (errno.EBUSY, errno.EAGAIN):
-            holders = ", ".join(_holders(self._device))
-            return f"{self._device}: another program has it open{holders and ': '}{holders}"
+            holders = ", ".join(_holders(self._name))
+            return f"{self._name}: another program has it open{holders and ': '}{holders}"
         if isinstance(error, ValueError):
-            return f"{self._device}: {self._baud} bit/s is not possible here: {error}"
-        if _is_no_terminal(self._device):
-            return f"{self._device}: is no serial device, which is such as /dev/ttyUSB0"
-        return f"{self._device}: cannot be opened: {error}"
+            return f"{self._name}: {self._baud} bit/s is not possible here: {error}"
+        if _is_no_terminal(self._name):
+            return f"{self._name}: is no serial device, which is such as /dev/ttyUSB0"
+        return f"{self._name}: cannot be opened: {error}"
 
 
 def _is_no_terminal(device: str) -> bool:

@@ -199,7 +199,7 @@ def test_servos_answer_over_a_network(far_end: Callable[[str], FarEnd], kind: st
         assert port.drain_until_quiet(0.05) == 0
         assert port.read_until(4, port.clock.now_s()) == b""
         far.close()
-        with pytest.raises(PortError, match=f"{kind}://127.0.0.1:.*: the line is gone"):
+        with pytest.raises(PortError, match=f"{kind}://127.0.0.1:.*: the port is gone"):
             NetworkPort.read_until(port, 1, math.inf)
     with pytest.raises(PortError, match="is closed"):
         port.write(b"\xff")
