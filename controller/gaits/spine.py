@@ -42,6 +42,7 @@ class SpineParameters(GaitParameters):
     phase_rad: StandingPhase = float(np.pi / 2)
     standing: bool = Field(False, description="Eq. 11 as printed: no thrust")
     turn_rad: float = Field(0.0, ge=-2.5, le=2.5, description="bend over the body; positive: left")
+    fold_rad: float = Field(1.1, ge=0.0, le=1.57, description="of legs, if any: back at the hip")
 
 
 def spine_bends_rad(
@@ -92,6 +93,9 @@ class SpineGait(Gait):
         joints[:, own] = spine_bends_rad(phase_rad, len(own), p, edges)
         if robot.yaw_joints:
             joints[:, robot.yaw_joints] += p.turn_rad / len(robot.yaw_joints)
+        for k, joint in enumerate(robot.limb_joints):
+            if joint.place == robot.limbs[joint.pair].joint_axes.find("y"):
+                joints[:, robot.link_count - 1 + k] = -p.fold_rad
         return joints
 
 

@@ -53,7 +53,7 @@ class Mechanics:
     before_m: Floats
     """(L, 3) centres of the links at the start of the last step."""
     water: Floats
-    """(L, 6) ``sim.physics.water.water_constants``."""
+    """(L, 7) ``sim.physics.water.water_constants``."""
     totals: Floats = field(default_factory=lambda: np.zeros(3))
     """Energy lost to ground friction and water, J; mean distance slipped across the links, m;
     energy lost to the drag of the gears, J."""

@@ -11,7 +11,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import FlatGround, WorldConfig
+from snakewalk.config.world import WorldConfig
 from snakewalk.drivers.compiling import compiled
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.body import build_model
@@ -53,7 +53,7 @@ class MujocoPlant:
 
     Raises:
         PhysicsError: the memory layout of the installed MuJoCo cannot be verified.
-        InputError: legs elsewhere than on flat ground.
+        InputError: legs on a height field.
 
     """
 
@@ -64,10 +64,10 @@ class MujocoPlant:
         ground: HeightField | None = None,
         step_s: float | None = None,
     ) -> None:
-        if robot.limbs and (ground is not None or not isinstance(world.ground, FlatGround)):
+        if robot.limbs and ground is not None:
             raise InputError(
                 f"world {world.name}: robot {robot.name} has legs, whose feet are simulated on "
-                "flat ground only"
+                "level ground only"
             )
         self.robot = robot
         self.world = world

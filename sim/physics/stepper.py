@@ -360,7 +360,7 @@ def _run(
     )
     gear_drag = carray(pointer(arrays[38]), (joints,), np.float64)
     mass_kg = carray(pointer(arrays[41]), (links,), np.float64)
-    water = carray(pointer(arrays[42]), (links, 6), np.float64)
+    water = carray(pointer(arrays[42]), (links, 7), np.float64)
     law = (constants[0], constants[1], constants[2], constants[3], constants[4])
     state = (at, rate, force)
     _steps(

@@ -25,20 +25,21 @@ GAUSS = 0.5 / math.sqrt(3.0)
 
 
 def water_constants(world: WorldConfig, robot: RobotConfig) -> Floats:
-    """(J + 1, 6) of each link, all zero where the world is dry; a leg's counts as a plain link.
+    """(J + 1, 7) of each link, all zero where the world is dry.
 
     Columns: drag across and along of half the link, kg/m; a Gauss point's arm, radius and surface,
-    m; lift of the link under water, N.
+    m; lift of the link under water, N; axis of the link's frame that lies along it: 0, or 1 of a
+    leg's segment, a rod as thick as its foot.
     """
     water, links = world.ground, robot.joint_count + 1
-    rows = np.zeros((links, 6))
+    rows = np.zeros((links, 7))
     if not isinstance(water, WaterGround):
         return rows
-    legs = links - robot.link_count
-    lengths_m = (*robot.link_lengths_m, *(robot.link_length_m,) * legs)
-    radii_m = (*robot.link_radii_m, *(robot.body_radius_m,) * legs)
-    masses_kg = (*robot.link_masses_kg, *(robot.link_mass_kg,) * legs)
-    for k, (length_m, r, mass_kg) in enumerate(zip(lengths_m, radii_m, masses_kg, strict=True)):
+    rods = [*zip(robot.link_lengths_m, robot.link_radii_m, robot.link_masses_kg, strict=True)]
+    for joint in robot.limb_joints:
+        pair = robot.limbs[joint.pair]
+        rods.append((pair.segments_m[joint.place], pair.foot_radius_m, pair.segment_mass_kg))
+    for k, (length_m, r, mass_kg) in enumerate(rods):
         half = 0.5 * length_m
         rows[k] = (
             0.5 * water.density_kg_m3 * water.drag_across * 2.0 * r * half,
@@ -47,6 +48,7 @@ def water_constants(world: WorldConfig, robot: RobotConfig) -> Floats:
             r,
             water.depth_m,
             water.buoyancy * mass_kg * GRAVITY_M_S2,
+            float(k >= robot.link_count),
         )
     return rows
 
@@ -93,7 +95,7 @@ def add_water(
         rotation: (L, 9) rows of their rotations.
         v: (L, 3) velocity of the centres, world.
         w: (L, 3) spins, world.
-        water: (L, 6) ``water_constants``.
+        water: (L, 7) ``water_constants``.
         step_s: length of the step.
 
     """
@@ -105,7 +107,8 @@ def add_water(
         wrench[i, 2] += wet * lift
         wrench[i, 3] += centre[i, 1] * wet * lift
         wrench[i, 4] -= centre[i, 0] * wet * lift
-        e0, e1, e2 = rotation[i, 0], rotation[i, 3], rotation[i, 6]
+        axis = int(water[i, 6])
+        e0, e1, e2 = rotation[i, axis], rotation[i, 3 + axis], rotation[i, 6 + axis]
         for side in (-1.0, 1.0):
             r0, r1, r2 = side * arm * e0, side * arm * e1, side * arm * e2
             s0 = v[i, 0] + w[i, 1] * r2 - w[i, 2] * r1

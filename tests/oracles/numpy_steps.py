@@ -86,7 +86,9 @@ def friction_forces(m: Mechanics) -> Floats:
     np.add.at(wrench, link, np.hstack([force, np.cross(place, force)]))
     if m.water[0, 3] > 0.0:
         m.totals[0] += add_water(wrench, centre, d.xmat[1:], velocity, spin, m.water, m.step_s)
-    behind = wrench[::-1].cumsum(axis=0)[::-1]
+    behind = wrench  # of each link and what hangs on it
+    for i in range(len(wrench) - 1, 0, -1):
+        behind[m.model.body_parentid[i + 1] - 1] += behind[i]
     f, t = behind[1:, :3], behind[1:, 3:]
     out[6:] = (d.xaxis[1:] * (t - np.cross(d.xanchor[1:], f))).sum(axis=1)
     out[:3] = behind[0, :3]

@@ -8,6 +8,7 @@ from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.loader import load_robot, load_world
+from snakewalk.config.world import WaterGround
 from snakewalk.sim.physics.mechanics import foot_geoms
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
@@ -125,10 +126,11 @@ ROBOT_SHARES = np.array(
 ROBOT_SHARES = ROBOT_SHARES / ROBOT_SHARES.sum()
 
 
-def test_compiled_and_numpy_steps_agree_with_legs() -> None:
+@pytest.mark.parametrize("world", ["isotropic", "pool"])
+def test_compiled_and_numpy_steps_agree_with_legs(world: str) -> None:
     ends = []
     for make in (MujocoPlant, numpy_plant):
-        body, servo = make(ROBOT, WORLD, None, 0.002), drive()
+        body, servo = make(ROBOT, load_world(world), None, 0.002), drive()
         body.reset((0.0, 0.0), 0.3, STAND)
         for k in range(60):
             phase = 0.02 * k * 4.0
@@ -139,7 +141,7 @@ def test_compiled_and_numpy_steps_agree_with_legs() -> None:
         ends.append((body.qpos, body.friction_loss_j, body.mechanics.load_n.copy()))
     np.testing.assert_allclose(ends[0][0], ends[1][0], atol=1e-9)
     assert ends[0][1] == pytest.approx(ends[1][1], rel=1e-6)
-    assert ends[0][1] > 0.0  # bellies slid
+    assert ends[0][1] > 0.0  # bellies slid, or water was stirred
     np.testing.assert_allclose(ends[0][2], ends[1][2], atol=1e-6)
 
 
@@ -159,8 +161,36 @@ def test_thrown_through_the_air_momentum_and_spin_stay() -> None:
     assert np.abs(spin).max() < 2e-4
 
 
-def test_hills_and_water_are_refused_in_words() -> None:
-    for name in ("pool", "jacksboro-gentle"):
-        world = load_world(name)
-        with pytest.raises(InputError, match="salamander has legs"):
-            MujocoPlant(ROBOT, world, build_ground(world))
+def test_legs_that_stand_out_brake_in_water_as_rods_across_the_way() -> None:
+    """``m v' = -c v^2`` has the solution ``v0 / (1 + c v0 t / m)``; c: the spine's skin, the legs.
+
+    Folded back by ``f`` a rod is crossed by ``v cos f`` and slid along by ``v sin f``: its drag
+    along the way is ``(c_across cos^3 f + c_along sin^3 f) v^2``.
+    """
+    ground = load_world("pool").ground
+    assert isinstance(ground, WaterGround)
+    half_rho = 0.5 * ground.density_kg_m3
+    skin, cross = half_rho * ground.drag_along * np.pi, half_rho * ground.drag_across * 2.0
+    rod_m = 4.0 * sum(HIND.segments_m)
+    for fold_rad in (0.0, 1.1):
+        body, servo = MujocoPlant(ROBOT, load_world("pool"), step_s=0.001), drive()
+        servo.goal_rad[:] = 0.0
+        servo.goal_rad[SPINE::2] = -fold_rad
+        body.reset((0.0, 0.0), 0.0, servo.goal_rad)
+        body.mechanics.data.qvel[0] = 0.5
+        body.mechanics.start_at_rest()
+        start = centre_m(body)
+        body.advance(1.0, servo)
+        along = skin * ROBOT.body_radius_m * ROBOT.length_m
+        across = HIND.foot_radius_m * rod_m * cross * np.cos(fold_rad) ** 3
+        slid = HIND.foot_radius_m * rod_m * skin * np.sin(fold_rad) ** 3
+        k = (along + across + slid) / ROBOT.mass_kg
+        way = centre_m(body) - start
+        assert way[0] == pytest.approx(np.log(1.0 + 0.5 * k) / k, rel=0.02)
+        assert np.abs(way[1:]).max() < 1e-3
+
+
+def test_hills_are_refused_in_words() -> None:
+    world = load_world("jacksboro-gentle")
+    with pytest.raises(InputError, match="salamander has legs"):
+        MujocoPlant(ROBOT, world, build_ground(world))
