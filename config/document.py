@@ -44,19 +44,31 @@ A run is a TOML file that names a robot and a world; each is a shipped name or a
 values out of range are reported all at once, one line each, with exit code 2.
 
 ```
-# my-run.toml                    # my-robot.toml
-name = "my-run"                  name = "mine"
-robot = "my-robot.toml"          joint_axes = "yyyyyyyyyyyy"
-world = "flat"                   link_length_m = 0.045
-waypoints_m = [[1, 0], [2, 1]]   body_radius_m = 0.02
-seed = 3                         link_mass_kg = 0.03
-                                 torque_limit_n_m = 0.25
+# my-run.toml
+name = "my-run"
+robot = "my-robot.toml"
+world = "flat"
+waypoints_m = [[1, 0], [2, 1]]
+seed = 3
+
 [behaviour]
-pulse_body_lengths_s = 0.2       [servo]
-                                 model = "XL330-M288"
-                                 supply_v = 5.0
-                                 armature_kg_m2 = 0.002
-                                 gear_drag_n_m_s = 0.006
+pulse_body_lengths_s = 0.2
+```
+
+```
+# my-robot.toml
+name = "mine"
+joint_axes = "yyyyyyyyyyyy"
+link_length_m = 0.045
+body_radius_m = 0.02
+link_mass_kg = 0.03
+torque_limit_n_m = 0.25
+
+[servo]
+model = "XL330-M288"
+supply_v = 5.0
+armature_kg_m2 = 0.002
+gear_drag_n_m_s = 0.006
 ```
 
 `snakewalk init mine` writes a run, a robot and a world to change, each with every key, its

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args, get_or
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticSerializationError, to_json
 
-from snakewalk.config.base import NAME_PATTERN
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.gait import GaitSetConfig
 
@@ -242,6 +241,16 @@ def _meant(model: type[BaseModel], key: str) -> str:
     return "" if owner is None else f"; it is a key of a {owner}'s file"
 
 
+def _pattern_in_words(pattern: str) -> str:
+    letters = re.fullmatch(r"\^\[(\w+)\](?:\*|\{(\d+),(\d+)\})\$", pattern)
+    if letters is None:
+        return "holds '/', a control character or a leading dot"
+    which, least, most = letters.groups()
+    return f"must have the letters {' and '.join(which)} only" + (
+        f", {least} to {most} of them" if least else ""
+    )
+
+
 def _line(model: type[BaseModel], path: str, text: str, fault: dict[str, Any]) -> str:
     loc = fault["loc"]
     where = ".".join(str(p) for p in loc)
@@ -274,10 +283,12 @@ def _line(model: type[BaseModel], path: str, text: str, fault: dict[str, Any]) -
         "less_than_equal": f"must be at most {bounds.get('le', 0):g}",
         "too_long": f"must have at most {context.get('max_length')} values",
         "too_short": f"must have at least {context.get('min_length')} values",
+        "string_too_long": f"must have at most {context.get('max_length')} characters",
+        "string_too_short": "must not be empty",
     }
     if fault["type"] == "extra_forbidden":
         said["extra_forbidden"] = f"unknown key{_meant(model, str(loc[-1]))}"
-    if context.get("pattern") == NAME_PATTERN:
-        said["string_pattern_mismatch"] = "holds '/', a control character or a leading dot"
+    pattern = str(context.get("pattern"))
+    said["string_pattern_mismatch"] = _pattern_in_words(pattern)
     what = said.get(str(fault["type"]), str(fault["msg"]).removeprefix("Value error, "))
     return f"{path}: {where}: {what}{shown}" if where else f"{path}: {what}{shown}"

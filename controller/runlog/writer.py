@@ -81,9 +81,22 @@ class RunLog:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Finish the file also when the run ends with an error: the log says how it came to it."""
-        self._writer.finish()
-        self._file.close()
+        """Finish the file also when the run ends with an error: the log says how it came to it.
+
+        A log that the disk does not take stays what it is, ``.part``, and the error says its name.
+        """
+        try:
+            try:
+                self._writer.finish()
+            finally:
+                self._file.close()
+        except OSError as fault:
+            told = error if isinstance(error, OSError) else fault
+            told.filename = told.filename or str(self._part)
+            told.add_note(f"the run up to there: snakewalk report {self._part}")
+            if error is None:
+                raise
+            return
         self._part.replace(self.path)
 
     def config(

@@ -51,8 +51,33 @@ class DecodedPacket:
         """For people."""
         arrow = {"question": "->", "answer": "<-", "noise": "??"}[self.kind]
         who = {BROADCAST_ID: "all", -1: "?"}.get(self.servo_id, str(self.servo_id))
-        said = ", ".join(f"{key} {value}" for key, value in self.values.items())
+        said = ", ".join(self._by_register())
         return f"{self.time_s:12.6f}  {arrow} {who:>3}  {self.name:<16} {said or self.raw}"
+
+    def _by_register(self) -> Iterator[str]:
+        """Values in words; a register of several servos once, with its values in their order."""
+        several: dict[str, dict[int, str]] = {}
+        for key, value in self.values.items():
+            servo_id, _, register = key.partition(": ")
+            if servo_id.isdigit():
+                several.setdefault(register, {})[int(servo_id)] = str(value)
+            else:
+                yield f"{key} {value}"
+        for register, values in several.items():
+            said = list(dict.fromkeys(values.values()))
+            words = said if len(said) == 1 else values.values()
+            yield " ".join([*([register] if register else []), *words, "of", _ranges(list(values))])
+
+
+def _ranges(numbers: list[int]) -> str:
+    """Numbers in their order, those that follow each other by one as ``1-16``."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ",".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
 
 
 class Decoder:

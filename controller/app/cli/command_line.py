@@ -2,12 +2,13 @@
 
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from copy import copy
 from functools import wraps
 from typing import Annotated, Any
 
 import typer
-from typer import rich_utils
 from typer.core import TyperGroup
 
 from snakewalk.controller.app.cli.commands.analyse import analyse
@@ -70,16 +71,62 @@ _JOB, _MOTION, _RECORDINGS, _BUS = "The job", "Motion", "Recordings", "The bus"
 
 
 class _Commands(TyperGroup):
-    """The commands; an interrupt ends each with exit code 130 and a line."""
+    """The commands; an interrupt ends each with exit code 130 and a line.
+
+    A command's options are built when it is asked for: to build those of all, and what draws
+    typer's boxes, costs more than a short command does.
+    """
+
+    whole: dict[str, Callable[[], Any]]
+    """What builds each command; until then it has its first line only."""
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command with its options."""
+        build = self.whole.get(cmd_name)
+        return super().get_command(ctx, cmd_name) if build is None else build()
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the list of commands, for which their first lines do."""
+        listed = copy(self)
+        listed.whole = {}
+        TyperGroup.format_help(listed, ctx, formatter)
+
+    def make_context(self, *words: Any, **options: Any) -> Any:
+        """Read the words before a command's name."""
+        with _faults_in_one_line():
+            return super().make_context(*words, **options)
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command; print what an interrupt's notes say of torque and log."""
         try:
-            return super().invoke(ctx)
+            with _faults_in_one_line():
+                return super().invoke(ctx)
         except KeyboardInterrupt as stop:
             text = "; ".join(["interrupted", *getattr(stop, "__notes__", [])])
             print(f"snakewalk: {text}", file=sys.stderr)
             raise SystemExit(130) from None
+
+
+@contextmanager
+def _faults_in_one_line() -> Iterator[None]:
+    """Have typer print what is wrong with a command's words in one line, in place of its box."""
+    try:
+        yield
+    except Exception as error:
+        if hasattr(error, "format_message"):  # one of typer's
+            from typer import rich_utils  # noqa: PLC0415  slow, and only --help and these need it
+
+            rich_utils.rich_format_error = _in_one_line  # type: ignore[assignment]
+        raise
+
+
+def _in_one_line(error: Any) -> None:
+    if type(error).__name__ == "NoArgsIsHelpError":  # its help has been shown
+        return
+    context = getattr(error, "ctx", None)
+    path = "snakewalk" if context is None else context.command_path
+    text = " ".join(error.format_message().split())
+    print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)
 
 
 def _with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -116,16 +163,36 @@ def _with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class _App(typer.Typer):
-    """Commands that say how they get on."""
+    """Commands that say how they get on, each built when it is asked for."""
 
-    def command(self, *args: Any, **options: Any) -> Any:
+    def __init__(self, **options: Any) -> None:
+        self._whole: dict[str, Callable[[], Any]] = {}
+        commands = type("_CommandsOfApp", (_Commands,), {"whole": self._whole})
+        super().__init__(cls=commands, **options)
+
+    def command(self, name: str | None = None, **options: Any) -> Any:
         """Register a command."""
-        register = super().command(*args, **options)
-        return lambda function: register(_with_messages(function))
+
+        def register(function: Callable[..., Any]) -> Callable[..., Any]:
+            def listed() -> None: ...
+
+            listed.__doc__ = function.__doc__
+            own_name = name or function.__name__.replace("_", "-")
+            self._whole[own_name] = lambda: _whole(own_name, function, options)
+            super(_App, self).command(own_name, **options)(listed)
+            return function
+
+        return register
+
+
+def _whole(name: str, function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Build a command with its options."""
+    alone = typer.Typer(add_completion=False, rich_markup_mode="rich")
+    alone.command(name, **options)(_with_messages(function))
+    return typer.main.get_command(alone)
 
 
 app = _App(
-    cls=_Commands,
     no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -470,16 +537,3 @@ repertoire.command(
     "run",
     epilog=_examples("repertoire run plan.json", "repertoire run plan.json --open-loop --json"),
 )(run_plan)
-
-
-def _in_one_line(error: Any) -> None:
-    """Print what is wrong with a command's words in one line, in place of typer's box."""
-    if type(error).__name__ == "NoArgsIsHelpError":  # its help has been shown
-        return
-    context = getattr(error, "ctx", None)
-    path = "snakewalk" if context is None else context.command_path
-    text = " ".join(error.format_message().split())
-    print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)
-
-
-rich_utils.rich_format_error = _in_one_line  # type: ignore[assignment]

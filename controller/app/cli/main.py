@@ -31,7 +31,8 @@ def main() -> None:
         _end(2, needed)
     except OSError as error:
         place = f"{Path(str(error.filename))}: " if error.filename else ""
-        _end(2, f"{place}{error.strerror or error}")
+        notes = getattr(error, "__notes__", [])  # of a run: what became of torque and log
+        _end(1 if notes else 2, "; ".join([f"{place}{error.strerror or error}", *notes]))
     except KeyboardInterrupt:
         _end(130, "interrupted")
     except SystemExit as stop:

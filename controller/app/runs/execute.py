@@ -1,7 +1,7 @@
 """Carry out a prepared run: folder, log, link, loop, summary."""
 
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,6 +26,7 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import InitialPose, RunRecord, Winding
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outcome
+from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.priority import raised_priority
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
@@ -156,25 +157,42 @@ def execute(
                 on_progress=on_progress,
                 on_event=on_event,
             )
-            try:
+            with _end_told(link, log, clock):
                 with raised_priority() if port is not None else nullcontext():
                     outcome = drive.run()
                 if button is not None:
                     button.end(outcome.tripped or "it had come to its end")
                 if beside is not None:
                     beside.end(clock.now_s())
-            except (KeyboardInterrupt, SystemExit) as stop:  # a signal: the link is closed by now
-                torque = "torque is off" if link.was_enabled else "torque was not switched on"
-                failed = getattr(stop, "__notes__", [])
-                text = "; ".join(failed) if failed else torque
-                log.event(clock.now_s(), "interrupt", text, "warning")
-                stop.add_note(torque if not failed else "torque may be on: switch the supply off")
-                stop.add_note(f"log: {log_path}; its page: snakewalk report {log_path}")
-                raise
     LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
-    record = read_log(log_path)
-    numbers = write_summary(summary(record), folder)
+    record, numbers = _read_back(log_path)
     return Finished(outcome, log_path, record, numbers, pose, source)
+
+
+@contextmanager
+def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
+    """Note what became of torque and log when a signal or a full disk ends a run."""
+    try:
+        yield  # the link is closed when an error comes out of it
+    except (KeyboardInterrupt, SystemExit, OSError) as stop:
+        failed = getattr(stop, "__notes__", [])
+        torque = "torque is off" if link.was_enabled else "torque was not switched on"
+        stop.add_note(torque if not failed else "torque may be on: switch the supply off")
+        if not isinstance(stop, OSError):
+            text = "; ".join(failed) if failed else torque
+            log.event(clock.now_s(), "interrupt", text, "warning")
+            stop.add_note(f"log: {log.path}; its page: snakewalk report {log.path}")
+        raise
+
+
+def _read_back(log: Path) -> tuple[RunRecord, RunSummary]:
+    """Read the log of a run that is over, and write its summary beside it."""
+    try:
+        record = read_log(log)
+        return record, write_summary(summary(record), log.parent)
+    except KeyboardInterrupt as stop:
+        stop.add_note(f"the run is whole: {log}; its page: snakewalk report {log}")
+        raise
 
 
 def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:

@@ -51,6 +51,18 @@ def test_an_interrupted_run_says_what_became_of_torque_and_log(
     assert summary(record).outcome == "interrupted"
 
 
+def test_a_run_that_is_over_is_whole_when_its_summary_is_interrupted(
+    tmp_path: Path, mocker: MockerFixture
+) -> None:
+    pytest.importorskip("mujoco")
+    mocker.patch("snakewalk.controller.app.runs.execute.summary", side_effect=KeyboardInterrupt)
+    with pytest.raises(KeyboardInterrupt) as stop:
+        execute(prepare_gait("lateral-undulation", seconds=0.2), tmp_path)
+    log = tmp_path / "log.mcap"
+    assert stop.value.__notes__ == [f"the run is whole: {log}; its page: snakewalk report {log}"]
+    assert read_log(log).complete
+
+
 def test_the_command_line_prints_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -8,10 +8,12 @@ from typing import Any
 
 import pytest
 import typer
+from pytest_mock import MockerFixture
 from typer.core import TyperGroup
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import command_line
 from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.app.messages import LOGGER, messages
 from snakewalk.controller.app.progress import ProgressBar
@@ -97,12 +99,21 @@ def test_the_result_is_the_same_at_every_level() -> None:
 def commands(group: Any, path: str = "snakewalk") -> dict[str, set[str]]:
     """Options of every command."""
     found: dict[str, set[str]] = {}
-    for name, command in group.commands.items():
+    for name in group.commands:
+        command = group.get_command(None, name)
         if isinstance(command, TyperGroup):
             found |= commands(command, f"{path} {name}")
         else:
             found[f"{path} {name}"] = {word for one in command.params for word in one.opts}
     return found
+
+
+def test_a_command_does_not_build_the_options_of_all(mocker: MockerFixture) -> None:
+    built = mocker.spy(command_line, "_with_messages")
+    assert CliRunner().invoke(app, ["--help"]).exit_code == 0
+    assert built.call_count == 0
+    assert CliRunner().invoke(app, ["schema", "run"]).exit_code == 0
+    assert [call.args[0].__name__ for call in built.call_args_list] == ["schema"]
 
 
 def test_every_command_has_these_options() -> None:

@@ -23,6 +23,7 @@ from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait
 from snakewalk.controller.app.studies.tune import Tuned
 from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.runlog.reader import read_log
 
 APP = Path(__file__).resolve().parents[3] / "controller" / "app"
 WRITERS = {
@@ -228,3 +229,24 @@ def test_every_result_is_written_atomically() -> None:
         for line in unsafe(file.read_text(encoding="utf-8"))
     }
     assert found == set()
+
+
+def test_a_full_disk_ends_a_run_and_says_what_became_of_torque_and_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mujoco")
+    job = prepare_gait("lateral-undulation", seconds=2.0)  # what numba keeps is written by now
+    execute(job, tmp_path / "before")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["snakewalk", "gait", "run", "lateral-undulation"])
+    with full_disk(60_000), pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 1
+    folder = Path("runs") / "gait-lateral-undulation-yaw16"
+    part = folder / "log.mcap.part"
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"snakewalk: {part}: File too large; torque is off; the run up to there: "
+        f"snakewalk report {part}"
+    )
+    assert [path.name for path in folder.iterdir()] == ["log.mcap.part"]
+    assert len(read_log(part).cycle.time_s) > 0

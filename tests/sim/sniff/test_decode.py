@@ -51,6 +51,24 @@ def test_group_reads_are_told_servo_by_servo(code: int) -> None:
     assert values == {"1: Present Position": 2048, "2: Present Position": 2048}
 
 
+def test_a_packet_of_sixteen_servos_is_read_at_a_glance() -> None:
+    ids = [*range(1, 16), 20]
+
+    def sync_write(goals: list[int]) -> bytes:
+        data = (
+            bytes((i,)) + goal.to_bytes(4, "little") for i, goal in zip(ids, goals, strict=True)
+        )
+        return bytes((116, 0, 4, 0)) + b"".join(data)
+
+    alike, *_ = decoded((0xFE, Instruction.SYNC_WRITE, sync_write([9] * 16)))
+    assert alike.text().endswith("  Goal Position 9 of 1-15,20")
+    different, *_ = decoded((0xFE, Instruction.SYNC_WRITE, sync_write([2000 + i for i in ids])))
+    assert different.text().endswith("2014 2015 2020 of 1-15,20")
+    asked, *_ = decoded((0xFE, Instruction.FAST_SYNC_READ, group_params(126, 10, iter(ids))))
+    assert asked.text().endswith("  Present Current, Present Velocity, Present Position of 1-15,20")
+    assert max(len(one.text()) for one in (alike, different, asked)) < 150
+
+
 def test_writes_errors_and_noise() -> None:
     goal = bytes((116, 0)) + (9_000).to_bytes(4, "little")
     question, answer = decoded((2, Instruction.WRITE, goal))

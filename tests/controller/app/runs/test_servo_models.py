@@ -36,13 +36,14 @@ time_limit_s = 8.0
 
 
 def _from_pages() -> dict[str, str]:
-    """Robot files as ``docs/configuration.md`` (right column) and ``docs/driver.md`` print them."""
-    page = (_DOCS / "configuration.md").read_text(encoding="utf-8")
-    block = page.split("```")[1]
-    right = "\n".join(line[33:] for line in block.splitlines())
-    other = re.search(r"# my-xl430\.toml\n(.*?)```", (_DOCS / "driver.md").read_text(), re.DOTALL)
-    assert other is not None
-    return {"xl330.toml": right, "xl430.toml": other[1]}
+    """Robot files as ``docs/configuration.md`` and ``docs/driver.md`` print them."""
+    found = {}
+    for name, page in (("my-robot", "configuration"), ("my-xl430", "driver")):
+        text = (_DOCS / f"{page}.md").read_text(encoding="utf-8")
+        block = re.search(rf"# {name}\.toml\n(.*?)```", text, re.DOTALL)
+        assert block is not None
+        found[name] = block[1]
+    return {"xl330.toml": found["my-robot"], "xl430.toml": found["my-xl430"]}
 
 
 def _robot(servo: ServoConfig) -> RobotConfig:
