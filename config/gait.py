@@ -18,6 +18,19 @@ class GaitChange(Strict):
     parameters: Parameters = Field({}, description="by name; the rest keep their defaults")
 
 
+class AshoreConfig(Strict):
+    """The gait that follows one that swims along waypoints, once the body has met the ground."""
+
+    name: str = Field(description="one that walks along waypoints: trot or lateral-walk")
+    parameters: Parameters = Field({}, description="by name; the rest keep their defaults")
+    headway: float = Field(
+        0.5,
+        gt=0.0,
+        lt=1.0,
+        description="share of its best way in a cycle: a body that makes less has met the ground",
+    )
+
+
 class GaitConfig(Strict):
     """A gait in place of a walk; its parameters and their ranges: `snakewalk gait show NAME`."""
 
@@ -28,6 +41,9 @@ class GaitConfig(Strict):
     look_at_m: tuple[float, float] | None = Field(None, description="point that the head looks at")
     then: tuple[GaitChange, ...] = Field(
         (), description="other gaits at rising times: tables of `at_s`, `name`, `parameters`"
+    )
+    ashore: AshoreConfig | None = Field(
+        None, description="along waypoints: how it goes on where it cannot swim; default: it swims"
     )
     by: Literal["blend", "cpg"] = Field(
         "blend", description="how gaits change: by a C1 join, or by coupled oscillators"

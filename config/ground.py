@@ -20,6 +20,7 @@ from snakewalk.config.world import (
     MapGround,
     RampGround,
     RandomGround,
+    ShoreGround,
     StepsGround,
     WaterGround,
     WorldConfig,
@@ -29,7 +30,7 @@ from snakewalk.config.world import (
 def build_ground(world: WorldConfig) -> HeightField | None:
     """Height field of ``world``, its lowest point at 0; None on a flat floor.
 
-    It is centred on (0, 0), but for a map, which lies where its file says.
+    It is centred on (0, 0), but for a map, which lies where its file says, and a shore.
 
     Raises:
         ConfigError: the source is missing or unreadable, or the crop leaves it.
@@ -40,6 +41,8 @@ def build_ground(world: WorldConfig) -> HeightField | None:
             return None
         case MapGround() as ground:
             return _mapped(world.name, ground)
+        case ShoreGround() as ground:
+            return _shore(ground)
         case ElevationGround() as ground:
             z, spacing_m = _cropped(world.name, ground), ground.spacing_m / ground.refine
         case RampGround() as ground:
@@ -69,6 +72,18 @@ def _ramp(ground: RampGround) -> Floats:
     x = (np.arange(cells + 1) - cells / 2) * ground.spacing_m
     rise = np.clip(x + ground.length_m / 2, 0.0, ground.length_m)
     return _drawn_out(math.tan(ground.slope_rad) * rise, ground.width_m, ground.spacing_m)
+
+
+def _shore(ground: ShoreGround) -> HeightField:
+    """Place the waterline at x = 0; kinks as those of a ramp."""
+    steep = math.tan(ground.slope_rad)
+    under_m, over_m = ground.depth_m / steep, ground.rise_m / steep
+    cells = _cells(ground.pool_m + under_m + over_m + ground.land_m, ground.spacing_m)
+    x_m = np.arange(cells + 1) * ground.spacing_m - (ground.pool_m + under_m)
+    profile_m = np.clip(ground.depth_m + steep * x_m, 0.0, ground.depth_m + ground.rise_m)
+    z_m = _drawn_out(profile_m, ground.width_m, ground.spacing_m)
+    south_m = -0.5 * (len(z_m) - 1) * ground.spacing_m
+    return HeightField(z_m, ground.spacing_m, float(x_m[0]), south_m)
 
 
 def _random(ground: RandomGround) -> Floats:

@@ -219,6 +219,8 @@ class RunConfig(Strict):
     def _motion_has_its_table(self) -> Self:
         if self.motion == "gait" and self.gait is None:
             raise ValueError("motion gait needs a table [gait] with its name")
+        if self.gait is not None and self.gait.ashore is not None and not self.waypoints_m:
+            raise ValueError("gait.ashore: belongs to a gait along waypoints_m; there are none")
         pathless = {"gait", "playback", "source"} | ({"repertoire"} if self.repertoire else set())
         if self.motion not in pathless and not self.waypoints_m:
             raise ValueError("waypoints_m: at least one is needed")

@@ -162,22 +162,45 @@ class GapsGround(Strict):
         return self.model_copy(update={"depth_m": self.depth_m * factor})
 
 
-class WaterGround(Strict):
-    """A pool: level bottom at z = 0, surface at ``depth_m``; each link is dragged and carried.
+class Water(Strict):
+    """Still water from z = 0 to ``depth_m``; each link in it is dragged and carried.
 
     The coefficients are those of E. Kelasidi, K. Y. Pettersen, J. T. Gravdahl, P. Liljeback,
     Modeling of underwater snake robots, ICRA 2014.
     """
 
-    kind: Literal["water"] = "water"
-    size_m: float = Field(12.0, gt=0.5, description="edge of the drawn bottom, centred at 0, 0")
-    depth_m: float = Field(0.6, gt=0.1, description="of the water")
+    depth_m: float = Field(0.6, gt=0.1, description="of the water, where it is deepest")
     density_kg_m3: float = Field(1000.0, gt=0.0, le=3000.0)
     drag_across: float = Field(2.0, ge=0.0, le=5.0, description="coefficient of the cross-flow")
     drag_along: float = Field(0.03, ge=0.0, le=1.0, description="coefficient of the skin")
     buoyancy: float = Field(
         1.0, ge=0.0, le=5.0, description="of a link under water over its weight; 1: trimmed neutral"
     )
+
+
+class WaterGround(Water):
+    """A pool with a level bottom."""
+
+    kind: Literal["water"] = "water"
+    size_m: float = Field(12.0, gt=0.5, description="edge of the drawn bottom, centred at 0, 0")
+
+
+class ShoreGround(Water):
+    """A pool whose bottom rises along x to level land; the waterline is x = 0."""
+
+    kind: Literal["shore"] = "shore"
+    slope_rad: float = Field(gt=0.0, le=1.0, description="of the beach, under water and above")
+    pool_m: float = Field(2.0, ge=0.1, le=50.0, description="of the pool's level bottom, along x")
+    land_m: float = Field(2.0, ge=0.1, le=50.0, description="of the level land, along x")
+    rise_m: float = Field(0.05, ge=0.0, le=5.0, description="of the land over the water")
+    width_m: float = Field(6.0, gt=0.5, le=50.0, description="across, along y")
+    spacing_m: float = Field(0.05, ge=0.005, le=0.5, description="distance between samples")
+
+    def with_relief(self, factor: float) -> Self:
+        """Return the same ground with its heights times ``factor``."""
+        heights = {"depth_m": factor * self.depth_m, "rise_m": factor * self.rise_m}
+        slope_rad = math.atan(factor * math.tan(self.slope_rad))
+        return self.model_copy(update={"slope_rad": slope_rad, **heights})
 
 
 class PoleObstacle(Strict):
@@ -277,7 +300,9 @@ class PlannerConfig(Strict):
     edge_margin_m: float = Field(0.3, ge=0.0, description="kept free along the border")
 
 
-ReliefGround = ElevationGround | MapGround | RampGround | RandomGround | StepsGround | GapsGround
+ReliefGround = (
+    ElevationGround | MapGround | RampGround | RandomGround | StepsGround | GapsGround | ShoreGround
+)
 """What makes a height field; the others are level."""
 
 

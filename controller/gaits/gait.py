@@ -90,8 +90,8 @@ class Gait(ABC):
     """Shipped world of its runs, where none is given."""
     p_gain: ClassVar[int | None] = None
     """Register 84 of every servo where the robot's own would squeeze too hard."""
-    steers: ClassVar[bool] = False
-    """Whether its parameter ``turn``, positive to the left, steers it along waypoints."""
+    steered_by: ClassVar[str | None] = None
+    """Its parameter, positive to the left, that steers it along waypoints; None: none does."""
     aim: ClassVar[Aim] = "advance"
     """The purpose that its speed is measured by."""
     model: ClassVar[type[GaitParameters]] = GaitParameters

@@ -83,6 +83,7 @@ class SpineGait(Gait):
     needs = Needs(yaw=True)
     model = SpineParameters
     world = "pool"
+    steered_by: ClassVar[str | None] = "turn_rad"
     vertical: ClassVar[bool] = False
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
@@ -178,5 +179,6 @@ class Dolphin(SpineGait):
     name = "thunniform-dolphin"
     title = "swims as a dolphin does: three quarters of a wave, up and down"
     needs = Needs(pitch=True)
+    steered_by = None
     model = DolphinParameters
     vertical = True

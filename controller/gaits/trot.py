@@ -48,7 +48,7 @@ class LegGait(Gait, ABC):
     offsets: ClassVar[tuple[float, float, float, float]]
     """In cycles, when a foot comes down: hind left, hind right, front left, front right."""
     needs = Needs(yaw=True, legs=True)
-    steers = True
+    steered_by = "turn"
     model = LegParameters
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """A steered gait: a gait with a turn goes along a path through waypoints.
 
 The straight motion is turned along the path, as [KP] 4.4 bends the motion of its animals along
-theirs; here by the gait's own parameter ``turn``, from where the body is measured in every cycle.
+theirs; here by a parameter of the gait's own, from where the body is measured in every cycle.
 """
 
 import numpy as np
@@ -22,7 +22,8 @@ from snakewalk.controller.motion.stop_profile import StopProfile
 from snakewalk.controller.walk.course import Course, OnCourse, aim_rad
 
 TURN_LIMIT = 1.4
-"""Of the gait's turn (ours): with it a trot turns on an arc of 0.4 m."""
+"""Of the gait's turn (ours): with it a trot turns on an arc of 0.4 m; a spine that swims is bent
+by as many radians."""
 TURN_PER_RAD = 3.0
 """Turn per error of the heading (ours)."""
 TURN_RATE_PER_S = 0.5
@@ -38,14 +39,23 @@ class SteeredGait(OnCourse):
     pulse_m_s = 0.0
     decision: Decision | None = None
 
-    def __init__(self, gait: Gait, robot: RobotConfig, course: Course, carrot_m: float) -> None:
+    def __init__(
+        self,
+        gait: Gait,
+        robot: RobotConfig,
+        course: Course,
+        carrot_m: float,
+        *,
+        cycles: float = 0.0,
+    ) -> None:
         """Begin at phase 0, straight.
 
         Args:
-            gait: one that ``steers``.
+            gait: one that is ``steered_by`` a parameter.
             robot: that it moves.
             course: of which a body length is ``CYCLES_PER_BODY``.
             carrot_m: how far ahead on the path the body aims.
+            cycles: that the course has seen before.
 
         Raises:
             InputError: as ``check_turns``.
@@ -59,7 +69,8 @@ class SteeredGait(OnCourse):
         self._turn = RateLimiter(np.zeros(1), TURN_RATE_PER_S, _TURN_PER_S2)
         self._stop_profile = StopProfile()
         self._phase_rad = 0.0
-        self._cycles = 0.0
+        self.cycles = cycles
+        """Gone through on this course."""
 
     @property
     def needs(self) -> Needs:
@@ -82,7 +93,7 @@ class SteeredGait(OnCourse):
         return float(self._rate_rad_s / TURN)
 
     def begin(self, view: BodyView) -> Floats:
-        """(J,) where the gait begins: the ground is flat."""
+        """(J,) where the gait begins, whatever the ground."""
         return self.goal_rad()
 
     def goal_rad(self) -> Floats:
@@ -107,7 +118,7 @@ class SteeredGait(OnCourse):
         """Go on by ``dt_s`` and return the new targets (J,)."""
         course, centre_m = self.course, view.centre_m[:2]
         heading_rad = float(view.headings_rad.mean())
-        course.follow(centre_m, view.link_m[0, :2], lambda: heading_rad, self._cycles)
+        course.follow(centre_m, view.link_m[0, :2], lambda: heading_rad, self.cycles)
         if course.complete:
             self._stop_profile.stop()
         aim = aim_rad(course.path, centre_m, course.along_m, self._carrot_m)
@@ -115,7 +126,7 @@ class SteeredGait(OnCourse):
         part_s = self._stop_profile.step(dt_s)
         self._turn.step(part_s, np.clip([wanted], -TURN_LIMIT, TURN_LIMIT))
         self._phase_rad = (self._phase_rad + part_s * self._rate_rad_s) % TURN
-        self._cycles += part_s * self._rate_rad_s / TURN
+        self.cycles += part_s * self._rate_rad_s / TURN
         return self.goal_rad()
 
     def _joints_rad(self, phase_rad: float, turn: float) -> Floats:
@@ -131,21 +142,23 @@ def check_turns(gait: Gait, robot: RobotConfig) -> None:
             at the largest turn.
 
     """
-    if not gait.steers:
-        able = ", ".join(name for name, kind in GAITS.items() if kind.steers)
+    if gait.steered_by is None:
+        able = ", ".join(name for name, kind in GAITS.items() if kind.steered_by is not None)
         raise InputError(
             f"gait {gait.name}: not steered along waypoints; those that are: {able}; "
             f"without waypoints: snakewalk gait run {gait.name}"
         )
-    if gait.params.turn != 0.0:
-        raise InputError(f"gait {gait.name}: turn is what steers it along waypoints; leave it out")
+    if getattr(gait.params, gait.steered_by) != 0.0:
+        raise InputError(
+            f"gait {gait.name}: {gait.steered_by} is what steers it along waypoints; leave it out"
+        )
     for turn in (-TURN_LIMIT, 0.0, TURN_LIMIT):
         _turned(gait, turn).check(robot)
 
 
 def _turned(gait: Gait, turn: float) -> Gait:
     turn = -turn if gait.params.mirror else turn
-    return type(gait)(gait.params.model_copy(update={"turn": turn}))
+    return type(gait)(gait.params.model_copy(update={gait.steered_by: turn}))
 
 
 def _rate_beside_turn(gait: Gait, robot: RobotConfig, pace: Pace) -> float:

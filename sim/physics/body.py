@@ -50,13 +50,13 @@ def build_model(
 
 
 def _add_planes(spec: mujoco.MjSpec) -> None:
-    """Let tangent planes bear the balls in place of the height field."""
+    """Let tangent planes bear bellies and feet in place of the height field."""
     field = spec.geom("ground")
     field.contype = field.conaffinity = 0
-    for belly in [geom for geom in spec.geoms if geom.name.startswith("belly")]:
+    for ball in [geom for geom in spec.geoms if geom.name.startswith(("belly", "foot"))]:
         for k in range(PLANES):
             plane = spec.worldbody.add_geom(
-                name=f"plane{k}_{belly.name}",
+                name=f"plane{k}_{ball.name}",
                 type=mujoco.mjtGeom.mjGEOM_PLANE,
                 size=[1.0, 1.0, 1.0],
                 pos=[0.0, 0.0, AWAY_M],
@@ -65,10 +65,11 @@ def _add_planes(spec: mujoco.MjSpec) -> None:
             )
             spec.add_pair(
                 geomname1=plane.name,
-                geomname2=belly.name,
-                condim=1,
-                solref=belly.solref,
-                solimp=belly.solimp,
+                geomname2=ball.name,
+                condim=ball.condim,
+                solref=ball.solref,
+                solimp=ball.solimp,
+                friction=[ball.friction[0], ball.friction[0], 0.0, 0.0, 0.0],
             )
 
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import WaterGround, WorldConfig
+from snakewalk.config.world import Water, WorldConfig
 from snakewalk.drivers.least_squares import least_squares
 from snakewalk.sim.physics.body import belly_points_m
 from snakewalk.sim.physics.mechanics import Mechanics, foot_geoms
@@ -56,23 +56,26 @@ def float_at(
     m: Mechanics,
     robot: RobotConfig,
     world: WorldConfig,
+    ground: HeightField | None,
     start_m: tuple[float, float],
     heading_rad: float,
     joint_rad: ArrayLike,
 ) -> bool:
-    """Put a body that water carries at the height where it stays; False on dry ground.
+    """Put a body that water carries at the height where it stays; False where it would touch.
 
     Raises:
         ValueError: ``joint_rad`` is not (J,).
 
     """
     water = world.ground
-    if not isinstance(water, WaterGround) or water.buoyancy < 1.0:
+    if not isinstance(water, Water) or water.buoyancy < 1.0:
         return False
     _pose(m, start_m, heading_rad, joint_rad)
     mujoco.mj_kinematics(m.model, m.data)
     height = floating_height_m(water, robot.body_radius_m)
     m.data.qpos[2] += height - float(m.data.xipos[1:, 2].mean())
+    if _clearance_m(m, robot, ground).min() < 0.0:
+        return False
     mujoco.mj_forward(m.model, m.data)
     m.start_at_rest()
     return True

@@ -53,7 +53,6 @@ class MujocoPlant:
 
     Raises:
         PhysicsError: the memory layout of the installed MuJoCo cannot be verified.
-        InputError: legs on a height field.
 
     """
 
@@ -64,11 +63,6 @@ class MujocoPlant:
         ground: HeightField | None = None,
         step_s: float | None = None,
     ) -> None:
-        if robot.limbs and ground is not None:
-            raise InputError(
-                f"world {world.name}: robot {robot.name} has legs, whose feet are simulated on "
-                "level ground only"
-            )
         self.robot = robot
         self.world = world
         self.ground = ground
@@ -155,7 +149,7 @@ class MujocoPlant:
         m = self.mechanics
         if not place_at_obstacle(
             m, self.robot, self.world, heading_rad, joint_rad
-        ) and not float_at(m, self.robot, self.world, start_m, heading_rad, joint_rad):
+        ) and not float_at(m, self.robot, self.world, self.ground, start_m, heading_rad, joint_rad):
             place(m, self.robot, self.ground, start_m, heading_rad, joint_rad)
         self._count = 0
         self._data.time = 0.0

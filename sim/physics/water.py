@@ -18,7 +18,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import WaterGround, WorldConfig
+from snakewalk.config.world import Water, WorldConfig
 
 GAUSS = 0.5 / math.sqrt(3.0)
 """Of a link's length, from its middle."""
@@ -33,7 +33,7 @@ def water_constants(world: WorldConfig, robot: RobotConfig) -> Floats:
     """
     water, links = world.ground, robot.joint_count + 1
     rows = np.zeros((links, 7))
-    if not isinstance(water, WaterGround):
+    if not isinstance(water, Water):
         return rows
     rods = [*zip(robot.link_lengths_m, robot.link_radii_m, robot.link_masses_kg, strict=True)]
     for joint in robot.limb_joints:
@@ -59,7 +59,7 @@ def immersed(height_m: float, radius_m: float, surface_m: float) -> float:
     return x * x * (3.0 - 2.0 * x)
 
 
-def floating_height_m(water: WaterGround, radius_m: float) -> float:
+def floating_height_m(water: Water, radius_m: float) -> float:
     """Height of a link's centre at which water carries it: the surface's, or half the depth.
 
     A body that is heavier than its water lies on the bottom.

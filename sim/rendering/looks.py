@@ -10,7 +10,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import WaterGround, WorldConfig
+from snakewalk.config.world import Water, WaterGround, WorldConfig
 from snakewalk.sim.physics.body import finish, mjcf
 from snakewalk.sim.rendering.shade import SUN_DIRECTION
 
@@ -83,7 +83,7 @@ def dressed_model(
         _skin(spec, robot)
     else:
         _animal(spec, look)
-    _water(spec, world)
+    _water(spec, world, ground)
     for k, (x, y) in enumerate(waypoints_m):
         z = 0.0 if ground is None else float(ground.elevation_m(x, y))
         _add(
@@ -198,13 +198,19 @@ def _floor(spec: mujoco.MjSpec, ground: HeightField | None) -> None:
         floor.size = [0.0, 0.0, 0.1]
 
 
-def _water(spec: mujoco.MjSpec, world: WorldConfig) -> None:
+def _water(spec: mujoco.MjSpec, world: WorldConfig, ground: HeightField | None) -> None:
     """Tint the floor by the water above it and draw its surface, which is seen through."""
-    if not isinstance(world.ground, WaterGround):
+    water = world.ground
+    if not isinstance(water, Water):
         return
-    spec.texture("ground").rgb1, spec.texture("ground").rgb2 = SHALLOW
-    surface = 0.5 * world.ground.size_m, 0.5 * world.ground.size_m, 0.001
-    _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_BOX, surface, (0, 0, world.ground.depth_m), SURFACE)
+    if isinstance(water, WaterGround):
+        spec.texture("ground").rgb1, spec.texture("ground").rgb2 = SHALLOW
+        west_m, wide_m, long_m = -0.5 * water.size_m, water.size_m, water.size_m
+    elif ground is not None:  # a shore: up to the waterline
+        west_m, wide_m, long_m = ground.x0_m, ground.size_m[1], -ground.x0_m
+    surface = 0.5 * long_m, 0.5 * wide_m, 0.001
+    middle = west_m + 0.5 * long_m, 0.0, water.depth_m
+    _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_BOX, surface, middle, SURFACE)
 
 
 def _paint(model: mujoco.MjModel, ground: HeightField) -> None:

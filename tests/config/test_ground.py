@@ -46,6 +46,24 @@ def test_a_ramp_has_its_slope_between_level_ends(degrees: float) -> None:
     np.testing.assert_allclose(field.elevation_m(np.linspace(2, 4, 9), y), top, atol=1e-12)
 
 
+def test_a_shore_has_its_waterline_at_zero_between_level_bottom_and_level_land() -> None:
+    """A kink lies between samples and is blunt by less than one spacing."""
+    slope = 0.15
+    field = build_ground(world(kind="shore", slope_rad=slope, depth_m=0.4, rise_m=0.1))
+    assert field is not None
+    steep, y = np.tan(slope), np.linspace(-2.9, 2.9, 9)
+    assert field.elevation_m(0.0, 0.0) == pytest.approx(0.4, abs=1e-9)
+    beach = np.linspace(-0.4 / steep, 0.1 / steep, 9)
+    np.testing.assert_allclose(
+        field.elevation_m(beach, y), 0.4 + steep * beach, atol=0.5 * steep * field.spacing_m
+    )
+    np.testing.assert_allclose(field.slope_rad(0.9 * beach, y), slope, atol=1e-12)
+    assert field.x0_m == pytest.approx(-0.4 / steep - 2.0)
+    np.testing.assert_allclose(field.elevation_m(field.x0_m + np.array([0.0, 1.9]), 0.0), 0.0)
+    np.testing.assert_allclose(field.elevation_m(0.1 / steep + np.array([0.1, 1.9]), 0.0), 0.5)
+    assert field.y0_m == pytest.approx(-3.0)
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_a_random_field_has_the_rms_slope_that_is_asked(seed: int) -> None:
     slope = float(np.radians(10.0))
@@ -129,7 +147,7 @@ def test_ground_that_a_grid_cannot_hold_is_refused(ground: dict[str, object], wo
         world(**ground)
 
 
-@pytest.mark.parametrize("name", ["ramp-15", "random-10", "steps-4cm", "gaps-8cm"])
+@pytest.mark.parametrize("name", ["ramp-15", "random-10", "steps-4cm", "gaps-8cm", "shore"])
 def test_relief_scales_heights_and_limits_alike(name: str) -> None:
     plain = load_world(name)
     field, half = build_ground(plain), build_ground(plain.with_relief(0.5))

@@ -8,7 +8,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.config.world import WaterGround
+from snakewalk.config.world import Water
 from snakewalk.controller.runlog.record import Header
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def skin_look(look: str, header: Header) -> "SkinLook | None":
 
     dressed = body_skin(animal(header.run.track) if look == ANIMAL else look)
     robot = header.robot
-    skin = robot_skin(dressed.skin, robot, isinstance(header.world.ground, WaterGround))
+    skin = robot_skin(dressed.skin, robot, isinstance(header.world.ground, Water))
     bone_m = np.array(robot.link_lengths_m)
     origins = rest_fronts_m(bone_m, skin.axis_m)  # a body begins at its joint, the head's amidst
     origins[0, 0] -= 0.5 * bone_m[0]

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import WaterGround
+from snakewalk.config.world import Water
 from snakewalk.controller.app.report.film import body_qpos
 from snakewalk.controller.app.result_files import LOG
 from snakewalk.controller.capture.mesh.bone_motion import BoneMotion, from_track, swimming
@@ -71,7 +71,7 @@ def _robot_skin(skin: Skin, record: RunRecord, fps: float, source: str) -> tuple
         raise InputError(f"{source}: the log holds no two poses: there is no motion")
     rows = _thinned(time_s, fps)
     robot = record.header.robot
-    in_water = isinstance(record.header.world.ground, WaterGround)
+    in_water = isinstance(record.header.world.ground, Water)
     return robot_skin(skin, robot, in_water), from_poses(robot, time_s[rows], qpos[rows])
 
 

@@ -1,22 +1,32 @@
 """A run of a gait along waypoints: its path, its checks and its motion."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.runs.gait_run import GaitRun
 from snakewalk.controller.app.runs.prepared_run import PathRun
+from snakewalk.controller.gaits.gait import Gait
+from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.record import PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.walk.course import Course
+from snakewalk.controller.walk.landing import Landing
 from snakewalk.controller.walk.steered_gait import CYCLES_PER_BODY, SteeredGait, check_turns
 
 
 @dataclass(frozen=True)
 class SteeredRun(PathRun, GaitRun):
-    """A ``PreparedRun`` of a gait that is steered along a path; flat floors only."""
+    """A ``PreparedRun`` of a gait that is steered along a path."""
+
+    @cached_property
+    def ashore(self) -> Gait | None:
+        """The gait on land, of a run that comes out of the water."""
+        table = self.config.ashore
+        return None if table is None else make_gait(table.name, table.parameters)
 
     def check_plan(self) -> PlanSummary:
         """Check that the gait can be steered, and within the joints' ranges; lay the path.
@@ -25,9 +35,10 @@ class SteeredRun(PathRun, GaitRun):
             InputError: it cannot, or the run asks for what belongs to a gait without waypoints.
 
         """
-        if self.ground is not None:
+        if self.ground is not None and not self.robot.limbs:
             raise InputError(
-                f"run {self.run.name}: a gait goes along waypoints on flat floors only"
+                f"run {self.run.name}: a gait goes along waypoints on flat floors only, unless the "
+                "body has legs"
             )
         config = self.config
         if config.then or config.look_heading_rad is not None or config.look_at_m is not None:
@@ -36,7 +47,8 @@ class SteeredRun(PathRun, GaitRun):
                 "look_at_m in its table [gait]"
             )
         try:
-            check_turns(self.gait, self.robot)
+            for gait in filter(None, (self.gait, self.ashore)):
+                check_turns(gait, self.robot)
         except InputError as error:
             faults = [f"run {self.run.name}: {fault}" for fault in error.faults]
             raise InputError(faults) from None
@@ -57,4 +69,14 @@ class SteeredRun(PathRun, GaitRun):
             length_m=self.robot.length_m,
             travel_per_body=CYCLES_PER_BODY,
         )
-        return SteeredGait(self.gait, self.robot, course, run.walk.carrot_m)
+        swim = SteeredGait(self.gait, self.robot, course, run.walk.carrot_m)
+        walk, table = self.ashore, self.config.ashore
+        if walk is None or table is None:
+            return swim
+        return Landing(
+            swim,
+            lambda cycles: SteeredGait(walk, self.robot, course, run.walk.carrot_m, cycles=cycles),
+            self.robot,
+            headway=table.headway,
+            on_ashore=lambda text: on_event("ashore", text),
+        )

@@ -20,6 +20,7 @@ from snakewalk.controller.walk.steered_gait import CYCLES_PER_BODY, TURN_LIMIT, 
 
 ROBOT = load_robot("salamander")
 STEP_S = 0.02
+SWIMS = {"run.gait.name": "anguilliform"}
 SWING = [len(ROBOT.joint_axes) + 2 * leg for leg in range(4)]
 """Left and right in turn."""
 
@@ -53,7 +54,7 @@ def test_it_turns_towards_its_path_and_a_body_on_it_goes_straight(name, values) 
         assert 1.0 <= max(left, right) < 1.1  # two strides of 0.5 rad, and to slow down in the air
 
 
-@pytest.mark.parametrize("name", ["trot", "lateral-walk"])
+@pytest.mark.parametrize("name", ["trot", "lateral-walk", "subcarangiform"])
 def test_joints_keep_within_their_limits_however_it_is_steered(name: str) -> None:
     motion, rng = steered(name), np.random.default_rng(3)
     goals = [motion.begin(body_at(0.0))]
@@ -101,9 +102,11 @@ def test_a_run_out_of_time_is_told_by_its_way_not_by_a_pulse(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ({"run.world": "ramp-10"}, "on flat floors only"),
-        ({"run.gait.name": "sidewinding"}, "those that are: trot, lateral-walk"),
-        ({"run.gait.parameters.turn": 0.3}, "leave it out"),
+        ({"run.world": "ramp-10", "run.robot": "yaw16"} | SWIMS, "on flat floors only"),
+        ({"run.gait.name": "sidewinding"}, "those that are: .*trot, lateral-walk"),
+        ({"run.gait.parameters.turn": 0.3}, "turn is what steers it along waypoints; leave it out"),
+        ({"run.gait.parameters.turn_rad": 0.3} | SWIMS, "turn_rad is what steers it"),
+        ({"run.gait.ashore.name": "sidewinding"}, "sidewinding: not steered"),
         ({"run.gait.look_heading_rad": 0.3}, "takes no then, look_heading_rad"),
     ],
 )

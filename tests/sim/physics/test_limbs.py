@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 
 from snakewalk.config.constants import GRAVITY_M_S2
-from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
-from snakewalk.config.world import WaterGround
+from snakewalk.config.world import RampGround, ShoreGround, WaterGround
 from snakewalk.sim.physics.mechanics import foot_geoms
 from snakewalk.sim.physics.plant import MujocoPlant
+from snakewalk.sim.physics.water import immersed
 from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
 from tests.oracles.numpy_steps import numpy_plant
 
@@ -190,7 +191,56 @@ def test_legs_that_stand_out_brake_in_water_as_rods_across_the_way() -> None:
         assert np.abs(way[1:]).max() < 1e-3
 
 
-def test_hills_are_refused_in_words() -> None:
-    world = load_world("jacksboro-gentle")
-    with pytest.raises(InputError, match="salamander has legs"):
-        MujocoPlant(ROBOT, world, build_ground(world))
+def test_a_level_field_bears_the_feet_as_the_floor_does() -> None:
+    ends = []
+    level = HeightField(np.zeros((41, 41)), 0.1, -2.0, -2.0)
+    for ground in (None, level):
+        body, servo = MujocoPlant(ROBOT, WORLD, ground, 0.001), drive()
+        body.reset((0.0, 0.0), 0.3, STAND)
+        for k in range(60):
+            phase = 0.02 * k * 4.0
+            servo.goal_rad[SPINE::2] = 0.4 * np.sin(phase + np.array([0.0, np.pi, np.pi, 0.0]))
+            servo.goal_rad[SPINE + 1 :: 2] = -0.4 + 0.2 * np.cos(phase)
+            body.advance(0.02 * (k + 1), servo)
+        ends.append((body.qpos, body.mechanics.load_n.copy()))
+    assert np.abs(ends[0][0][:2]).max() > 0.005  # it went
+    np.testing.assert_allclose(ends[1][0], ends[0][0], atol=1e-5)
+    assert ends[1][1].sum() == pytest.approx(ends[0][1].sum(), rel=0.02)
+
+
+def test_feet_on_a_slope_bear_its_cosine_and_hold_until_the_friction_ends() -> None:
+    """A body stands still while the tangent of the slope is under the feet's friction, 0.8."""
+    weight_n, way_m = ROBOT.mass_kg * GRAVITY_M_S2, {}
+    for slope_rad in (0.3, 0.9):
+        world = WORLD.model_copy(update={"ground": RampGround(slope_rad=slope_rad, spacing_m=0.05)})
+        body = MujocoPlant(ROBOT, world, build_ground(world))
+        body.reset((0.2, 0.0), 0.5, STAND)
+        body.advance(0.5, drive())
+        was = centre_m(body)
+        body.advance(1.0, drive())
+        way_m[slope_rad] = float(np.linalg.norm(centre_m(body) - was))
+        if slope_rad < 0.5:
+            feet = body.mechanics.model.geom_bodyid[foot_geoms(body.mechanics.model, ROBOT)] - 1
+            load = body.mechanics.load_n
+            assert load[feet].sum() == pytest.approx(load.sum())
+            assert load.sum() == pytest.approx(weight_n * np.cos(slope_rad), rel=0.01)
+    assert way_m[0.3] < 2e-3
+    assert way_m[0.9] > 0.05
+
+
+def test_off_a_shore_it_floats_and_on_the_beach_it_stands() -> None:
+    """Archimedes: five sixths of a body of buoyancy 1.2 are under water."""
+    world = load_world("shore")
+    ground = build_ground(world)
+    assert isinstance(world.ground, ShoreGround)
+    for x_m, floats in ((-1.5, True), (1.5, False)):
+        body, servo = MujocoPlant(ROBOT, world, ground), drive()
+        body.reset((x_m, 0.0), 0.0, STAND)
+        body.advance(0.5, servo)
+        assert (body.contact_count == 0) == floats
+        wet = [
+            immersed(z, r, world.ground.depth_m)
+            for z, r in zip(body.link_positions_m[:, 2], body.mechanics.water[:, 3], strict=True)
+        ]
+        carried = float(np.dot(wet, body.mechanics.water[:, 5]))
+        assert carried == pytest.approx(floats * ROBOT.mass_kg * GRAVITY_M_S2, rel=0.02)
