@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from snakewalk.config.base import Strict
 
-PoseName = Literal["simulator", "camera", "joints"]
+PoseName = Literal["simulator", "camera", "imu", "joints"]
 Place = tuple[float, float]
 
 

@@ -210,7 +210,9 @@ class RunConfig(Strict):
         None, description="joint goals that yield to measured current; default: they do not"
     )
     pose: PoseName | None = Field(
-        None, description="what measures the head; default: the simulator, on servos the joints"
+        None,
+        description="what measures the head; default: the simulator, on servos the robot's IMU, "
+        "or the joints",
     )
     camera: CameraConfig = CameraConfig()
     synthesis: SynthesisConfig = SynthesisConfig()

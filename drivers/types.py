@@ -23,6 +23,20 @@ class JointCommand(NamedTuple):
     """(J,) goal positions; 0 is straight, positive yaw bends the body to the left."""
 
 
+class ImuState(NamedTuple):
+    """Newest reading of the robot's IMU, in the axes of the link that it sits in."""
+
+    rotation: Floats
+    """(3, 3) columns: the link's forward, left and up axes in a world whose up is right and whose
+    heading is arbitrary, and drifts."""
+    rate_rad_s: Floats
+    """(3,) about these axes."""
+    age_s: float
+    """Since it was measured, at most."""
+    valid: bool
+    """Whether this cycle's read succeeded."""
+
+
 class JointState(NamedTuple):
     """Newest known state of all joints; after a failed read the old value stays and ages."""
 
@@ -49,6 +63,8 @@ class JointState(NamedTuple):
     """(J,) whether this cycle's read succeeded."""
     slow_age_s: Floats
     """(J,) the same for temperature and voltage; infinite until first read."""
+    imu: ImuState | None = None
+    """None where the robot has none, or it has not shown an attitude yet."""
 
 
 class BodyPose(NamedTuple):

@@ -6,7 +6,7 @@ reads the drive in every step, and writes back the motors' output.
 """
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -108,6 +108,16 @@ def shaft_torque(
     current = (pwm * supply_v - back_emf_v_s * velocity_rad_s) / resistance_ohm
     current = min(max(current, -current_limit_a), current_limit_a)
     return pwm, current, torque_constant_n_m_a * current
+
+
+class LinkMotion(NamedTuple):
+    """Where one link is, as an IMU in it feels it."""
+
+    time_s: float
+    centre_m: Floats
+    """(3,)"""
+    rotation: Floats
+    """(3, 3) columns: forward, left and up axes in the world."""
 
 
 class Plant(Protocol):

@@ -28,7 +28,7 @@ from snakewalk.controller.kinematics.links import (
     chain_points_m,
     half_lengths_m,
 )
-from snakewalk.controller.kinematics.rotations import rotation_by
+from snakewalk.drivers.attitude import rotation_by
 from snakewalk.drivers.types import BodyPose
 
 if TYPE_CHECKING:

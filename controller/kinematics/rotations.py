@@ -1,19 +1,9 @@
-"""Angles and rotations: wrapped angles, circular means, rotations about an axis."""
+"""Angles: wrapped, and their circular means."""
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
-
-
-def rotation_by(vector: Floats) -> Floats:
-    """(3, 3) rotation about ``vector`` by its length."""
-    angle = float(np.linalg.norm(vector))
-    if angle < 1e-15:
-        return np.eye(3)
-    x, y, z = vector / angle
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k)
 
 
 def wrap(angle_rad: ArrayLike) -> Floats:

@@ -148,6 +148,20 @@ class ShadowTable:
 
 
 @dataclass(frozen=True, slots=True)
+class ImuTable:
+    """What the robot's IMU said; no rows where it has none."""
+
+    time_s: Floats
+    """(I,) those of the cycles"""
+    rotation: Floats
+    """(I, 3, 3) of the link that it sits in; its heading begins anywhere, and drifts."""
+    rate_rad_s: Floats
+    """(I, 3) about the link's forward, left and up axes."""
+    age_s: Floats
+    """(I,)"""
+
+
+@dataclass(frozen=True, slots=True)
 class PoseTable:
     """Where the body was."""
 
@@ -224,6 +238,7 @@ class RunRecord:
     walk: WalkTable
     qpos: QposTable
     shadow: ShadowTable
+    imu: ImuTable
     paths: tuple[tuple[float, Floats], ...]
     """Paths in force from a time on; the first is the plan's, at 0."""
     events: tuple[Event, ...]

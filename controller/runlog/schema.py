@@ -71,6 +71,12 @@ TOPICS: Final[dict[str, Json]] = {
         "position_rad": _list("(J,) of a simulated chain that gets the same goals"),
         "current_a": _list("(J,) of it"),
     },
+    "/imu": {
+        "time_s": _TIME,
+        "rotation": _list("(9,) rows of the rotation matrix of the link of the IMU; any heading"),
+        "rate_rad_s": _list("(3,) about the link's forward, left and up axes"),
+        "age_s": _of("number", "since it was measured"),
+    },
     "/pose": {
         "time_s": _TIME,
         "head_m": _list("(3,) centre of the head link in the world"),

@@ -14,6 +14,7 @@ from snakewalk.controller.runlog.record import (
     CycleTable,
     Event,
     Header,
+    ImuTable,
     InitialPose,
     PlanSummary,
     PoseTable,
@@ -52,6 +53,7 @@ def record_of(
         walk=_walk(rows.get("/walk", ())),
         qpos=_qpos(rows.get("/qpos", ())),
         shadow=_shadow(rows.get("/shadow", ()), joints),
+        imu=_imu(rows.get("/imu", ())),
         paths=((0.0, header.plan.path_m), *replanned),
         events=tuple(
             Event(float(r["time_s"]), r["level"], r["kind"], r["text"])
@@ -132,6 +134,15 @@ def _shadow(rows: Sequence[Row], joints: int) -> ShadowTable:
         time_s=_floats(rows, "time_s"),
         position_rad=_floats(rows, "position_rad", joints),
         current_a=_floats(rows, "current_a", joints),
+    )
+
+
+def _imu(rows: Sequence[Row]) -> ImuTable:
+    return ImuTable(
+        time_s=_floats(rows, "time_s"),
+        rotation=_floats(rows, "rotation", 9).reshape(-1, 3, 3),
+        rate_rad_s=_floats(rows, "rate_rad_s", 3),
+        age_s=_floats(rows, "age_s"),
     )
 
 

@@ -36,7 +36,7 @@ from snakewalk.controller.runlog.record import (
     Winding,
 )
 from snakewalk.controller.runlog.schema import FORMAT, TOPICS, schema_json, schema_name
-from snakewalk.drivers.types import JointState
+from snakewalk.drivers.types import ImuState, JointState
 
 Level = Literal["info", "warning", "error"]
 VerdictKind = Literal["pass", "clamp", "veto"]
@@ -158,7 +158,7 @@ class RunLog:
         reason: str = "",
         joints: Sequence[int] = (),
     ) -> None:
-        """One control cycle; writes ``/slow`` too when temperature, voltage or alarms changed."""
+        """One control cycle; ``/slow`` too when heat, voltage or alarms changed, and ``/imu``."""
         asked, sent = np.asarray(asked_rad, dtype=float), np.asarray(sent_rad, dtype=float)
         asked_text = exact_text(asked)
         same = sent.tobytes() == asked.tobytes()
@@ -181,6 +181,8 @@ class RunLog:
         )
         self._add_text("/cycle", time_s, row)
         self._slow_row(time_s, state)
+        if state.imu is not None:
+            self._imu_row(time_s, state.imu)
 
     def pose(
         self,
@@ -268,6 +270,14 @@ class RunLog:
             "hardware_error": state.hardware_error.tolist(),
         }
         self._add("/slow", time_s, row)
+
+    def _imu_row(self, time_s: float, imu: ImuState) -> None:
+        turn, rate = rounded_texts((imu.rotation.ravel(), imu.rate_rad_s))
+        row = (
+            f'{{"time_s":{text(time_s)},"rotation":{turn},"rate_rad_s":{rate},'
+            f'"age_s":{rounded_text(imu.age_s)}}}'
+        )
+        self._add_text("/imu", time_s, row)
 
     def _add(self, topic: str, time_s: float, row: Mapping[str, Any]) -> None:
         self._add_text(topic, time_s, encode(row))

@@ -19,6 +19,7 @@ from snakewalk.controller.runlog.record import MotorEnergy
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.derating import Derating
 from snakewalk.controller.runtime.loop import Tick, ticks
+from snakewalk.controller.runtime.roll_monitor import RollMonitor
 from snakewalk.controller.runtime.slip_monitor import SlipMonitor
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import SafetyTrippedError
@@ -124,6 +125,7 @@ class Drive:
         self._log, self._robot, self._run = log, robot, run
         self._gain = gain
         self._slip_monitor = SlipMonitor(robot.length_m, gain, run.safety.advance_fraction)
+        self._roll_monitor = RollMonitor()
         self._derating = Derating(run.safety, robot, self._on_derating)
         self._compliance = None if run.compliance is None else Compliance(run.compliance, robot)
         self._on_progress, self._on_event = on_progress, on_event
@@ -165,6 +167,8 @@ class Drive:
                 self._displacement_m = (
                     view.advance_since_m(self._last) if self._last is not None else 0.0
                 )
+                if self._run.waypoints_m:  # gaits may roll as they please
+                    self._tell_roll(view)
                 if clock.now_s() < walk_s:
                     goal = ramp.at(clock.now_s() - start_s)
                 else:
@@ -190,6 +194,12 @@ class Drive:
         duration_s = clock.now_s() - start_s
         least = self._derating.least
         return Outcome(path.reached, path.missed, duration_s, self._alarms, tripped, least)
+
+    def _tell_roll(self, view: BodyView) -> None:
+        text = self._roll_monitor.update(view, self._clock.now_s())
+        if text is not None:
+            self._log.event(self._clock.now_s(), "roll", text, "warning")
+            self._on_event("roll", text)
 
     def _on_derating(self, kind: str, text: str) -> None:
         self._log.event(self._clock.now_s(), kind, text, "warning")

@@ -4,9 +4,11 @@ A cycle is one sync write and one sync read, or *fast* sync read, of N servos. E
 bit times (start, eight data bits, stop). Packet lengths: e-manual, DYNAMIXEL Protocol 2.0.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.errors import BudgetError
+from snakewalk.drivers.protocol.imu_table import BLOCK_BYTES
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 
 GROUP_BYTES = 14
@@ -116,6 +118,18 @@ def wire_budget(
 def chain_budget(servos: int, baud: int, *, fast: bool) -> WireBudget:
     """Budget of the longest cycle of a ``ServoChain``: one that also reads the slow state."""
     return wire_budget(servos, baud, fast=fast, slow_read_bytes=SLOW_STATE_BYTES)
+
+
+def robot_budget(robot: RobotConfig, baud: int, *, fast: bool) -> WireBudget:
+    """``chain_budget`` of a robot's servos, and of its IMU where it has one."""
+    budget = chain_budget(robot.joint_count, baud, fast=fast)
+    if robot.imu is None:
+        return budget
+    return replace(
+        budget,
+        request_bytes=budget.request_bytes + GROUP_BYTES + 1,
+        reply_bytes=budget.reply_bytes + STATUS_BYTES + BLOCK_BYTES,
+    )
 
 
 def _reply_bytes(servos: int, length: int, *, fast: bool) -> int:

@@ -246,6 +246,18 @@ class DynamixelBus:
             pending=self._pending,
         )
 
+    def device_block(self, device_id: int, address: int, length: int) -> ControlCycle:
+        """Group read of one device that is no servo, from ``address`` on."""
+        return ControlCycle(
+            self.port,
+            (device_id,),
+            read_address=address,
+            read_bytes=length,
+            fast=False,
+            latency_s=self.latency_s,
+            pending=self._pending,
+        )
+
     def table_of(self, servo_id: int) -> ControlTable:
         """Control table of one servo's model."""
         return self._tables.get(servo_id, self.table)

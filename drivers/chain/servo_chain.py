@@ -8,9 +8,10 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Int32s, Ints
 from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.bus.budget import WireBudget, chain_budget
+from snakewalk.drivers.bus.budget import WireBudget, robot_budget
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, ControlCycle, CycleCounters
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Readings
 from snakewalk.drivers.chain.recheck import Recheck, recheck
 from snakewalk.drivers.chain.start_up import (
@@ -94,6 +95,7 @@ class ServoChain:
         self._goals = GoalEncoder(self._units)
         self._readings = Readings(tables, self._units)
         self._prepare_reads(fast=True)
+        self._imu = None if robot.imu is None else ImuReader(bus, robot.imu)
         self._reads = 0
         self._armed = False
         self._sent_at_s = -np.inf
@@ -137,6 +139,8 @@ class ServoChain:
         self.inspection = inspect(self._bus, self.robot)
         if self.inspection.faults:
             raise ChainError([str(fault) for fault in self.inspection.faults])
+        if self._imu is not None:
+            self._imu.find()
         if self._rate_hz is not None:
             self._budget(fast=self.inspection.fast_reads).check(self._rate_hz)
         blind = np.flatnonzero(~self._units.measures_current)
@@ -324,7 +328,10 @@ class ServoChain:
             self._readings.update_slow(reply, slow_at_s)
         if self._armed and self._liveness is not None:
             self._liveness.check(self._reads - 1)
-        return self._readings.state(self._clock.now_s())
+        if self._imu is None:
+            return self._readings.state(self._clock.now_s())
+        imu = self._imu.read(self.on_event)
+        return self._readings.state(self._clock.now_s())._replace(imu=imu)
 
     def write(self, command: JointCommand) -> None:
         """Send goal positions, kept inside the joint limits.
@@ -351,7 +358,7 @@ class ServoChain:
         self._fast_reads = fast
 
     def _budget(self, *, fast: bool) -> WireBudget:
-        return chain_budget(self.joint_count, self.port.getBaudRate(), fast=fast)
+        return robot_budget(self.robot, self.port.getBaudRate(), fast=fast)
 
     def _report_plain_reads(self) -> None:
         """Tell that fast reads were given up, and whether the wire still carries the rate."""

@@ -4,7 +4,10 @@
 servos at once.
 """
 
+from typing import NamedTuple
+
 from snakewalk.drivers.protocol.packet import (
+    ALERT,
     BITS_PER_BYTE,
     BROADCAST_ID,
     Instruction,
@@ -15,6 +18,7 @@ from snakewalk.drivers.protocol.packet import (
     encode_status,
 )
 from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
+from snakewalk.sim.imu import Imu
 from snakewalk.sim.line.bus_contention import Reply, bus_contention
 from snakewalk.sim.line.id_directory import IdDirectory
 from snakewalk.sim.line.instructions import Instructions, word
@@ -29,11 +33,20 @@ MAX_LENGTH = 0xFFFF
 """Greatest value of a packet's length field."""
 
 
+class _Block(NamedTuple):
+    """A device's part of the reply to a read."""
+
+    delay_s: float
+    error: int
+    data: bytes
+
+
 class InstructionHandler:
     """Executes instruction packets on a firmware and composes the replies."""
 
-    def __init__(self, firmware: Firmware, baud: int) -> None:
+    def __init__(self, firmware: Firmware, baud: int, imu: Imu | None = None) -> None:
         self.firmware = firmware
+        self._imu = imu
         self.bank = firmware.bank
         self.baud = baud
         self.directory = IdDirectory(self.bank)
@@ -55,7 +68,7 @@ class InstructionHandler:
 
     def execute(self, packet: InstructionPacket, now_s: float) -> list[Reply]:
         """Execute a valid packet that ended at ``now_s``; the firmware is already there."""
-        if not self.directory.present():
+        if not self.directory.present() and self._imu is None:
             return []
         self.firmware.on_instruction(now_s)
         code, params, servo_id = packet.instruction, packet.params, packet.servo_id
@@ -78,7 +91,16 @@ class InstructionHandler:
                 replies.append(Reply(delay_s, self._status(row, servo_id, error, b"")))
         for row in self.directory.secondary(servo_id):
             self._one(row, code, params, ram_only=True)
+        if self._imu_at(servo_id) is not None:  # nothing of it is known to be writable
+            refused = StatusPacket(servo_id, ResultError.ACCESS, b"")
+            replies.append(Reply(0.0, encode_status(refused)))
         return self._respond(replies)
+
+    def _imu_at(self, servo_id: int) -> Imu | None:
+        """Return the IMU, if it has this ID and hears the line's baud rate."""
+        imu = self._imu
+        heard = imu is not None and imu.config.id == servo_id and imu.baud == self.baud
+        return imu if heard else None
 
     def _group(self, code: int, params: bytes) -> list[Reply]:
         """Execute an instruction to a group; it is none for a single servo."""
@@ -102,8 +124,14 @@ class InstructionHandler:
 
     def _ping(self, servo_id: int) -> list[Reply]:
         sent = []
-        for each in self.directory.ids() if servo_id == BROADCAST_ID else (servo_id,):
+        others = () if self._imu is None else (self._imu.config.id,)
+        everyone = sorted({*self.directory.ids(), *others})
+        for each in everyone if servo_id == BROADCAST_ID else (servo_id,):
             replies = []
+            imu = self._imu_at(each)
+            if imu is not None:
+                data = imu.model_number.to_bytes(2, "little") + b"\x01"
+                replies.append(Reply(0.0, encode_status(StatusPacket(each, 0, data))))
             for row in self.directory.replying(each):
                 model, firmware = self.bank["Model Number"][row], self.bank["Firmware Version"][row]
                 data = int(model).to_bytes(2, "little") + bytes((int(firmware),))
@@ -116,18 +144,34 @@ class InstructionHandler:
             return ResultError.ACCESS, b""
         return 0, self.bank.table[row, address : address + length].tobytes()
 
+    def _blocks(self, servo_id: int, address: int, length: int) -> list[_Block]:
+        """What each device with this ID replies to a read."""
+        rows = [
+            row
+            for row in self.directory.replying(servo_id)
+            if self.bank["Status Return Level"][row] >= 1
+        ]
+        blocks = []
+        for row in rows:
+            error, data = self._block(row, address, length)
+            blocks.append(_Block(self.delay_s(row), error | int(self.bank.alert(row)), data))
+        imu = self._imu_at(servo_id)
+        if imu is not None:
+            shown = imu.block(address, length)
+            error = ResultError.ACCESS if shown is None else ResultError.NONE
+            blocks.append(_Block(0.0, error, shown or b""))
+        return blocks
+
     def _read(self, servo_id: int, params: bytes) -> list[Reply]:
+        address, length = 0, 0
         if len(params) == 4:
-            self.firmware.refresh(word(params, 0), word(params, 2))
-        replies = []
-        for row in self.directory.replying(servo_id):
-            if self.bank["Status Return Level"][row] < 1:
-                continue
-            error, data = ResultError.DATA_LENGTH.value, b""
-            if len(params) == 4:
-                error, data = self._block(row, word(params, 0), word(params, 2))
-            replies.append(Reply(self.delay_s(row), self._status(row, servo_id, error, data)))
-        return self._respond(replies)
+            address, length = word(params, 0), word(params, 2)
+            self.firmware.refresh(address, length)
+        blocks = self._blocks(servo_id, address, length)
+        if len(params) != 4:
+            wrong = ResultError.DATA_LENGTH
+            blocks = [_Block(b.delay_s, b.error & ALERT | wrong, b"") for b in blocks]
+        return self._respond([_reply(servo_id, block) for block in blocks])
 
     def _sync_read(self, params: bytes, *, fast: bool) -> list[Reply]:
         asked = [(each, word(params, 0), word(params, 2)) for each in params[4:]]
@@ -147,34 +191,22 @@ class InstructionHandler:
         """
         if fast and sum(length + 4 for _, _, length in asked) + 1 > MAX_LENGTH:
             return []  # no length field could announce the common reply
-        self.firmware.refresh()
+        if any(self.directory.replying(servo_id) for servo_id, _, _ in asked):
+            self.firmware.refresh()
         sent: list[Reply] = []
         parts: list[tuple[int, int, bytes]] = []
         first_s, garbled = 0.0, False
         for servo_id, address, length in asked:
-            rows = [
-                row
-                for row in self.directory.replying(servo_id)
-                if self.bank["Status Return Level"][row] >= 1
-            ]
-            if not rows:
+            blocks = self._blocks(servo_id, address, length)
+            if not blocks:
                 break
-            blocks = [self._block(row, address, length) for row in rows]
             if fast:
-                first_s = first_s if parts else min(self.delay_s(row) for row in rows)
-                shares = [
-                    (error | int(self.bank.alert(row)), servo_id, data.ljust(length, b"\0"))
-                    for row, (error, data) in zip(rows, blocks, strict=True)
-                ]
+                first_s = first_s if parts else min(block.delay_s for block in blocks)
+                shares = [(b.error, servo_id, b.data.ljust(length, b"\0")) for b in blocks]
                 garbled |= any(part != shares[0] for part in shares)
                 parts.append(shares[0])
             else:
-                sent += self._respond(
-                    [
-                        Reply(self.delay_s(row), self._status(row, servo_id, error, data))
-                        for row, (error, data) in zip(rows, blocks, strict=True)
-                    ]
-                )
+                sent += self._respond([_reply(servo_id, block) for block in blocks])
         if parts:
             whole = sum(length + 4 for _, _, length in asked)
             data = encode_fast(parts, whole)
@@ -214,3 +246,7 @@ class InstructionHandler:
     def _written(self) -> None:
         self.firmware.apply_registers()
         self.refresh_ids()
+
+
+def _reply(servo_id: int, block: _Block) -> Reply:
+    return Reply(block.delay_s, encode_status(StatusPacket(servo_id, block.error, block.data)))

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from snakewalk.drivers.protocol.packet import BROADCAST_ID, HEADER, Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
+from snakewalk.sim.imu import Imu
 from snakewalk.sim.line.bus_contention import Reply
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.group_fast_path import GroupFastPath
@@ -40,12 +41,13 @@ class SimLine(Wire):
         mounting: Mounting | None = None,
         tamper: Tamper | None = None,
         usb_latency_s: float = 0.0,
+        imu: Imu | None = None,
     ) -> None:
         super().__init__(clock if clock is not None else SimClock(plant.time_s), usb_latency_s)
         self.firmware = Firmware(bank, plant, supply_and_ambient, mounting)
         self.bank = bank
         self.tamper = tamper
-        self._handler = InstructionHandler(self.firmware, baud)
+        self._handler = InstructionHandler(self.firmware, baud, imu)
         self._group = GroupFastPath(self._handler)
         self._reader = PacketParser()
         self._asked = b""

@@ -1,6 +1,7 @@
 """A ``sim.plant.Plant`` in MuJoCo: the body is placed, stepped and measured here."""
 
 import math
+from functools import partial
 from typing import Protocol
 
 import mujoco
@@ -14,12 +15,13 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.drivers.compiling import compiled
 from snakewalk.drivers.types import BodyPose
+from snakewalk.sim.imu import Imu
 from snakewalk.sim.physics.body import build_model
 from snakewalk.sim.physics.mechanics import Mechanics, PhysicsError
 from snakewalk.sim.physics.obstacles import place_at_obstacle, start_fault
 from snakewalk.sim.physics.placing import float_at, place
 from snakewalk.sim.physics.stepper import CompiledSteps
-from snakewalk.sim.plant import ServoDrive
+from snakewalk.sim.plant import LinkMotion, ServoDrive
 
 FLOOR_STEP_S = 0.002
 FIELD_STEP_S = 0.001
@@ -175,6 +177,13 @@ class MujocoPlant:
         copy: Floats = self._data.xmat[1:].reshape(-1, 3, 3).copy()
         return copy
 
+    def link_motion(self, link: int) -> LinkMotion:
+        """Where a link of the spine is now."""
+        m, d = self.mechanics.model, self._data
+        mujoco.mj_kinematics(m, d)
+        body = m.body(f"link{link}").id
+        return LinkMotion(self.time_s, d.xipos[body].copy(), d.xmat[body].reshape(3, 3).copy())
+
     @property
     def contact_count(self) -> int:
         """Links that bear load, of L."""
@@ -230,3 +239,10 @@ class MujocoPlant:
         mujoco.mj_kinematics(m, d)
         mujoco.mj_comPos(m, d)
         mujoco.mj_crb(m, d)
+
+
+def plant_imu(robot: RobotConfig, plant: MujocoPlant, baud: int, seed: int = 0) -> Imu | None:
+    """Return the robot's IMU in the body of ``plant``; None where it has none."""
+    if robot.imu is None:
+        return None
+    return Imu(robot.imu, partial(plant.link_motion, robot.imu.link), baud, seed)

@@ -33,7 +33,7 @@ ORDER = {
 }
 """Rooms, from the ground up."""
 
-VOCABULARY = {"types", "clock", "errors", "link", "compiling", "least_squares"}
+VOCABULARY = {"types", "clock", "errors", "link", "compiling", "least_squares", "attitude"}
 """What the controller may know of the drivers."""
 
 SAFETY_MUST_NOT_KNOW = ("drivers.bus", "dynamixel_sdk")

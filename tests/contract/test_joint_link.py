@@ -173,7 +173,8 @@ def test_state_is_whole_and_read_only(backend: Backend) -> None:
     state = backend.link.enable()
     joints = backend.link.joint_count
     assert joints == backend.robot.joint_count
-    for name in JointState._fields[1:]:
+    assert (state.imu is None) == (backend.robot.imu is None)
+    for name in JointState._fields[1:-1]:  # time first, IMU last
         array = getattr(state, name)
         assert array.shape == (joints,), name
         assert not array.flags.writeable, name

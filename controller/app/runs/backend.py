@@ -59,7 +59,7 @@ def simulated(
     """
     require_extra("simulated runs need", "mujoco")
     from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
-    from snakewalk.sim.physics.plant import MujocoPlant  # noqa: PLC0415
+    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
     from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
@@ -73,6 +73,7 @@ def simulated(
         baud=servo.baud,
         mounting=deviation.mounting(robot),
         supply_and_ambient=SupplyAndAmbient(supply_v=servo.supply_v),
+        imu=plant_imu(robot, plant, servo.baud, run.seed),
     )
     chain = ServoChain(
         DynamixelBus(line, robot.models_by_id),

@@ -35,7 +35,7 @@ from snakewalk.controller.gaits.gait import Gait, fitting_robot
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.repertoire.repertoire import load_repertoire
-from snakewalk.drivers.bus.budget import chain_budget
+from snakewalk.drivers.bus.budget import robot_budget
 from snakewalk.sim.servo.models import MODELS
 
 C = TypeVar("C", RunConfig, RobotConfig, WorldConfig)
@@ -463,7 +463,7 @@ def _check_servos(run: RunConfig, robot: RobotConfig) -> None:
             robot.check_over_current("safety.current_limit_a", run.safety.current_limit_a)
         except ValueError as fault:
             raise InputError(f"run {run.name}: {fault}") from None
-    chain_budget(robot.joint_count, robot.servo.baud, fast=True).check(run.cycle_hz)
+    robot_budget(robot, robot.servo.baud, fast=True).check(run.cycle_hz)
 
 
 def _gait_by_name(

@@ -1,4 +1,4 @@
-"""What measures the head in a run: the simulator, an overhead camera, or the joints alone."""
+"""What measures the head in a run: the simulator, an overhead camera, an IMU, or the joints."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
@@ -36,7 +36,9 @@ def pose_faults(run: RunConfig, robot: RobotConfig, world: WorldConfig, *, metal
     """
     faults = []
     if run.pose == "simulator" and metal:
-        faults.append("pose: servos on a port have no simulator; take camera or joints")
+        faults.append("pose: servos on a port have no simulator; take camera, imu or joints")
+    if run.pose == "imu" and robot.imu is None:
+        faults.append(f"pose: robot {robot.name} has no IMU: describe it in its file, table [imu]")
     if run.pose == "camera":
         require_extra("pose: the overhead camera needs", "cv2", "skimage")
         if not isinstance(world.ground, FlatGround) or world.obstacle is not None:
@@ -155,7 +157,11 @@ def pose_provider(
         yield PoseProvider(lambda state: measured())
         return
     reckoning = DeadReckoning(
-        robot, prepared.world.friction, run.start_m, prepared.start_heading_rad
+        robot,
+        prepared.world.friction,
+        run.start_m,
+        prepared.start_heading_rad,
+        imu=run.pose == "imu" or (run.pose is None and robot.imu is not None),
     )
     provider = PoseProvider(reckoning)
     comparison: PoseComparison | None = None

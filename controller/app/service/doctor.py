@@ -7,10 +7,11 @@ from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.app.service import adapter, line_checks
 from snakewalk.controller.app.service import servo_checks as servos
 from snakewalk.controller.app.service.finding import Finding, worst
+from snakewalk.controller.app.service.imu_check import imu_finding
 from snakewalk.controller.app.service.register_checks import read_registers, register_findings
 from snakewalk.controller.app.service.scan import scan
 from snakewalk.controller.app.service.supply_check import supply_under_load
-from snakewalk.drivers.bus.budget import chain_budget
+from snakewalk.drivers.bus.budget import robot_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.probe import overhear
 from snakewalk.drivers.chain.joint_codec import JointUnits
@@ -60,7 +61,10 @@ def examine(
     elsewhere = _at_other_bauds(port, missing, on_progress) if missing else {}
     findings += servos.presence(expected, found, elsewhere, baud, port.name)
     on_progress("who else is there")
-    findings += [f for f in [servos.unexpected_ids(expected, list(bus.scan()))] if f is not None]
+    known = (*expected, *(() if robot.imu is None else (robot.imu.id,)))
+    findings += [f for f in [servos.unexpected_ids(known, list(bus.scan()))] if f is not None]
+    if robot.imu is not None:
+        findings.append(imu_finding(bus, robot.imu))
     if not found:
         return findings
     if findings[1].grade != "fail":  # else their replies are taken for a second servo's
@@ -90,7 +94,7 @@ def examine(
         cycle = patient.cycle([s.servo_id for s in reports], fast=fast)
         findings.append(line_checks.line_quality(port, cycle, latency_s))
     fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
-    findings.append(adapter.wire(chain_budget(robot.joint_count, baud, fast=fast), rate_hz))
+    findings.append(adapter.wire(robot_budget(robot, baud, fast=fast), rate_hz))
     if wiggle and worst(findings) != "fail":
         on_progress("supply under load")
         findings.append(supply_under_load(bus, robot, safety))

@@ -6,12 +6,16 @@ from dataclasses import asdict, dataclass
 
 from serial.tools import list_ports
 
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.config.robot import ImuConfig
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
+from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.errors import BusError, ControlTableError, PortError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import model_numbers
+from snakewalk.drivers.protocol.imu_table import imu_model
 from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, SECONDARY_ID_LIMIT
 
+_LOOKS = 3
 _LIKELY = (1_000_000, FACTORY_BAUD)
 
 
@@ -99,10 +103,22 @@ def _at(port: BytePort, baud: int) -> list[ScanResult]:
     names = model_numbers()
     results = []
     for servo in DynamixelBus(port).scan().values():
-        model = names.get(servo.model_number, f"number {servo.model_number}")
+        model = names.get(servo.model_number) or _other(port, servo)
         shadow = _secondary_id(port, servo.servo_id, model)
         results.append(ScanResult(servo.servo_id, model, servo.firmware, baud, shadow))
     return results
+
+
+def _other(port: BytePort, device: PingReply) -> str:
+    """Name of a device that the SDK does not know."""
+    published = imu_model(device.model_number)
+    if published is not None:
+        return published
+    # whose number is not published: known by what only it shows
+    guess = ImuConfig(model="imu_to_dxl", id=device.servo_id)
+    reader = ImuReader(DynamixelBus(port), guess)
+    shown = any(reader.read(lambda line: None) is not None for _ in range(_LOOKS))
+    return f"{'imu_to_dxl?, ' if shown else ''}number {device.model_number}"
 
 
 def _secondary_id(port: BytePort, servo_id: int, model: str) -> int | None:

@@ -1,18 +1,25 @@
 """What the doctor finds on simulated buses with one thing wrong each; it writes nothing."""
 
+import numpy as np
 import pytest
 from pytest_mock import MockerFixture
+from scipy.spatial.transform import Rotation
 
-from snakewalk.config.robot import RobotConfig
+from snakewalk.config.robot import ImuConfig, RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.app.service import adapter
 from snakewalk.controller.app.service.doctor import examine
 from snakewalk.controller.app.service.finding import Finding, worst
+from snakewalk.controller.app.service.imu_check import imu_finding
 from snakewalk.controller.app.service.scan import ScanResult, pick_port, scan
 from snakewalk.drivers.bus.budget import chain_budget, wire_budget
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.protocol.packet import Instruction
+from snakewalk.sim.imu import Imu
 from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.plant import LinkMotion
+from snakewalk.sim.servo.bench import BenchPlant
 from tests.drivers.chain.test_servo_chain import Recorder, ServoBank
 
 ROBOT = RobotConfig(name="four", joint_axes="ypyp")
@@ -203,3 +210,57 @@ def test_the_only_adapter_is_taken_and_else_one_is_asked_for(
     there.clear()
     with pytest.raises(PortError, match="no USB serial adapter"):
         pick_port(None)
+
+
+def an_imu(imu: ImuConfig, rotation: np.ndarray, rate_dps: float = 0.0) -> SimLine:
+    plant = BenchPlant(4)
+
+    def motion() -> LinkMotion:
+        turn = Rotation.from_euler("z", rate_dps * plant.time_s, degrees=True).as_matrix()
+        return LinkMotion(plant.time_s, np.zeros(3), turn @ rotation)
+
+    return SimLine(ServoBank(ROBOT.servo_ids), plant, imu=Imu(imu, motion))
+
+
+DUCK = ImuConfig()
+ON_ITS_SIDE = Rotation.from_euler("x", 90.0, degrees=True).as_matrix()
+
+
+@pytest.mark.parametrize(
+    ("rotation", "rate_dps", "grade", "found"),
+    [
+        (np.eye(3), 0.0, "ok", "imu_to_dxl (ID 200): link 0 is 0 degrees off upright"),
+        (ON_ITS_SIDE, 0.0, "warn", "link 0 is 90 degrees off upright"),
+        (np.eye(3), 30.0, "warn", "turns at up to 30"),
+    ],
+)
+def test_the_imu_is_named_and_what_it_shows_is_judged(
+    rotation: np.ndarray, rate_dps: float, grade: str, found: str
+) -> None:
+    line = an_imu(DUCK, rotation, rate_dps)
+    finding = imu_finding(DynamixelBus(line), DUCK)
+    assert finding.grade == grade
+    assert found in finding.found
+    assert bool(finding.remedy) == (grade != "ok")
+
+
+def test_the_doctor_expects_the_imu_of_the_robot_and_no_other() -> None:
+    line = an_imu(DUCK, np.eye(3))
+    line.bank["Return Delay Time"][:] = 0
+    robot = ROBOT.model_copy(update={"imu": DUCK})
+    told = examine(line, robot, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
+    assert worst(told) == "ok"
+    assert of(told, "imu").grade == "ok"
+    unknown = of(doctor(line), "servo IDs")
+    assert unknown.grade == "warn"
+    assert unknown.found == "servo 200 is on the bus and not in the robot"
+    line = an_imu(DUCK.model_copy(update={"id": 77}), np.eye(3))
+    assert imu_finding(DynamixelBus(line), DUCK).grade == "fail"
+
+
+def test_scan_names_both_imus() -> None:
+    """One by its published number, the other by what only it shows, with a question mark."""
+    g40 = ImuConfig(model="FFW-G40-IMU", id=9, gyro_range_dps=500.0, acceleration_range_g=4.0)
+    for imu, name in ((g40, "FFW-G40-IMU"), (DUCK, "imu_to_dxl?, number 0")):
+        found = {s.servo_id: s.model for s in scan(an_imu(imu, np.eye(3)), (1_000_000,))}
+        assert found == {**dict.fromkeys(ROBOT.servo_ids, "XM430-W350"), imu.id: name}

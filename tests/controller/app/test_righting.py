@@ -10,14 +10,15 @@ from pytest_mock import MockerFixture
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.metrics.ground_contact import roll_rad
-from snakewalk.controller.runlog.reader import read_log
+from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.plant import MujocoPlant
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_a_body_on_its_back_turns_home_on_hills(
-    seed: int, tmp_path: Path, mocker: MockerFixture
+@pytest.mark.parametrize(("seed", "pose"), [(0, "simulator"), (1, "imu")])
+def test_a_body_on_its_back_turns_home_on_hills_and_says_so(
+    seed: int, pose: str, tmp_path: Path, mocker: MockerFixture
 ) -> None:
+    """With ``imu`` nothing but the device on the bus tells the walk how the body lies."""
     reset = MujocoPlant.reset
 
     def on_its_back(plant: MujocoPlant, *place: object) -> None:
@@ -27,9 +28,24 @@ def test_a_body_on_its_back_turns_home_on_hills(
         mujoco.mj_forward(plant.mechanics.model, data)
 
     mocker.patch.object(MujocoPlant, "reset", on_its_back)
-    prepared = prepare_walk("jacksboro-traverse", seed=seed, time_limit_s=20.0)
-    execute(prepared, tmp_path)
-    pose = read_log(tmp_path / "log.mcap").pose
-    roll = np.abs(roll_rad(pose.rotation))
+    rolls: list[tuple[float, float]] = []
+    head_pose = MujocoPlant.head_pose
+
+    def watched(plant: MujocoPlant) -> BodyPose:
+        true = head_pose(plant)
+        rolls.append((true.time_s, abs(float(roll_rad(true.rotation[None])[0]))))
+        return true
+
+    mocker.patch.object(MujocoPlant, "head_pose", watched)
+    robot = "alternating16-imu"
+    prepared = prepare_walk(
+        "jacksboro-traverse", seed=seed, robot=robot, pose=pose, time_limit_s=20.0
+    )
+    record = execute(prepared, tmp_path).record
+    time_s, roll = np.array(rolls).T
     assert roll[0] > 2.5
-    assert roll[pose.time_s > 18.0].max() < 1.2
+    assert roll[time_s > 18.0].max() < 1.2
+    assert len(record.imu.time_s) == len(record.cycle.time_s)
+    said = [event.text for event in record.events if event.kind == "roll"]
+    assert said[0].startswith("rolled over")
+    assert said[-1] == "upright again"

@@ -7,8 +7,8 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.kinematics.links import BodyView, body_in_world, pose_at
-from snakewalk.controller.kinematics.rotations import rotation_by
 from snakewalk.controller.walk.side_roll import MOST_TURNS, RollPlan, RollPlanner, SideRolls
+from snakewalk.drivers.attitude import rotation_by
 
 ROBOT = load_robot("alternating16")
 GIRTH_M = 2.0 * np.pi * ROBOT.body_radius_m

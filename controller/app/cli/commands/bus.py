@@ -179,7 +179,7 @@ def _simulated(
 def _robot_line(name: str, baud: int | None) -> "SimLine":
     from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415
     from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
-    from snakewalk.sim.physics.plant import MujocoPlant  # noqa: PLC0415
+    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
     from snakewalk.sim.plant import Mounting  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
 
@@ -187,7 +187,9 @@ def _robot_line(name: str, baud: int | None) -> "SimLine":
     rate = baud or robot.servo.baud
     bank = ServoBank(robot.servo_ids, robot.servo_models, rate)
     plant = MujocoPlant(robot, load_world("flat"))
-    return SimLine(bank, plant, baud=rate, mounting=Mounting.of(robot))
+    return SimLine(
+        bank, plant, baud=rate, mounting=Mounting.of(robot), imu=plant_imu(robot, plant, rate)
+    )
 
 
 def _announce(server: "PtyServer", what: "ChainSpec", line: "Wire", as_json: bool) -> None:

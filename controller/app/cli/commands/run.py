@@ -46,8 +46,8 @@ def run(
     pose: Annotated[
         str | None,
         typer.Option(
-            help="what measures the head: simulator, camera or joints",
-            autocompletion=completion.words("simulator", "camera", "joints"),
+            help="what measures the head: simulator, camera, imu or joints",
+            autocompletion=completion.words("simulator", "camera", "imu", "joints"),
         ),
     ] = None,
     set_: Set = None,

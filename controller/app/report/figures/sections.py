@@ -6,6 +6,7 @@ from typing import Final
 from matplotlib.figure import Figure
 
 from snakewalk.controller.app.report.figures.advance import advance_figure
+from snakewalk.controller.app.report.figures.attitude import attitude_figure
 from snakewalk.controller.app.report.figures.effort import effort_figure
 from snakewalk.controller.app.report.figures.joints import joints_figure
 from snakewalk.controller.app.report.figures.path import path_figure
@@ -36,6 +37,12 @@ _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] =
         "The shape travels from the head (top) to the tail (bottom). What remains between asked "
         "and measured is servo lag, a clamp, or ground that does not give way.",
         joints_figure,
+    ),
+    (
+        "Attitude",
+        "The link of the robot's IMU. Roll and pitch come from gravity; the heading begins "
+        "anywhere and drifts with the gyro's bias.",
+        attitude_figure,
     ),
     (
         "The walk",

@@ -1,0 +1,69 @@
+"""Rotations, and which way is up from rates and accelerations: an IMU's own filter, or the host's.
+
+A complementary filter on rotations: rates are integrated, and at rest the measured acceleration
+says where up is. About the vertical nothing corrects it: the heading drifts with the gyro's bias.
+(R. Mahony, T. Hamel, J.-M. Pflimlin, "Nonlinear complementary filters on the special orthogonal
+group", IEEE Transactions on Automatic Control 53, 2008, without its estimate of the bias.)
+"""
+
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.constants import GRAVITY_M_S2
+
+CORRECTION_1_S: Final = 0.5
+"""How fast up is corrected (ours): an error is down to a third in two seconds."""
+_AT_REST: Final = 0.15
+"""A force that differs from gravity by a greater part says nothing of up (ours)."""
+_LONGEST_S: Final = 0.2
+"""After a longer pause without a reading a correction counts as one of so long (ours)."""
+
+
+def rotation_by(vector: Floats) -> Floats:
+    """(3, 3) rotation about ``vector`` by its length."""
+    angle = float(np.linalg.norm(vector))
+    if angle < 1e-15:
+        return np.eye(3)
+    x, y, z = vector / angle
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k)
+
+
+class AttitudeFilter:
+    """Axes of a device in the world, from its readings; the heading begins at 0."""
+
+    def __init__(self) -> None:
+        self._rotation: Floats | None = None
+
+    def update(self, rate_rad_s: Floats, force_m_s2: Floats, step_s: float) -> Floats:
+        """Take a reading that is ``step_s`` later than the last; returns the axes (3, 3), columns.
+
+        Args:
+            rate_rad_s: (3,) mean rate since the last reading, in the device's axes.
+            force_m_s2: (3,) specific force, in the device's axes; at rest it points up.
+            step_s: since the last reading, s; of no account in the first.
+
+        """
+        size = float(np.linalg.norm(force_m_s2))
+        still = abs(size - GRAVITY_M_S2) <= _AT_REST * GRAVITY_M_S2
+        if self._rotation is None:
+            self._rotation = _level(force_m_s2 / size) if size > 0.0 else np.eye(3)
+            return self._rotation
+        turned = self._rotation @ rotation_by(rate_rad_s * step_s)
+        if still:
+            up = turned[2]  # the world's up in the device's axes
+            error = np.cross(force_m_s2 / size, up)
+            share = CORRECTION_1_S * min(step_s, _LONGEST_S)
+            turned = turned @ rotation_by(error * share)
+        self._rotation = np.asarray(turned)
+        return self._rotation
+
+
+def _level(up: Floats) -> Floats:
+    """Axes, columns, of a device that sees ``up`` (3,) in its own; its x is at heading 0."""
+    ahead = np.array([1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.array([0.0, 0.0, -up[0]])
+    left = np.cross(up, ahead)
+    left /= np.linalg.norm(left)
+    return np.array([np.cross(left, up), left, up])

@@ -1,0 +1,98 @@
+"""The IMU of a robot on its bus: bytes to the attitude of the link that it sits in."""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import ImuConfig
+from snakewalk.drivers.attitude import AttitudeFilter
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.errors import ChainError, NoAnswerError
+from snakewalk.drivers.protocol.imu_table import BLOCK_BYTES, IMU_TABLES, ImuSample, decode
+from snakewalk.drivers.types import ImuState
+
+SILENT_S = 1.0
+"""After so long without a reading this is told (ours)."""
+
+
+class ImuReader:
+    """Reads the IMU of ``config`` on ``bus``, once a call."""
+
+    def __init__(self, bus: DynamixelBus, config: ImuConfig) -> None:
+        self._bus, self._config = bus, config
+        self._cycle = bus.device_block(config.id, IMU_TABLES[config.model].address, BLOCK_BYTES)
+        in_link = Rotation.from_euler("xyz", config.mounting_deg, degrees=True).as_matrix()
+        self._to_link: Floats = np.asarray(in_link)
+        self._filter = AttitudeFilter()
+        self._measured_at_s = -np.inf
+        self._silent = False
+        self._state: ImuState | None = None
+
+    def find(self) -> None:
+        """Ask whether it is there.
+
+        Raises:
+            ChainError: it does not answer, or another device does.
+            PortError: the port is gone.
+
+        """
+        config, number = self._config, IMU_TABLES[self._config.model].model_number
+        try:
+            reply = self._bus.ping(config.id)
+        except NoAnswerError:
+            raise ChainError(
+                f"imu (ID {config.id}): no answer at {self._bus.port.getBaudRate()} baud: power, "
+                "cable, id or baud rate; without one, take [imu] out of the robot's file"
+            ) from None
+        if number is not None and reply.model_number != number:
+            raise ChainError(
+                f"imu (ID {config.id}): is of model number {reply.model_number}, a {config.model} "
+                f"has {number}"
+            )
+
+    def read(self, on_event: Callable[[str], None]) -> ImuState | None:
+        """Read once; None until the device has shown an attitude, and the old one if it is silent.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        reply = self._cycle.read()
+        now_s = self._bus.port.clock.now_s()
+        measured_at_s = now_s - self._cycle.since_sent_s
+        if reply.valid[0]:
+            self._take(decode(self._config, reply.data[0].tobytes()), measured_at_s)
+        valid = self._measured_at_s == measured_at_s
+        if self._state is None:
+            return None
+        age_s = now_s - self._measured_at_s
+        if self._silent is not (age_s > SILENT_S):
+            self._silent = not self._silent
+            what = f"silent for {age_s:.1f} s" if self._silent else "answers again"
+            on_event(f"imu (ID {self._config.id}): {what}")
+        return self._state._replace(age_s=age_s, valid=valid)
+
+    def _take(self, sample: ImuSample, measured_at_s: float) -> None:
+        rotation = sample.rotation
+        if rotation is None and sample.acceleration_m_s2 is not None:
+            step_s = measured_at_s - self._measured_at_s
+            first = not np.isfinite(step_s)
+            rotation = self._filter.update(
+                sample.rate_rad_s, sample.acceleration_m_s2, 0.0 if first else step_s
+            )
+        if rotation is None:  # its own filter does not run yet
+            return
+        self._measured_at_s = measured_at_s
+        self._state = ImuState(
+            rotation=_constant(rotation @ self._to_link.T),
+            rate_rad_s=_constant(self._to_link @ sample.rate_rad_s),
+            age_s=0.0,
+            valid=True,
+        )
+
+
+def _constant(array: Floats) -> Floats:
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,105 @@
+"""An IMU on the simulated line: its registers, filled from the motion of a link.
+
+Readings are those between two looks at the device: the mean rate, exactly the turn that the link
+has made, and the mean acceleration. To both a constant bias and noise are added; from them the
+device's own filter, where it has one, finds its attitude, so that heading drifts as the bias says.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from snakewalk.config.constants import GRAVITY_M_S2
+from snakewalk.config.robot import ImuConfig
+from snakewalk.drivers.attitude import AttitudeFilter
+from snakewalk.drivers.protocol.imu_table import IMU_TABLES, encode
+from snakewalk.drivers.protocol.registers import BAUDS
+from snakewalk.sim.plant import LinkMotion
+
+_TABLE_BYTES = 256
+_SHORTEST_S = 1e-4
+"""Looks that follow each other faster see the same reading (ours)."""
+_UP = np.array([0.0, 0.0, GRAVITY_M_S2])
+
+
+class Imu:
+    """The device of ``config`` on a line of ``baud``, in the link whose motion ``motion`` tells."""
+
+    def __init__(
+        self,
+        config: ImuConfig,
+        motion: Callable[[], LinkMotion],
+        baud: int = 1_000_000,
+        seed: int = 0,
+    ) -> None:
+        self.config, self.baud = config, baud
+        self._motion = motion
+        self._in_link = Rotation.from_euler("xyz", config.mounting_deg, degrees=True).as_matrix()
+        self._random = np.random.default_rng(seed)
+        self._bias_rad_s = np.deg2rad(config.gyro_bias_dps) * self._random.standard_normal(3)
+        self._filter = AttitudeFilter()
+        self._table = np.zeros(_TABLE_BYTES, np.uint8)
+        self._public = IMU_TABLES[config.model]
+        self._starts = {register.address for register in self._public.registers.values()}
+        self._last: LinkMotion | None = None
+        self._velocity_m_s = np.zeros(3)
+        self._start_s = motion().time_s
+        for name, value in self._identity().items():
+            self._set(name, value)
+
+    @property
+    def model_number(self) -> int:
+        """What a ping tells; 0 where the device's number is not published."""
+        return self._public.model_number or 0
+
+    def block(self, address: int, length: int) -> bytes | None:
+        """Bytes that a read returns now; None where no register begins at ``address``."""
+        if address not in self._starts or not 0 < length <= _TABLE_BYTES - address:
+            return None
+        self._look()
+        return self._table[address : address + length].tobytes()
+
+    def _look(self) -> None:
+        """Take a reading, unless the last one is of just now."""
+        now, last = self._motion(), self._last
+        step_s = 0.0 if last is None else now.time_s - last.time_s
+        if last is not None and step_s < _SHORTEST_S:
+            return
+        rotation = now.rotation @ self._in_link
+        rate, velocity = np.zeros(3), self._velocity_m_s
+        acceleration = np.zeros(3)
+        if last is not None:
+            before = last.rotation @ self._in_link
+            rate = Rotation.from_matrix(before.T @ rotation).as_rotvec() / step_s
+            velocity = (now.centre_m - last.centre_m) / step_s
+            acceleration = (velocity - self._velocity_m_s) / step_s
+        self._last, self._velocity_m_s = now, velocity
+        noise = self._random.standard_normal((2, 3))
+        rate = rate + self._bias_rad_s + np.deg2rad(self.config.gyro_noise_dps) * noise[0]
+        force = rotation.T @ (acceleration + _UP) + self.config.acceleration_noise_m_s2 * noise[1]
+        attitude = self._filter.update(rate, force, step_s)
+        shown = np.frombuffer(encode(self.config, rate, force, attitude), np.uint8)
+        self._table[self._public.address : self._public.address + len(shown)] = shown
+        since_s = now.time_s - self._start_s
+        for name, value in {
+            "Micros": int(since_s * 1e6),
+            "Millis": int(since_s * 1e3),
+            "IMU TIMESTAMP": int(since_s * 1e6),
+        }.items():
+            self._set(name, value & 0xFFFF_FFFF)
+
+    def _identity(self) -> dict[str, int]:
+        return {
+            "Model Number": self.model_number,
+            "Firmware_Version_Major": 1,
+            "ID": self.config.id,
+            "Baud Rate (Bus)": BAUDS.index(self.baud),
+        }
+
+    def _set(self, name: str, value: int) -> None:
+        """Put a value into a register, where the device has it."""
+        register = self._public.registers.get(name)
+        if register is not None:
+            data = np.frombuffer(register.encode(value), np.uint8)
+            self._table[register.address : register.address + register.size] = data
