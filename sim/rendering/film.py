@@ -1,4 +1,4 @@
-"""Recorded poses as a film: a chase camera, ground, waypoints, paths and the head's trail."""
+"""Recorded poses as a film: a chase camera, ground, waypoints, paths, trails and a scale."""
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
@@ -18,7 +18,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.looks import SkinLook, dressed_model, mark_reached
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import add_shade
-from snakewalk.sim.rendering.trail import make_trail
+from snakewalk.sim.rendering.trail import AXES_GEOMS, add_axes, make_trail
 
 if TYPE_CHECKING:
     import av
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 SMOOTHING_S = 1.2
 """The camera's smoothing, in seconds of film."""
 TURN_SMOOTHING_S = 4.0
+DISTANCE_LENGTHS = 1.2
+"""Of the camera from a body that keeps its place, in lengths of the body."""
 
 
 def render_film(
@@ -92,16 +94,19 @@ def render_film(
     )
     data = mujoco.MjData(model)
     spine = slice(1, 1 + (bodies if bodies > 1 else robot.link_count))
-    camera = _camera(model, data, shots, fps, robot.length_m, spine)
-    trail = make_trail(paths, times, poses, ground)
-    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + model.nbody + 11 + trail.most)
+    camera, centre = _camera(model, data, shots, fps, robot.length_m, spine)
+    shot_s = times[0] + np.arange(len(shots)) * speed_up / fps
+    centre_m = np.column_stack([np.interp(times, shot_s, column) for column in centre.T])
+    trail = make_trail(paths, times, poses, centre_m, ground)
+    room = model.ngeom + model.nbody + 11 + AXES_GEOMS + trail.most
+    scene = mujoco.MjvScene(model, maxgeom=room)
     scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
     scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
     view, option = mujoco.MjvCamera(), mujoco.MjvOption()
-    reached = 0
+    reached, scale_m = 0, _scale_m(robot.length_m)
     with Offscreen(model, *size) as screen, MovieFile(path, fps, size) as film:
         for k, shot in enumerate(shots):
-            now = float(times[0]) + k * speed_up / fps
+            now = float(shot_s[k])
             while reached < len(reached_s) and reached_s[reached] <= now:
                 mark_reached(model, reached)
                 reached += 1
@@ -118,6 +123,7 @@ def render_film(
                 scene, np.array(data.xipos[spine]), np.array(data.xmat[spine, ::3]), robot, ground
             )
             trail.add(scene, now)
+            add_axes(scene, _corner(camera[k]), scale_m, ground)
             film.add(screen.draw(scene, f"{title}  {now:6.1f} s   {speed_up:g}x".strip()))
             if on_frame is not None:
                 on_frame(k + 1, len(shots))
@@ -147,21 +153,44 @@ def _camera(
     fps: int,
     length_m: float,
     spine: slice,
-) -> Floats:
-    """Look-at point, azimuth in degrees, and distance of each frame (F, 5), smoothed both ways."""
-    centre, body = np.empty((len(shots), 3)), np.empty((len(shots), 2))
+) -> tuple[Floats, Floats]:
+    """Camera of each frame (F, 5), smoothed both ways, and the body's centre (F, 3).
+
+    A camera is its look-at point, azimuth in degrees and distance.
+    """
+    middle, centre, body = (
+        np.empty((len(shots), 3)),
+        np.empty((len(shots), 3)),
+        np.empty((len(shots), 2)),
+    )
     for k, shot in enumerate(shots):
         data.qpos[:] = shot
         mujoco.mj_kinematics(model, data)
         links = data.xipos[spine]
-        centre[k] = (links.min(axis=0) + links.max(axis=0)) / 2
+        middle[k] = (links.min(axis=0) + links.max(axis=0)) / 2
+        centre[k] = links.mean(axis=0)
         body[k] = links[0, :2] - links[-1, :2]
-    smooth = gaussian_filter1d(centre, SMOOTHING_S * fps, axis=0, mode="nearest")
+    smooth = gaussian_filter1d(middle, SMOOTHING_S * fps, axis=0, mode="nearest")
     heading = gaussian_filter1d(body, TURN_SMOOTHING_S * fps, axis=0, mode="nearest")
     azimuth = np.degrees(np.unwrap(np.arctan2(heading[:, 1], heading[:, 0]))) + 28.0
-    stray = np.abs(centre - smooth).max()
-    distance = np.full(len(shots), 1.55 * length_m + stray)
-    return np.column_stack([smooth, azimuth, distance])
+    stray = np.abs(middle - smooth).max()
+    distance = np.full(len(shots), DISTANCE_LENGTHS * length_m + stray)
+    return np.column_stack([smooth, azimuth, distance]), centre
+
+
+def _corner(camera: Floats) -> Floats:
+    """Where (2,) on the ground the scale lies: to the left of the look-at point, and nearer."""
+    turn = np.radians(camera[3])
+    ahead = np.array([np.cos(turn), np.sin(turn)])
+    left = np.array([-ahead[1], ahead[0]])
+    at_m: Floats = camera[:2] + camera[4] * (0.42 * left - 0.30 * ahead)
+    return at_m
+
+
+def _scale_m(length_m: float) -> float:
+    """A round length of about a fifth of the body's."""
+    power = 10.0 ** np.floor(np.log10(0.2 * length_m))
+    return float(power * max(each for each in (1.0, 2.0, 5.0) if each * power <= 0.2 * length_m))
 
 
 class MovieFile:

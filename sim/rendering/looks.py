@@ -221,15 +221,20 @@ def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
     z = ground.elevation_m(*np.meshgrid(x, y))
     level = (z - z.min()) / max(float(np.ptp(z)), 1e-9)
     colour = LOWLAND + (HIGHLAND - LOWLAND) * level[..., None]
-    steps = np.floor(level * CONTOURS)
-    line = (np.diff(steps, axis=0, append=steps[-1:]) != 0) | (
-        np.diff(steps, axis=1, append=steps[:, -1:]) != 0
-    )
-    colour[line] *= 0.72
+    colour *= 1.0 - 0.28 * _contours(level * CONTOURS)[..., None]
     texture = model.tex("ground")
     size = TEXELS * TEXELS * 3
     start = int(texture.adr[0])
     model.tex_data[start : start + size] = colour.astype(np.uint8).ravel()
+
+
+def _contours(level: Floats) -> Floats:
+    """How much of each texel (n, m) a line covers where ``level`` is whole; of even width."""
+    rise = np.hypot(*np.gradient(level))
+    flat = rise < 1e-6
+    texels = np.abs(level - np.round(level)) / np.where(flat, 1.0, rise)
+    covered: Floats = np.where(flat, 0.0, np.clip(1.5 - texels, 0.0, 1.0))
+    return covered
 
 
 def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:

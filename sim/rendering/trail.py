@@ -1,4 +1,4 @@
-"""Lines on the ground of a picture: where the head went, and the paths that it follows."""
+"""Lines on the ground of a picture: where head and body went, paths to follow, and a scale."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +16,12 @@ PATH: Final[Rgba] = (0.98, 0.98, 0.95, 1)
 FORMER: Final[Rgba] = (0.98, 0.98, 0.95, 0.35)
 """Of a path that another one replaced."""
 TRAIL: Final[Rgba] = (0.20, 0.33, 0.62, 1)
+"""Of the head."""
+CENTRE: Final[Rgba] = (0.85, 0.30, 0.10, 1)
+"""Of the body's centre."""
+AXES: Final[tuple[Rgba, Rgba]] = ((0.80, 0.12, 0.12, 1), (0.10, 0.50, 0.15, 1))
+"""The world's x and y."""
+AXES_GEOMS: Final = 5
 LIFT_M = 0.004
 SPACING_M = 0.12
 """Between dots of a path."""
@@ -26,6 +32,25 @@ MOST = 400
 
 
 @dataclass(frozen=True, slots=True)
+class TrailLine:
+    """Where a point of the body went."""
+
+    time_s: Floats
+    """(H,) when it was at each point of the line."""
+    points_m: Floats
+    """(H, 3), on the ground."""
+    rgba: Rgba
+
+    def add(self, scene: mujoco.MjvScene, now_s: float) -> None:
+        """Append the line's end up to a time."""
+        been = int(np.searchsorted(self.time_s, now_s, side="right"))
+        for k in range(max(1, been - MOST), been):
+            kind, piece = mujoco.mjtGeom.mjGEOM_LINE, _next(scene)
+            mujoco.mjv_initGeom(piece, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), self.rgba)
+            mujoco.mjv_connector(piece, kind, 3.0, self.points_m[k - 1], self.points_m[k])
+
+
+@dataclass(frozen=True, slots=True)
 class Trail:
     """What the lines of each frame are made of."""
 
@@ -33,20 +58,18 @@ class Trail:
     """(K,) from when on each path is in force, increasing."""
     dots_m: tuple[Floats, ...]
     """K times (D, 3), on the ground."""
-    head_s: Floats
-    """(H,) when the head was at each point of its trail."""
-    head_m: Floats
-    """(H, 3), on the ground."""
+    lines: tuple[TrailLine, ...]
+    """Of the head, and of the body's centre."""
 
     @property
     def most(self) -> int:
         """Most geoms that a frame takes."""
-        return max((len(dots) for dots in self.dots_m), default=0) * 2 + MOST
+        return max((len(dots) for dots in self.dots_m), default=0) * 2 + MOST * len(self.lines)
 
     def add(self, scene: mujoco.MjvScene, now_s: float) -> None:
         """Append dots and lines to a scene that was just updated and has room for them.
 
-        Drawn are the path in force, pale the one before it, and the head's trail.
+        Drawn are the path in force, pale the one before it, and the trails.
         """
         current = int(np.searchsorted(self.starts_s, now_s, side="right")) - 1
         for k, rgba in ((current - 1, FORMER), (current, PATH)):
@@ -55,40 +78,62 @@ class Trail:
                     _next(scene), mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.012), at_m,
                     np.eye(3).ravel(), rgba,
                 )  # fmt: skip
-        been = int(np.searchsorted(self.head_s, now_s, side="right"))
-        for k in range(max(1, been - MOST), been):
-            line = _next(scene)
-            mujoco.mjv_initGeom(
-                line, mujoco.mjtGeom.mjGEOM_LINE, np.zeros(3), np.zeros(3), np.eye(3).ravel(), TRAIL
-            )
-            mujoco.mjv_connector(
-                line, mujoco.mjtGeom.mjGEOM_LINE, 3.0, self.head_m[k - 1], self.head_m[k]
-            )
+        for line in self.lines:
+            line.add(scene, now_s)
 
 
 def make_trail(
     paths: Sequence[tuple[float, Floats]],
     time_s: Floats,
     head_m: Floats,
+    centre_m: Floats,
     ground: HeightField | None,
 ) -> Trail:
-    """Lay paths, each (P, 2) with the time from when on it is in force, and the head on the ground.
+    """Lay paths, each (P, 2) with the time from when on it is in force, and trails on the ground.
 
     Args:
         paths: in the order of their times; none on a run without a path.
         time_s: (T,) increasing.
         head_m: (T, 2 or more) the head's x and y at these times.
+        centre_m: (T, 2 or more) those of the body's centre.
         ground: None on a plane.
 
     """
-    arc = _arc_m(head_m)
-    rows = np.flatnonzero(np.diff(np.floor(arc / STEP_M), prepend=-1.0) > 0)
     return Trail(
         starts_s=np.array([start for start, _ in paths], dtype=float),
         dots_m=tuple(_on_ground(_dots(path), ground) for _, path in paths),
-        head_s=time_s[rows],
-        head_m=_on_ground(head_m[rows, :2], ground),
+        lines=(
+            _line(time_s, centre_m, ground, CENTRE),
+            _line(time_s, head_m, ground, TRAIL),
+        ),
     )
+
+
+def add_axes(
+    scene: mujoco.MjvScene, at_m: Floats, length_m: float, ground: HeightField | None
+) -> None:
+    """Append a rod along the world's x and one along its y, from (2,) on the ground."""
+    foot = _on_ground(at_m[None], ground)[0] + [0.0, 0.0, 0.02 * length_m]
+    rod, still = mujoco.mjtGeom.mjGEOM_CAPSULE, (np.zeros(3), np.zeros(3), np.eye(3).ravel())
+    _label(scene, foot - [0.3 * length_m, 0.3 * length_m, 0.0], f"{length_m:g} m")
+    for axis, (name, rgba) in enumerate(zip("xy", AXES, strict=True)):
+        along = np.eye(3)[axis] * length_m
+        geom = _next(scene)
+        mujoco.mjv_initGeom(geom, rod, *still, rgba)
+        mujoco.mjv_connector(geom, rod, 0.03 * length_m, foot, foot + along)
+        _label(scene, foot + 1.1 * along, name)
+
+
+def _label(scene: mujoco.MjvScene, at_m: Floats, text: str) -> None:
+    geom, white = _next(scene), (1.0, 1.0, 1.0, 1.0)
+    kind = mujoco.mjtGeom.mjGEOM_LABEL
+    mujoco.mjv_initGeom(geom, kind, np.zeros(3), at_m, np.eye(3).ravel(), white)
+    geom.label = text
+
+
+def _line(time_s: Floats, point_m: Floats, ground: HeightField | None, rgba: Rgba) -> TrailLine:
+    rows = np.flatnonzero(np.diff(np.floor(_arc_m(point_m) / STEP_M), prepend=-1.0) > 0)
+    return TrailLine(time_s[rows], _on_ground(point_m[rows, :2], ground), rgba)
 
 
 def _next(scene: mujoco.MjvScene) -> mujoco.MjvGeom:
