@@ -64,7 +64,9 @@ Look = Annotated[
 ]
 RunFolder = Annotated[
     Path | None,
-    typer.Option(file_okay=False, help="folder of this run; default: a new one in runs/"),
+    typer.Option(
+        "--out", "-o", file_okay=False, help="folder of this run; default: a new one in runs/"
+    ),
 ]
 Compliant = Annotated[
     bool | None,
