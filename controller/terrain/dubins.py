@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.drivers.compiling import compiled
 
 _TURNS = np.array(
     [(a, 0, b) for a in (1, -1) for b in (1, -1)] + [(a, -a, a) for a in (1, -1)] * 2, float
@@ -31,7 +32,8 @@ class DubinsCurves:
 
     start_m: complex
     """x + iy."""
-    heading_rad: float
+    headings_rad: Floats
+    """(n,) at the start."""
     radius_m: float
     pieces_m: Floats
     """(n, 8, 3) lengths of the pieces; infinite where there is no such curve."""
@@ -42,9 +44,9 @@ class DubinsCurves:
         return np.asarray(self.pieces_m.sum(axis=-1))
 
     def position(self, goal: int, kind: int, s_m: ArrayLike) -> Floats:
-        """(..., 2) points of one curve at arc lengths."""
-        s = np.asarray(s_m, float)
-        return self._positions(self.pieces_m[goal, kind], _TURNS[kind], s)
+        """(n, 2) points of one curve at arc lengths (n,)."""
+        s = np.atleast_2d(np.asarray(s_m, float))
+        return np.asarray(self._positions(np.array([goal * len(_TURNS) + kind]), s)[0])
 
     def samples(self, which: Ints, count: int) -> Floats:
         """(k, count, 2) points evenly along curves, both ends included.
@@ -54,36 +56,60 @@ class DubinsCurves:
             count: points a curve.
 
         """
-        pieces = self.pieces_m.reshape(-1, 3)[which]
-        s = pieces.sum(axis=-1)[:, None] * np.linspace(0.0, 1.0, count)
-        return self._positions(pieces[:, None, :], _TURNS[which % len(_TURNS)][:, None, :], s)
+        length_m = self.pieces_m.reshape(-1, 3)[which].sum(axis=-1)
+        return self._positions(which, length_m[:, None] * np.linspace(0.0, 1.0, count))
 
-    def _positions(self, pieces_m: Floats, turns: Floats, s_m: Floats) -> Floats:
-        at = np.full(s_m.shape, self.start_m, complex)
-        heading, begin = np.full(s_m.shape, self.heading_rad), np.zeros(s_m.shape)
-        for k in range(3):
-            length = np.clip(s_m - begin, 0.0, pieces_m[..., k])
-            turn = turns[..., k] * length / self.radius_m
-            # the chord of an arc: sin(turn / 2) over (turn / 2) of its length, half the turn on
-            at = at + length * np.sinc(turn / (2.0 * np.pi)) * np.exp(1j * (heading + turn / 2.0))
-            heading, begin = heading + turn, begin + pieces_m[..., k]
-        return np.stack([at.real, at.imag], axis=-1)
+    def _positions(self, which: Ints, s_m: Floats) -> Floats:
+        """(k, c, 2) points of curves (k,) at arc lengths (k, c)."""
+        goal, kind = np.divmod(which, len(_TURNS))
+        points = np.empty((*s_m.shape, 2))
+        start = np.empty((len(which), 3))
+        start[:, 0], start[:, 1] = self.start_m.real, self.start_m.imag
+        start[:, 2] = self.headings_rad[goal]
+        pieces = self.pieces_m.reshape(-1, 3)[which]
+        _draw(start, pieces, _TURNS[kind] / self.radius_m, s_m, points)
+        return points
+
+
+@compiled(
+    "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1])"
+)
+def _draw(start: Floats, pieces_m: Floats, bend_1_m: Floats, s_m: Floats, points: Floats) -> None:
+    """Write points (k, c, 2) at arc lengths (k, c) of curves from poses (k, 3).
+
+    The pieces (k, 3) have curvatures ``bend_1_m`` (k, 3).
+    """
+    for k in range(len(s_m)):
+        for i in range(s_m.shape[1]):
+            x, y, heading, left_m = start[k, 0], start[k, 1], start[k, 2], s_m[k, i]
+            for piece in range(3):
+                length = min(left_m, pieces_m[k, piece])
+                left_m -= length
+                half = 0.5 * bend_1_m[k, piece] * length
+                # the chord of an arc: sin(half) / half of its length, half the turn on
+                chord = length * np.sin(half) / half if half != 0.0 else length
+                x += chord * np.cos(heading + half)
+                y += chord * np.sin(heading + half)
+                heading += 2.0 * half
+            points[k, i, 0], points[k, i, 1] = x, y
 
 
 def dubins_curves(
     start_m: ArrayLike,
-    heading_rad: float,
+    heading_rad: ArrayLike,
     goals_m: ArrayLike,
     goal_headings_rad: ArrayLike,
     radius_m: float,
 ) -> DubinsCurves:
     """Return all curves from a pose to goals (n, 2) with headings (n,); the shortest is Dubins'.
 
+    The heading at the start is one for all goals, or one for each (n,).
     The tangent of two circles gives an arc, a line and an arc; a circle that touches both, of the
     same radius, gives three arcs.
     """
     z0, z1 = complex(*np.asarray(start_m, float)), np.asarray(goals_m, float) @ [1.0, 1.0j]
-    h0, h1 = heading_rad, np.asarray(goal_headings_rad, float)
+    h1 = np.asarray(goal_headings_rad, float)
+    h0 = np.broadcast_to(np.asarray(heading_rad, float), h1.shape)
     pieces = np.full((len(z1), len(_TURNS), 3), np.inf)
     for kind, (first, middle, last) in enumerate(_TURNS):
         c0 = z0 + 1j * first * radius_m * np.exp(1j * h0)
@@ -103,56 +129,92 @@ def dubins_curves(
             between = radius_m * _turn(middle * (meet - leave))
         arcs = radius_m * _turn(first * (leave - h0)), between, radius_m * _turn(last * (h1 - meet))
         pieces[there, kind] = np.stack(arcs, axis=-1)[there]
-    return DubinsCurves(z0, heading_rad, radius_m, pieces)
+    return DubinsCurves(z0, h0, radius_m, pieces)
 
 
-def turn_onto(
-    path: SplinePath,
-    heading_rad: float,
-    radius_m: float,
-    until_m: float,
-    cost_per_m: Callable[[Floats], Floats],
-    least_per_m: float,
-) -> SplinePath:
-    """Return a path that begins with ``heading_rad`` and turns onto ``path`` by ``until_m``.
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A Dubins curve from the start of a path onto it."""
 
-    Of all Dubins curves to places on the path up to there, the one is taken with which the way to
-    ``until_m`` costs least.
+    points_m: Floats
+    """(n, 2) a centimetre apart, from the start to where it joins the path."""
+    joins_at_m: float
+    """Arc length of the path there."""
+    cost: float
+    """Of the turn and what is left of the path."""
 
-    Args:
-        path: its start is where the curve begins.
-        heading_rad: direction of the body at the start.
-        radius_m: least that the body can turn with.
-        until_m: arc length on the path, for example of the first waypoint.
-        cost_per_m: of points (..., k, 2) along curves, (..., k).
-        least_per_m: what a metre costs at least: spares curves that are too long.
 
-    """
-    s_m = np.linspace(0.0, until_m, _JOINS)
-    at_m = path.position(s_m)
-    ahead = path.position(s_m + _STEP_M) - path.position(s_m - _STEP_M)
-    headings = np.arctan2(ahead[:, 1], ahead[:, 0])
-    curves = dubins_curves(at_m[0], heading_rad, at_m, headings, radius_m)
-    length_m, per_m = curves.length_m, cost_per_m(at_m)
-    spent = np.concatenate([[0.0], np.cumsum(np.diff(s_m) * (per_m[1:] + per_m[:-1]) / 2.0)])
-    rest = np.repeat(spent[-1] - spent, len(_TURNS))
-    bound = least_per_m * length_m.ravel() + rest
-    order = np.argsort(bound)
-    best, chosen = np.inf, int(order[0])
-    for some in np.split(order, range(_BATCH, len(order), _BATCH)):
-        if bound[some[0]] >= best:
-            break
-        exist = some[np.isfinite(bound[some])]
-        cost = cost_per_m(curves.samples(exist, _SAMPLES)).mean(axis=-1)
-        cost = cost * length_m.ravel()[exist] + rest[exist]
-        k = int(np.argmin(cost))
-        if cost[k] < best:
-            best, chosen = float(cost[k]), int(exist[k])
-    goal, kind = divmod(chosen, len(_TURNS))
-    turn_m = length_m[goal, kind]
-    turn = curves.position(goal, kind, np.linspace(0.0, turn_m, max(2, round(turn_m / _STEP_M))))
-    after = np.arange(s_m[goal] + _STEP_M, path.length_m + _STEP_M, _STEP_M)
-    return SplinePath.tabulated(np.vstack([turn, path.position(after)]))
+class PathTurns:
+    """All turns from the start of a path onto it, in each of several directions."""
+
+    def __init__(
+        self,
+        path: SplinePath,
+        headings_rad: ArrayLike,
+        radius_m: float,
+        until_m: float,
+        cost_per_m: Callable[[Floats], Floats],
+        least_per_m: float,
+        joins: int = _JOINS,
+    ) -> None:
+        """Lay all Dubins curves to ``joins`` places on the path, up to ``until_m``.
+
+        Args:
+            path: its start is where the curves begin.
+            headings_rad: (h,) directions of the body at the start.
+            radius_m: least that the body can turn with.
+            until_m: arc length on the path, for example of the first waypoint.
+            cost_per_m: of points (..., k, 2) along curves, (..., k).
+            least_per_m: what a metre costs at least: spares curves that are too long.
+            joins: places.
+
+        """
+        headings = np.atleast_1d(np.asarray(headings_rad, float))
+        self.path, self._cost_per_m = path, cost_per_m
+        self._s_m = s_m = np.linspace(0.0, until_m, joins)
+        at_m = path.position(s_m)
+        ahead = path.position(s_m + _STEP_M) - path.position(s_m - _STEP_M)
+        direction, times = np.arctan2(ahead[:, 1], ahead[:, 0]), len(headings)
+        self._curves = dubins_curves(
+            at_m[0],
+            np.repeat(headings, joins),
+            np.tile(at_m, (times, 1)),
+            np.tile(direction, times),
+            radius_m,
+        )
+        per_m = cost_per_m(at_m)
+        spent = np.concatenate([[0.0], np.cumsum(np.diff(s_m) * (per_m[1:] + per_m[:-1]) / 2.0)])
+        self._length_m = self._curves.length_m.ravel()
+        self._rest = np.tile(np.repeat(spent[-1] - spent, len(_TURNS)), times)
+        self._bound = least_per_m * self._length_m + self._rest
+        self.least = self._bound.reshape(times, -1).min(axis=1)
+        """(h,) less than the cheapest turn in each direction costs."""
+
+    def cheapest(self, direction: int = 0) -> Turn:
+        """Return the turn in one direction with which the way to ``until_m`` costs least."""
+        count = len(self._s_m) * len(_TURNS)
+        first = direction * count
+        order = first + np.argsort(self._bound[first : first + count])
+        best, chosen = np.inf, int(order[0])
+        for some in np.split(order, range(_BATCH, count, _BATCH)):
+            if self._bound[some[0]] >= best:
+                break
+            exist = some[np.isfinite(self._bound[some])]
+            cost = self._cost_per_m(self._curves.samples(exist, _SAMPLES)).mean(axis=-1)
+            cost = cost * self._length_m[exist] + self._rest[exist]
+            k = int(np.argmin(cost))
+            if cost[k] < best:
+                best, chosen = float(cost[k]), int(exist[k])
+        goal, kind = divmod(chosen, len(_TURNS))
+        turn_m = self._length_m[chosen]
+        at = np.linspace(0.0, turn_m, max(2, round(turn_m / _STEP_M)))
+        join_m = float(self._s_m[goal % len(self._s_m)])
+        return Turn(self._curves.position(goal, kind, at), join_m, best)
+
+    def onto(self, turn: Turn) -> SplinePath:
+        """Return the path that begins with a turn."""
+        after = np.arange(turn.joins_at_m + _STEP_M, self.path.length_m + _STEP_M, _STEP_M)
+        return SplinePath.tabulated(np.vstack([turn.points_m, self.path.position(after)]))
 
 
 def _turn(angle_rad: Floats) -> Floats:

@@ -10,13 +10,15 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.terrain.bends import widen
-from snakewalk.controller.terrain.dubins import turn_onto
+from snakewalk.controller.terrain.dubins import PathTurns
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.relief import Relief
 from snakewalk.controller.terrain.safe_graph import SafeGraph
+from snakewalk.controller.terrain.waypoint_turns import WaypointTurns
 
 _CHECK_STEP_M = 0.02  # how densely a spline is checked again
 _UNSAFE = 30.0  # metres of level path that a turn takes to stay off a metre of unsafe ground
+_ONWARD_STEP_M = 0.01
 _ROUNDS = 7  # halvings: a corner's pieces end at a hundredth of their length
 
 
@@ -30,6 +32,12 @@ class TerrainPlanner:
     def __init__(self, ground: HeightField | None, config: PlannerConfig) -> None:
         self.relief = None if ground is None else Relief(ground, config)
         self.graph = None if self.relief is None else SafeGraph(self.relief)
+        self._least_per_m = 1.0 if self.graph is None else self.graph.length_weight
+        self._waypoint_turns = WaypointTurns(
+            self._turn_cost_per_m, self._least_per_m, self._all_safe, config.bend_radius_m
+        )
+        self._planned: tuple[Floats, SplinePath] | None = None
+        """Points and path of the last plan that began in any direction."""
 
     def __call__(
         self,
@@ -55,20 +63,59 @@ class TerrainPlanner:
             InputError: a waypoint is off the world or on unsafe ground, or no safe way leads to it.
 
         """
-        points = np.asarray(points_m, float)
-        graph = self.graph and self.graph.avoiding(np.asarray(avoid_m, float))
-        if self.relief is None or graph is None:
-            path = SplinePath(points)
-        else:
-            faults = [f for k in range(1, len(points)) for f in _fault(self, k, points[k])]
-            if faults:
-                raise InputError(faults)
-            path = self._spline(self._polygon(points, graph), points, self.relief)
+        points, avoid = np.asarray(points_m, float), np.asarray(avoid_m, float).reshape(-1, 2)
         if heading_rad is None:
+            path = self._waypoint_turns(self._base(points, avoid), points[1:], any_start=True)
+            self._planned = points, path
             return path
+        path = self._again(points, avoid)
         until_m = path.first_pass(points[1])
-        least = 1.0 if self.graph is None else self.graph.length_weight
-        return turn_onto(path, heading_rad, turn_radius_m, until_m, self._turn_cost_per_m, least)
+        turns = PathTurns(
+            *(path, heading_rad, turn_radius_m, until_m, self._turn_cost_per_m, self._least_per_m)
+        )
+        return turns.onto(turns.cheapest())
+
+    def _base(self, points: Floats, avoid: Floats) -> SplinePath:
+        """Path through points that knows nothing of the body's direction."""
+        graph = self.graph and self.graph.avoiding(avoid)
+        if self.relief is None or graph is None:
+            return SplinePath(points)
+        faults = [f for k in range(1, len(points)) for f in _fault(self, k, points[k])]
+        if faults:
+            raise InputError(faults)
+        return self._spline(self._polygon(points, graph), points, self.relief)
+
+    def _again(self, points: Floats, avoid: Floats) -> SplinePath:
+        """Path from elsewhere: a new leg to the next waypoint, then the path that was planned.
+
+        A body that moves has no time for more: turns by waypoints take some 30 ms each.
+        """
+        onward = self._onward(points, avoid)
+        if onward is None:
+            return self._waypoint_turns(self._base(points, avoid), points[1:], any_start=False)
+        path = self._waypoint_turns.arrive(self._base(points[:2], avoid), onward)
+        return self._base(points, avoid) if path is None else path
+
+    def _onward(self, points: Floats, avoid: Floats) -> Floats | None:
+        """(n, 2) points, a centimetre apart, of the planned path from the second point on.
+
+        None where it was planned for other waypoints, ends there, or passes a place to be avoided.
+        """
+        if self._planned is None or len(points) < 3:
+            return None
+        planned, path = self._planned
+        at_m = 0.0
+        for point in planned[1 : len(planned) - len(points) + 2]:
+            at_m = path.first_pass(point, at_m)
+        if not np.array_equal(planned[1 - len(points) :], points[1:]):
+            return None
+        count = max(2, round((path.length_m - at_m) / _ONWARD_STEP_M) + 1)
+        onward = path.position(np.linspace(at_m, path.length_m, count))
+        if self.relief is not None and len(avoid):
+            gap = np.hypot(*(onward[:, None] - avoid[None]).T)
+            if gap.min() < self.relief.config.footprint_m:
+                return None
+        return onward
 
     def plan(self, points_m: ArrayLike) -> SplinePath:
         """Plan a path as a call does, but refuse a start that is off the world or on unsafe ground.
@@ -89,6 +136,9 @@ class TerrainPlanner:
             return np.ones(points_m.shape[:-1])
         unsafe = ~self.relief.safe(*np.moveaxis(points_m, -1, 0))
         return self.graph.cost_per_m(points_m) + _UNSAFE * self.graph.length_weight * unsafe
+
+    def _all_safe(self, points_m: Floats) -> bool:
+        return self.relief is None or bool(self.relief.safe(*points_m.T).all())
 
     def _polygon(self, points: Floats, graph: SafeGraph) -> Floats:
         """(k, 2) corners through all points, leg by leg."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.world import PlannerConfig
-from snakewalk.controller.terrain.dubins import dubins_curves, turn_onto
+from snakewalk.controller.terrain.dubins import PathTurns, dubins_curves
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from tests.controller.terrain.test_planner import field, hill
@@ -120,11 +120,16 @@ def test_a_path_begins_with_the_body_and_passes_its_waypoints(ground, heading: f
     assert (np.hypot(*np.diff(at, axis=0).T) < 0.0051).all()  # no jump where they join
 
 
+def turned_onto(path: SplinePath, heading: float, radius_m: float, until_m: float) -> SplinePath:
+    turns = PathTurns(path, heading, radius_m, until_m, level_cost, 1.0)
+    return turns.onto(turns.cheapest())
+
+
 def test_a_turn_joins_as_soon_as_it_pays() -> None:
     path = SplinePath([(0.0, 0.0), (8.0, 0.0)])
-    ahead = turn_onto(path, 0.0, 0.5, 8.0, level_cost, 1.0)
+    ahead = turned_onto(path, 0.0, 0.5, 8.0)
     assert ahead.length_m == pytest.approx(8.0)
-    aside = turn_onto(path, PI / 2, 0.5, 8.0, level_cost, 1.0)
+    aside = turned_onto(path, PI / 2, 0.5, 8.0)
     exact = dubins_curves((0.0, 0.0), PI / 2, [(8.0, 0.0)], [0.0], 0.5).length_m.min()
     assert aside.length_m == pytest.approx(exact, abs=2e-3)
 
@@ -133,7 +138,7 @@ def test_a_turn_stays_on_safe_ground_where_one_does() -> None:
     """The body stands beside a hill; the shortest turn back leads over the foot of it."""
     planner = TerrainPlanner(field(hill), PlannerConfig(edge_margin_m=0.1))
     points, heading = np.array([(-0.9, 0.4), (-1.5, -1.2)]), np.radians(30.0)
-    level = turn_onto(planner(points), heading, 0.35, 9.0, level_cost, 1.0)
+    level = turned_onto(planner(points), heading, 0.35, 9.0)
     aware = planner(points, heading, 0.35)
     unsafe = [
         float((~planner.relief.safe(*path.position(np.arange(0.0, path.length_m, 0.01)).T)).mean())

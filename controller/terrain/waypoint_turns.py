@@ -1,0 +1,157 @@
+"""Turns by waypoints: where a path bends there more sharply than a body can, it swings out.
+
+A path through waypoints may turn back at one of them, or come to it past unsafe ground: its spline
+then has a bend of a few centimetres, and the body that cannot follow it passes the waypoint by.
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.terrain.bends import sharpest_bend
+from snakewalk.controller.terrain.dubins import PathTurns, Turn
+from snakewalk.controller.terrain.path import SplinePath
+
+_SHARP = 0.45
+"""Of the wanted radius (ours): bends above it are followed, at 0.2 m a corner of 90 degrees."""
+_RADII = 1.5, 1.0, 0.75, 0.5
+"""Of the wanted radius, tried in turn until a turn stays on safe ground. The centre of a body of
+1.2 m in an arc of 0.4 m lies 0.13 m inside of it, of 0.6 m 0.09 m."""
+_DIRECTIONS = 16
+_STEP_M = 0.01
+_NEAR_M = 0.5
+"""Way before and after a waypoint in which a bend counts as being there."""
+_JOIN_M = 0.1
+_JOINS = 16, 64
+
+
+class WaypointTurns:
+    """Puts Dubins curves in place of sharp bends by the waypoints of a path."""
+
+    def __init__(
+        self,
+        cost_per_m: Callable[[Floats], Floats],
+        least_per_m: float,
+        safe: Callable[[Floats], bool],
+        radius_m: float,
+    ) -> None:
+        """Remember what ground costs.
+
+        Args:
+            cost_per_m: of points (..., k, 2) along curves, (..., k).
+            least_per_m: what a metre costs at least.
+            safe: whether all points (n, 2) are on safe ground.
+            radius_m: wanted of every turn.
+
+        """
+        self._cost_per_m, self._least = cost_per_m, least_per_m
+        self._safe, self._radius_m = safe, radius_m
+
+    def __call__(self, path: SplinePath, waypoints_m: ArrayLike, *, any_start: bool) -> SplinePath:
+        """Return the path with a turn where it bends sharply by its start or a waypoint.
+
+        The body comes to the waypoint, and leaves it, in the direction with which both legs
+        together cost least. Where every turn leads over unsafe ground the bend stays.
+
+        Args:
+            path: through the waypoints.
+            waypoints_m: (n, 2) in order; the last is the path's end.
+            any_start: whether the path may begin in another direction.
+
+        """
+        legs, turned = _legs(path, np.asarray(waypoints_m, float)), False
+        for k in range(0 if any_start else 1, len(legs) + 1):
+            around = slice(max(k - 1, 0), min(k + 1, len(legs)))
+            if _bend_m(legs, k) < _SHARP * self._radius_m:
+                found = self._turned(legs[around], begins=k == 0)
+                legs[around], turned = found or legs[around], turned or found is not None
+        if not turned:
+            return path
+        return SplinePath.tabulated(np.vstack([legs[0], *(leg[1:] for leg in legs[1:])]))
+
+    def arrive(self, leg: SplinePath, onward_m: Floats) -> SplinePath | None:
+        """Return the path of a leg to a waypoint and points (n, 2) from there on, joined by a turn.
+
+        None where every turn leads over unsafe ground.
+        """
+        back = _points(leg, 0.0, leg.length_m)[::-1]
+        first, second = onward_m[0], onward_m[1]
+        heading = np.arctan2(*(first - second)[::-1])
+        for share in _RADII:
+            turns = self._turns(back, np.array([heading]), share, back=True)
+            turn = turns.cheapest()
+            if self._safe(turn.points_m):
+                onto = turns.onto(turn)
+                points = _points(onto, 0.0, onto.length_m)[::-1]
+                return SplinePath.tabulated(np.vstack([points, onward_m[1:]]))
+        return None
+
+    def _turned(self, legs: Sequence[Floats], *, begins: bool) -> list[Floats] | None:
+        """Legs (n, 2) to and from a waypoint with a turn there; None where none is safe."""
+        headings = np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS
+        for share in _RADII:
+            sides = []
+            if not begins:
+                sides.append(self._turns(legs[0][::-1], headings + np.pi, share, back=True))
+            if begins or len(legs) > 1:
+                sides.append(self._turns(legs[-1], headings, share, back=False))
+            turns = self._cheapest(sides)
+            if turns:
+                found = [side.onto(turn) for side, turn in zip(sides, turns, strict=True)]
+                points = [_points(leg, 0.0, leg.length_m) for leg in found]
+                return [points[0] if begins else points[0][::-1], *points[1:]]
+        return None
+
+    def _turns(self, leg: Floats, headings: Floats, share: float, *, back: bool) -> PathTurns:
+        """Turns from the waypoint onto a leg (n, 2); of one to it both are told backwards."""
+        path = SplinePath.tabulated(np.ascontiguousarray(leg))
+        joins = int(np.clip(path.length_m / _JOIN_M, *_JOINS))
+        cost = self._cost_backwards if back else self._cost_per_m
+        radius_m = share * self._radius_m
+        return PathTurns(path, headings, radius_m, path.length_m, cost, self._least, joins)
+
+    def _cost_backwards(self, points_m: Floats) -> Floats:
+        return self._cost_per_m(points_m[..., ::-1, :])[..., ::-1]
+
+    def _cheapest(self, sides: list[PathTurns]) -> list[Turn]:
+        """Return the safe turns, one on each side, in the direction that costs least; or none."""
+        least = np.sum([side.least for side in sides], axis=0)
+        best, chosen = np.inf, list[Turn]()
+        for direction in np.argsort(least).tolist():
+            if least[direction] >= best:
+                break
+            cost, turns = float(least[direction]), list[Turn]()
+            for side in sides:
+                turn = side.cheapest(direction)
+                cost += turn.cost - side.least[direction]
+                if cost >= best or not self._safe(turn.points_m):
+                    break
+                turns.append(turn)
+            else:
+                best, chosen = cost, turns
+        return chosen
+
+
+def _legs(path: SplinePath, waypoints_m: Floats) -> list[Floats]:
+    """Points (n, 2) of a path from waypoint to waypoint."""
+    marks = [0.0]
+    for point in waypoints_m:
+        marks.append(path.first_pass(point, marks[-1]))
+    marks[-1] = path.length_m
+    return [_points(path, begin, end) for begin, end in pairwise(marks)]
+
+
+def _points(path: SplinePath, begin_m: float, end_m: float) -> Floats:
+    count = max(2, round((end_m - begin_m) / _STEP_M) + 1)
+    return path.position(np.linspace(begin_m, end_m, count))
+
+
+def _bend_m(legs: Sequence[Floats], k: int) -> float:
+    """Least radius of curvature of a path near the end of its k-th leg."""
+    near = round(_NEAR_M / _STEP_M)
+    before = [leg[-near:] for leg in legs[max(k - 1, 0) : k]]
+    after = [leg[1:near] for leg in legs[k : k + 1]]
+    return sharpest_bend(SplinePath.tabulated(np.vstack(before + after)))[0]
