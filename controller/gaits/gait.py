@@ -30,6 +30,8 @@ class Needs:
     pitch: bool = False
     legs: bool = False
     """Whether two pairs of legs take part."""
+    leg_axes: str = ""
+    """Axes of each of these legs from the hip; empty: whatever they are."""
     wheels: bool = False
     """Whether it advances only on a belly that slides along easily and across badly."""
 
@@ -54,13 +56,19 @@ class Needs:
                 f"{what} needs two pairs of legs; robot {robot.name} has {len(robot.limbs)} "
                 "(tables [[limbs]])"
             )
+        for pair in robot.limbs if self.leg_axes else ():
+            if pair.joint_axes != self.leg_axes:
+                raise InputError(
+                    f"{what} needs legs of joint_axes {self.leg_axes}; those of robot {robot.name} "
+                    f"at link {pair.link} are {pair.joint_axes}"
+                )
 
 
 def fitting_robot(needs: Iterable[Needs]) -> str:
     """Name of the shipped robot that has the joints which all of some motions need."""
     wanted = list(needs)
     if any(each.legs for each in wanted):
-        return "salamander"
+        return "quadruped" if any(each.leg_axes for each in wanted) else "salamander"
     return "alternating16" if any(each.pitch for each in wanted) else "yaw16"
 
 

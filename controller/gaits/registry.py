@@ -5,6 +5,7 @@ from typing import Any
 from snakewalk.config.errors import InputError
 from snakewalk.controller.gaits.compound_serpenoid import CompoundSerpenoid
 from snakewalk.controller.gaits.concertina import Concertina
+from snakewalk.controller.gaits.erect import ErectTrot, ErectWalk
 from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.gaits.helix import HelixPipe, HelixPole
 from snakewalk.controller.gaits.lateral_undulation import LateralUndulation
@@ -40,6 +41,8 @@ GAITS: dict[str, type[Gait]] = {
         Dolphin,
         Trot,
         LateralWalk,
+        ErectWalk,
+        ErectTrot,
     )
 }
 

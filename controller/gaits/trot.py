@@ -9,7 +9,7 @@ take their height from one ``T_y``; here each foot has a phase of its own in hei
 """
 
 from abc import ABC
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -23,6 +23,17 @@ if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
 
 
+Turn = Annotated[
+    float,
+    Field(
+        ge=-1.6,
+        le=1.6,
+        description="share of their stride that the inner legs leave out; positive turns left, "
+        "beyond 1 they step backwards",
+    ),
+]
+
+
 class LegParameters(GaitParameters):
     """Strides, stance and bends."""
 
@@ -31,13 +42,7 @@ class LegParameters(GaitParameters):
     stance_rad: float = Field(0.6, ge=0.0, le=1.2, description="roll of a leg down to the ground")
     lift_rad: float = Field(0.35, ge=0.0, le=1.2, description="how far a leg rises in the air")
     bend_rad: float = Field(0.5, ge=0.0, le=1.5, description="front girdle against hind girdle")
-    turn: float = Field(
-        0.0,
-        ge=-1.6,
-        le=1.6,
-        description="share of their stride that the inner legs leave out; positive turns left, "
-        "beyond 1 they step backwards",
-    )
+    turn: Turn = 0.0
 
 
 class LegGait(Gait, ABC):
@@ -49,7 +54,7 @@ class LegGait(Gait, ABC):
     """In cycles, when a foot comes down: hind left, hind right, front left, front right."""
     needs = Needs(yaw=True, legs=True)
     steered_by = "turn"
-    model = LegParameters
+    model: ClassVar[type[GaitParameters]] = LegParameters
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         joints = np.zeros((len(phase_rad), robot.joint_count))

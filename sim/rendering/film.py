@@ -94,7 +94,8 @@ def render_film(
     )
     data = mujoco.MjData(model)
     spine = slice(1, 1 + (bodies if bodies > 1 else robot.link_count))
-    camera, centre = _camera(model, data, shots, fps, robot.length_m, spine)
+    legs_m = max((sum(pair.segments_m) for pair in robot.limbs), default=0.0)
+    camera, centre = _camera(model, data, shots, fps, robot.length_m + legs_m, spine)
     shot_s = times[0] + np.arange(len(shots)) * speed_up / fps
     centre_m = np.column_stack([np.interp(times, shot_s, column) for column in centre.T])
     trail = make_trail(paths, times, poses, centre_m, ground)
@@ -151,12 +152,13 @@ def _camera(
     data: mujoco.MjData,
     shots: Floats,
     fps: int,
-    length_m: float,
+    size_m: float,
     spine: slice,
 ) -> tuple[Floats, Floats]:
     """Camera of each frame (F, 5), smoothed both ways, and the body's centre (F, 3).
 
-    A camera is its look-at point, azimuth in degrees and distance.
+    A camera is its look-at point, azimuth in degrees and distance. ``size_m`` is what it has to
+    show: the spine and, beside it, a leg.
     """
     middle, centre, body = (
         np.empty((len(shots), 3)),
@@ -174,7 +176,7 @@ def _camera(
     heading = gaussian_filter1d(body, TURN_SMOOTHING_S * fps, axis=0, mode="nearest")
     azimuth = np.degrees(np.unwrap(np.arctan2(heading[:, 1], heading[:, 0]))) + 28.0
     stray = np.abs(middle - smooth).max()
-    distance = np.full(len(shots), DISTANCE_LENGTHS * length_m + stray)
+    distance = np.full(len(shots), DISTANCE_LENGTHS * size_m + stray)
     return np.column_stack([smooth, azimuth, distance]), centre
 
 

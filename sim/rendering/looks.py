@@ -273,13 +273,19 @@ def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
 
 
 def _legs(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
-    """A capsule a segment, and the feet, which are not drawn as bellies are not."""
+    """A capsule a segment, a ball over the seam of two of them, and the feet.
+
+    The geoms that touch the ground are not drawn, as bellies are not.
+    """
     for k, joint in enumerate(robot.limb_joints):
         pair = robot.limbs[joint.pair]
         body = spec.body(f"link{robot.link_count + k}")
         end = pair.segments_m[joint.place] * (1.0 if joint.side == "left" else -1.0)
         thick = pair.foot_radius_m
-        _add(body, _CAPSULE, (thick, 0, 0), (), BACK[k % 2], (0, 0, 0, 0, end, 0))
+        colour = BACK[joint.place % 2]
+        _add(body, _CAPSULE, (thick, 0, 0), (), colour, (0, 0, 0, 0, end, 0))
+        if joint.place:  # the round ends of both segments lie in each other
+            _add(body, _SPHERE, (1.04 * thick, 0, 0), (0, 0, 0), colour)
         if joint.has_foot:
             _add(body, _SPHERE, (1.02 * thick, 0, 0), (0, end, 0), HEAD)
 

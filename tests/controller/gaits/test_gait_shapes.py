@@ -12,7 +12,8 @@ from snakewalk.controller.gaits.gait import Gait, ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 
 ROBOTS = {
-    name: load_robot(name) for name in ("yaw16", "alternating16", "alternating32", "salamander")
+    name: load_robot(name)
+    for name in ("yaw16", "alternating16", "alternating32", "salamander", "quadruped")
 }
 PHASES = np.linspace(0.0, 2.0 * np.pi, 50)
 
@@ -22,6 +23,7 @@ def suits(gait: type[Gait], robot: RobotConfig) -> bool:
         (gait.needs.pitch and not robot.pitch_joints)
         or (gait.needs.yaw and not robot.yaw_joints)
         or gait.needs.legs != bool(robot.limbs)
+        or (gait.needs.leg_axes and gait.needs.leg_axes != robot.limbs[0].joint_axes)
     )
 
 

@@ -6,8 +6,9 @@ import pytest
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
+from snakewalk.config.loader import load_robot
 from snakewalk.sim.rendering.film import _scale_m
-from snakewalk.sim.rendering.looks import _contours
+from snakewalk.sim.rendering.looks import _contours, _legs
 from snakewalk.sim.rendering.trail import (
     AXES,
     AXES_GEOMS,
@@ -102,3 +103,20 @@ def test_contour_lines_are_of_one_width_however_steep_the_ground_is() -> None:
     widths = [covered[int(at) - 5 : int(at) + 5].sum() for at in (500, 850, 1199, 1599)]
     assert widths == pytest.approx([2.1] * 4, abs=0.25)
     assert _contours(np.full((4, 4), 3.0)) == pytest.approx(0.0)
+
+
+def test_a_leg_has_one_colour_at_each_joint_and_those_of_the_other_side() -> None:
+    robot, spec = load_robot("quadruped"), mujoco.MjSpec()
+    for k in range(robot.link_count + len(robot.limb_joints)):
+        spec.worldbody.add_body(name=f"link{k}")
+    _legs(spec, robot)
+    colours: dict[tuple[int, str], list[tuple[float, ...]]] = {}
+    for k, joint in enumerate(robot.limb_joints):
+        geoms = spec.body(f"link{robot.link_count + k}").geoms
+        colours.setdefault((joint.pair, joint.side), []).append(tuple(geoms[0].rgba))
+        balls = [g for g in geoms[1:] if not np.any(g.pos)]
+        assert len(balls) == (joint.place > 0)
+        for ball in balls:  # two capsules of one radius end here: neither may be seen
+            assert ball.size[0] > geoms[0].size[0]
+            np.testing.assert_array_equal(ball.rgba, geoms[0].rgba)
+    assert colours[0, "left"] == colours[0, "right"] == colours[1, "left"]
