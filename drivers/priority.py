@@ -1,30 +1,58 @@
 """Priority of this process: how soon the operating system lets it run on a busy machine."""
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 RAISE = 10
-"""Steps of niceness; each is about a quarter more of a busy processor (Linux, ``sched(7)``)."""
+"""Steps of niceness where there is no real-time scheduling; each is about a quarter more of a busy
+processor (Linux, ``sched(7)``), but only among the programs of one terminal where the system
+groups them (autogroup)."""
+LOWER = 10
+"""The same for what may wait."""
 
 
 @contextmanager
 def raised_priority() -> Iterator[None]:
     """Put the calling thread, and what it starts, before others for as long as the context lasts.
 
-    Who keeps servos waiting at the wrong time drops or stops them. Only a superuser may do it, on
-    a system that has it: for others nothing changes.
+    Who keeps servos waiting at the wrong time drops or stops them. On Linux it is a real-time
+    priority (``SCHED_RR``, the least), on other systems niceness. Only a superuser, or who is
+    granted ``rtprio`` (``limits.conf(5)``), may have it: for others nothing changes. The system
+    leaves a twentieth of the time to all others.
     """
-    if not hasattr(os, "setpriority"):
-        yield
-        return
-    before = os.getpriority(os.PRIO_PROCESS, 0)
-    try:
-        os.setpriority(os.PRIO_PROCESS, 0, before - RAISE)
-    except OSError:
-        yield
-        return
+    restore = _real_time() or _nicer()
     try:
         yield
     finally:
-        os.setpriority(os.PRIO_PROCESS, 0, before)
+        if restore is not None:
+            restore()
+
+
+def give_way() -> None:
+    """Let all others run before this process, whatever priority its parent has."""
+    if hasattr(os, "sched_setscheduler"):
+        with suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    if hasattr(os, "nice"):
+        os.nice(LOWER)
+
+
+def _real_time() -> Callable[[], None] | None:
+    """Take the least real-time priority; how to give it back, None where it is not to be had."""
+    try:
+        before = os.sched_getscheduler(0), os.sched_getparam(0)
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+    except (AttributeError, OSError):
+        return None
+    return lambda: os.sched_setscheduler(0, *before)
+
+
+def _nicer() -> Callable[[], None] | None:
+    """Likewise with niceness."""
+    try:
+        before = os.getpriority(os.PRIO_PROCESS, 0)
+        os.setpriority(os.PRIO_PROCESS, 0, before - RAISE)
+    except (AttributeError, OSError):
+        return None
+    return lambda: os.setpriority(os.PRIO_PROCESS, 0, before)

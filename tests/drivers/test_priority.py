@@ -1,52 +1,96 @@
 """Priority is raised only for as long as it is needed, and only by whom the system lets."""
 
 import os
+import subprocess
+import sys
 
 import pytest
 
-from snakewalk.drivers.priority import RAISE, raised_priority
+from snakewalk.drivers.priority import RAISE, give_way, raised_priority
 
-
-def niceness() -> int:
-    return os.getpriority(os.PRIO_PROCESS, 0)
+REAL_TIME = hasattr(os, "sched_setscheduler")
 
 
 @pytest.fixture
-def kept(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     """What the system was asked for; this process stays as it is."""
-    asked: list[int] = []
-    monkeypatch.setattr(os, "setpriority", lambda which, who, value: asked.append(value))
-    return asked
+    words: list[object] = []
+    if REAL_TIME:
+        monkeypatch.setattr(
+            os, "sched_setscheduler", lambda pid, policy, _: words.append(("policy", policy))
+        )
+    monkeypatch.setattr(os, "setpriority", lambda which, who, value: words.append(value))
+    monkeypatch.setattr(os, "nice", lambda steps: words.append(("nice", steps)))
+    return words
 
 
-def test_it_is_raised_and_given_back_whatever_happens(kept: list[int]) -> None:
-    before = niceness()
+def refuse(*given: object) -> None:
+    raise PermissionError
+
+
+@pytest.mark.skipif(not REAL_TIME, reason="no real-time scheduling here")
+def test_it_is_raised_and_given_back_whatever_happens(asked: list[object]) -> None:
     with pytest.raises(RuntimeError, match="within"), raised_priority():
         raise RuntimeError("within")
-    assert kept == [before - RAISE, before]
+    assert asked == [("policy", os.SCHED_RR), ("policy", os.SCHED_OTHER)]
 
 
-def test_who_may_not_goes_on_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(which: int, who: int, value: int) -> None:
-        raise PermissionError
+def test_without_real_time_it_is_niceness(
+    asked: list[object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(os, "sched_getscheduler", raising=False)
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    with raised_priority():
+        assert asked == [before - RAISE]
+    assert asked == [before - RAISE, before]
 
-    before, done = niceness(), False
-    monkeypatch.setattr(os, "setpriority", refuse)
+
+def test_who_may_neither_goes_on_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("sched_setscheduler", "setpriority"):
+        monkeypatch.setattr(os, name, refuse, raising=False)
+    done = False
     with raised_priority():
         done = True
     assert done
-    assert niceness() == before
 
 
-def test_a_system_without_it_goes_on_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(os, "setpriority")
+def test_a_system_without_either_goes_on_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("sched_getscheduler", "setpriority", "getpriority"):
+        monkeypatch.delattr(os, name, raising=False)
     with raised_priority():
         assert not hasattr(os, "setpriority")
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only a superuser may raise its priority")
+def test_who_gives_way_keeps_nothing_of_its_parents_priority(asked: list[object]) -> None:
+    give_way()
+    assert ("nice", RAISE) in asked
+    if REAL_TIME:
+        assert asked[0] == ("policy", os.SCHED_OTHER)
+
+
+@pytest.mark.skipif(
+    not REAL_TIME or os.geteuid() != 0, reason="only a superuser may raise its priority"
+)
 def test_the_system_does_it() -> None:
-    before = niceness()
-    with raised_priority():
-        assert niceness() == max(before - RAISE, -20)
-    assert niceness() == before
+    told = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import os\n"
+            "from snakewalk.drivers.priority import give_way, raised_priority\n"
+            "with raised_priority():\n"
+            "    print(os.sched_getscheduler(0), flush=True)\n"
+            "    if os.fork() == 0:\n"
+            "        give_way()\n"
+            "        print(os.sched_getscheduler(0), flush=True)\n"
+            "        os._exit(0)\n"
+            "    os.wait()\n"
+            "print(os.sched_getscheduler(0))\n",
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    first, child, last = map(int, told.stdout.split())
+    assert first in (os.SCHED_RR, os.SCHED_OTHER)  # a container may keep it from a superuser, too
+    assert (child, last) == (os.SCHED_OTHER, os.SCHED_OTHER)

@@ -4,7 +4,6 @@ Drawing takes longer than a servo may take to reply. A thread would not help: wh
 holds the interpreter for 5 ms at a time, at each byte that the serving thread waits for.
 """
 
-import os
 import signal
 import sys
 from collections import deque
@@ -21,6 +20,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from snakewalk.drivers.priority import give_way
 from snakewalk.sim.ax12.decode import Decoder1
 from snakewalk.sim.serve.live_table import Packet, Rows
 from snakewalk.sim.sniff.decode import DecodedPacket, Decoder
@@ -30,8 +30,6 @@ _SHOWN: Final = 8
 """Packets in words below the table."""
 _END_S: Final = 2.0
 """How long the drawing process may take to end."""
-_NICE: Final = 20
-"""Added to the niceness of the server, whose priority may be raised: the servos come first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +89,7 @@ class LiveScreen:
 
 def _draw(line: Connection, make_decoder: MakeDecoder) -> None:
     """Draw what comes until the server is gone."""
-    os.nice(_NICE)
+    give_way()
     decoder, recent = make_decoder(), deque[DecodedPacket](maxlen=_SHOWN)
     screen = Console(file=sys.stderr)
     with Live(console=screen, auto_refresh=False) as live, suppress(EOFError, OSError):

@@ -19,6 +19,7 @@ from snakewalk.controller.app.view.scene import BodyScene
 from snakewalk.controller.runlog.record import Header, RunRecord
 from snakewalk.controller.runlog.tables import record_of
 from snakewalk.drivers.clock import WallClock
+from snakewalk.drivers.priority import give_way
 from snakewalk.drivers.safety.stop_button import PressedButton
 
 _PERIOD_S: Final = 0.05
@@ -27,8 +28,6 @@ _SERVOS_S: Final = 0.2
 _CURVES_S: Final = 0.5
 _SILENT_S: Final = 2.0
 """A run that says nothing for so long is told."""
-_NICE: Final = 10
-"""Niceness of this process: the run comes first."""
 _ROWS: Final = round(SPAN_S / _PERIOD_S)
 
 
@@ -36,7 +35,7 @@ def serve(line: socket.socket, host: str, port: int) -> None:
     """Serve a page until the run closes the line."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115  viser prints
-    os.nice(_NICE)
+    give_way()
     try:
         server, url = open_page(host, port)
     except OSError as fault:
