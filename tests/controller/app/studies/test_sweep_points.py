@@ -11,14 +11,14 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, locate
 from snakewalk.controller.app.studies.sweep_measure import measure
 from snakewalk.controller.app.studies.sweep_points import SLOWEST_HZ, Space, plan_sweep, points_of
-from snakewalk.controller.gaits.gait import ranges
+from snakewalk.controller.gaits.gait import fitting_robot, ranges
 from snakewalk.controller.gaits.registry import GAITS
 
 
 @pytest.mark.parametrize("name", list(GAITS))
 def test_points_are_in_range_and_within_the_joints(name: str) -> None:
     gait = GAITS[name]
-    robot = load_robot("salamander" if gait.needs.legs else "alternating16")
+    robot = load_robot(fitting_robot([gait.needs]) if gait.needs.legs else "alternating16")
     points, _ = points_of(gait, robot, 30, seed=3, seconds=10.0)
     assert len(points) == 30
     assert points[0].parameters == {}
