@@ -58,6 +58,11 @@ class SplinePath:
         points[..., 1] = np.interp(s, self._s, self._xy[1])
         return points
 
+    def piece_m(self, begin_m: float, end_m: float) -> Floats:
+        """(n, 2) points of a piece, about a centimetre apart, both ends included."""
+        count = max(2, round((end_m - begin_m) / _STEP_M) + 1)
+        return self.position(np.linspace(begin_m, end_m, count))
+
     def heading_rad(self, s_m: float) -> float:
         """Direction of the path at an arc length."""
         before, after = self.position(np.array([s_m - _STEP_M, s_m + _STEP_M]))
@@ -93,6 +98,14 @@ class SplinePath:
         close = np.flatnonzero(gap <= gap.min() + _STEP_M)
         run = close[: int(np.argmax(np.append(np.diff(close), 2) > 1)) + 1]
         return float(self._s[low + run[np.argmin(gap[run])]])
+
+    def passes(self, points_m: ArrayLike) -> list[float]:
+        """Arc lengths at which the path first comes nearest to points (n, 2), in their order."""
+        found, at_m = list[float](), 0.0
+        for point in np.asarray(points_m, dtype=float):
+            at_m = self.first_pass(point, at_m)
+            found.append(at_m)
+        return found
 
 
 @compiled(

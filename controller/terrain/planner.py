@@ -18,7 +18,6 @@ from snakewalk.controller.terrain.waypoint_turns import WaypointTurns
 
 _CHECK_STEP_M = 0.02  # how densely a spline is checked again
 _UNSAFE = 30.0  # metres of level path that a turn takes to stay off a metre of unsafe ground
-_ONWARD_STEP_M = 0.01
 _ROUNDS = 7  # halvings: a corner's pieces end at a hundredth of their length
 
 
@@ -104,13 +103,10 @@ class TerrainPlanner:
         if self._planned is None or len(points) < 3:
             return None
         planned, path = self._planned
-        at_m = 0.0
-        for point in planned[1 : len(planned) - len(points) + 2]:
-            at_m = path.first_pass(point, at_m)
         if not np.array_equal(planned[1 - len(points) :], points[1:]):
             return None
-        count = max(2, round((path.length_m - at_m) / _ONWARD_STEP_M) + 1)
-        onward = path.position(np.linspace(at_m, path.length_m, count))
+        until_next = planned[1 : len(planned) - len(points) + 2]
+        onward = path.piece_m(path.passes(until_next)[-1], path.length_m)
         if self.relief is not None and len(avoid):
             gap = np.hypot(*(onward[:, None] - avoid[None]).T)
             if gap.min() < self.relief.config.footprint_m:

@@ -20,7 +20,7 @@ _SHARP = 0.45
 _RADII = 1.5, 1.0, 0.75, 0.5
 """Of the wanted radius, tried in turn until a turn stays on safe ground. The centre of a body of
 1.2 m in an arc of 0.4 m lies 0.13 m inside of it, of 0.6 m 0.09 m."""
-_DIRECTIONS = 16
+_ALL_ROUND_RAD = np.arange(16) * 2.0 * np.pi / 16
 _STEP_M = 0.01
 _NEAR_M = 0.5
 """Way before and after a waypoint in which a bend counts as being there."""
@@ -64,10 +64,12 @@ class WaypointTurns:
         """
         legs, turned = _legs(path, np.asarray(waypoints_m, float)), False
         for k in range(0 if any_start else 1, len(legs) + 1):
-            around = slice(max(k - 1, 0), min(k + 1, len(legs)))
             if _bend_m(legs, k) < _SHARP * self._radius_m:
-                found = self._turned(legs[around], begins=k == 0)
-                legs[around], turned = found or legs[around], turned or found is not None
+                to_m = legs[k - 1] if k > 0 else None
+                from_m = legs[k] if k < len(legs) else None
+                found = self._turned(to_m, from_m, _ALL_ROUND_RAD + np.pi, _ALL_ROUND_RAD)
+                if found is not None:
+                    legs[max(k - 1, 0) : k + 1], turned = found, True
         if not turned:
             return path
         return SplinePath.tabulated(np.vstack([legs[0], *(leg[1:] for leg in legs[1:])]))
@@ -77,32 +79,30 @@ class WaypointTurns:
 
         None where every turn leads over unsafe ground.
         """
-        back = _points(leg, 0.0, leg.length_m)[::-1]
-        first, second = onward_m[0], onward_m[1]
-        heading = np.arctan2(*(first - second)[::-1])
-        for share in _RADII:
-            turns = self._turns(back, np.array([heading]), share, back=True)
-            turn = turns.cheapest()
-            if self._safe(turn.points_m):
-                onto = turns.onto(turn)
-                points = _points(onto, 0.0, onto.length_m)[::-1]
-                return SplinePath.tabulated(np.vstack([points, onward_m[1:]]))
-        return None
+        back = np.arctan2(*(onward_m[0] - onward_m[1])[::-1])
+        to_m, backs = leg.piece_m(0.0, leg.length_m), np.array([back])
+        found = self._turned(to_m, None, backs, backs - np.pi)
+        return None if found is None else SplinePath.tabulated(np.vstack([*found, onward_m[1:]]))
 
-    def _turned(self, legs: Sequence[Floats], *, begins: bool) -> list[Floats] | None:
-        """Legs (n, 2) to and from a waypoint with a turn there; None where none is safe."""
-        headings = np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS
+    def _turned(
+        self, to_m: Floats | None, from_m: Floats | None, backs_rad: Floats, headings_rad: Floats
+    ) -> list[Floats] | None:
+        """Legs (n, 2) to and from a waypoint with a turn there; None where none is safe.
+
+        The path leaves the waypoint in one of the directions ``headings_rad`` (h,), and comes from
+        the opposite of it, ``backs_rad`` (h,).
+        """
         for share in _RADII:
             sides = []
-            if not begins:
-                sides.append(self._turns(legs[0][::-1], headings + np.pi, share, back=True))
-            if begins or len(legs) > 1:
-                sides.append(self._turns(legs[-1], headings, share, back=False))
+            if to_m is not None:
+                sides.append(self._turns(to_m[::-1], backs_rad, share, back=True))
+            if from_m is not None:
+                sides.append(self._turns(from_m, headings_rad, share, back=False))
             turns = self._cheapest(sides)
             if turns:
                 found = [side.onto(turn) for side, turn in zip(sides, turns, strict=True)]
-                points = [_points(leg, 0.0, leg.length_m) for leg in found]
-                return [points[0] if begins else points[0][::-1], *points[1:]]
+                points = [leg.piece_m(0.0, leg.length_m) for leg in found]
+                return points if to_m is None else [points[0][::-1], *points[1:]]
         return None
 
     def _turns(self, leg: Floats, headings: Floats, share: float, *, back: bool) -> PathTurns:
@@ -137,16 +137,8 @@ class WaypointTurns:
 
 def _legs(path: SplinePath, waypoints_m: Floats) -> list[Floats]:
     """Points (n, 2) of a path from waypoint to waypoint."""
-    marks = [0.0]
-    for point in waypoints_m:
-        marks.append(path.first_pass(point, marks[-1]))
-    marks[-1] = path.length_m
-    return [_points(path, begin, end) for begin, end in pairwise(marks)]
-
-
-def _points(path: SplinePath, begin_m: float, end_m: float) -> Floats:
-    count = max(2, round((end_m - begin_m) / _STEP_M) + 1)
-    return path.position(np.linspace(begin_m, end_m, count))
+    marks = [0.0, *path.passes(waypoints_m[:-1]), path.length_m]
+    return [path.piece_m(begin, end) for begin, end in pairwise(marks)]
 
 
 def _bend_m(legs: Sequence[Floats], k: int) -> float:

@@ -264,7 +264,5 @@ class Course:
         self.path = self._plan(points_m, heading_rad, avoid_m=stalls_m)
         self._gained_m, self._gained_at = 0.0, self._travel
         self._along_m[:] = 0.0
-        self._passed_m = [0.0] * len(self.waypoints_m)
-        at = 0.0
-        for k in range(self.reached, len(self.waypoints_m)):
-            at = self._passed_m[k] = self.path.first_pass(self.waypoints_m[k], at)
+        left_m = self.waypoints_m[self.reached :]
+        self._passed_m = [0.0] * self.reached + self.path.passes(left_m)
