@@ -9,7 +9,7 @@ RAISE = 10
 processor (Linux, ``sched(7)``), but only among the programs of one terminal where the system
 groups them (autogroup)."""
 LOWER = 10
-"""The same for what may wait."""
+"""Niceness of what may wait."""
 
 
 @contextmanager
@@ -34,8 +34,10 @@ def give_way() -> None:
     if hasattr(os, "sched_setscheduler"):
         with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    if hasattr(os, "nice"):
-        os.nice(LOWER)
+    if hasattr(os, "setpriority"):
+        with suppress(OSError):
+            before = os.getpriority(os.PRIO_PROCESS, 0)
+            os.setpriority(os.PRIO_PROCESS, 0, max(before, LOWER))
 
 
 def _real_time() -> Callable[[], None] | None:

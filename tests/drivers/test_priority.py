@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from snakewalk.drivers.priority import RAISE, give_way, raised_priority
+from snakewalk.drivers.priority import LOWER, RAISE, give_way, raised_priority
 
 REAL_TIME = hasattr(os, "sched_setscheduler")
 
@@ -20,7 +20,6 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[object]:
             os, "sched_setscheduler", lambda pid, policy, _: words.append(("policy", policy))
         )
     monkeypatch.setattr(os, "setpriority", lambda which, who, value: words.append(value))
-    monkeypatch.setattr(os, "nice", lambda steps: words.append(("nice", steps)))
     return words
 
 
@@ -61,9 +60,12 @@ def test_a_system_without_either_goes_on_as_before(monkeypatch: pytest.MonkeyPat
         assert not hasattr(os, "setpriority")
 
 
-def test_who_gives_way_keeps_nothing_of_its_parents_priority(asked: list[object]) -> None:
+def test_who_gives_way_keeps_nothing_of_its_parents_priority(
+    asked: list[object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "getpriority", lambda which, who: -RAISE)
     give_way()
-    assert ("nice", RAISE) in asked
+    assert asked[-1] == LOWER
     if REAL_TIME:
         assert asked[0] == ("policy", os.SCHED_OTHER)
 
