@@ -14,6 +14,7 @@ from benchmarks.rows import Row
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot, load_world
+from snakewalk.controller.app.runs.rendered_camera import floor_prints
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.localization.lens import Lens
 from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadDetector
@@ -26,6 +27,11 @@ TITLE = "Overhead camera, rendered views with faults: 16 poses each, wrong is ov
 POSES = 16
 WRONG_M = 0.005
 CAMERA = CameraConfig()
+MARKED = CameraConfig(
+    markers_m={
+        "0": (-2.6, -1.9), "1": (2.6, -1.9), "2": (2.6, 1.9), "3": (-2.6, 1.9), "4": (0.0, 1.9)
+    }
+)  # fmt: skip
 Effect = Callable[[Floats, np.random.Generator, Floats], Floats]
 """(H, W, 3) frame, chance, (2,) pixel of the body's middle -> (H, W, 3) frame."""
 
@@ -104,6 +110,35 @@ EFFECTS: dict[str, Effect] = {
 }
 
 
+def _turned(axis: tuple[float, float, float], degrees: float) -> Effect:
+    """The camera turned about an axis of its picture through the lens, either way by chance."""
+
+    def effect(frame: Floats, chance: np.random.Generator, at: Floats) -> Floats:
+        matrix = _lens(0.0).matrix
+        by = np.radians(degrees) * chance.choice([-1.0, 1.0]) * np.array(axis)
+        turn, _ = cv2.Rodrigues(by)
+        move = matrix @ turn @ np.linalg.inv(matrix)
+        size = frame.shape[1::-1]
+        return np.asarray(cv2.warpPerspective(frame, move, size, borderMode=cv2.BORDER_REPLICATE))
+
+    return effect
+
+
+def _kicked(frame: Floats, chance: np.random.Generator, at: Floats) -> Floats:
+    """The marker in a corner moved by 6 px over the floor, the camera where it was."""
+    out = frame.copy()
+    out[28:58, 34:64] = frame[28:58, 28:58]
+    return out
+
+
+BUMPS: dict[str, Effect] = {
+    "turned by 1 degree": _turned((0.0, 0.0, 1.0), 1.0),
+    "tilted by 1 degree": _turned((0.6, 0.8, 0.0), 1.0),
+    "one marker moved": _kicked,
+}
+"""What only markers tell."""
+
+
 @dataclass(frozen=True)
 class Scene:
     picture: Image
@@ -118,13 +153,15 @@ class Found:
     used: int
     wrong: int
     head_max_m: float
+    noticed: int
+    """Frames in which a bump was told."""
 
 
-def scenes(seed: int) -> tuple[list[Scene], Image]:
+def scenes(seed: int, camera: CameraConfig) -> tuple[list[Scene], Image]:
     """Poses of a walk's shapes anywhere in the view, and the empty floor."""
     robot, world = load_robot("yaw16"), load_world("flat")
     chance = np.random.default_rng(seed)
-    view = TopView(robot, world, CAMERA, (0.0, 0.0), seed)
+    view = TopView(robot, world, camera, (0.0, 0.0), seed, floor_prints(camera))
     plant = MujocoPlant(robot, world)
     found = []
     for _ in range(POSES):
@@ -156,13 +193,27 @@ def run() -> list[Row]:
     """Measure."""
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
+    seed = int(os.environ.get("SEED", "1000"))
     try:
-        drawn, floor = scenes(int(os.environ.get("SEED", "1000")))
+        drawn, floor = scenes(seed, CAMERA)
         rows = []
         for name, effect in EFFECTS.items():
-            rows += _told(name, measure(drawn, floor, effect, None))
+            rows += _told(name, measure(drawn, floor, effect, CAMERA, None))
         for k1 in (-0.1, -0.3):
-            rows += _told(f"k1 = {k1:g}", measure(drawn, floor, _gain(1.0), _lens(k1)))
+            rows += _told(f"k1 = {k1:g}", measure(drawn, floor, _gain(1.0), CAMERA, _lens(k1)))
+        drawn, floor = scenes(seed, MARKED)
+        for name, effect in (EFFECTS | BUMPS).items():
+            found = measure(drawn, floor, effect, MARKED, None)
+            rows += _told(f"with markers, {name}", found)
+            bumped = name in BUMPS or name == "shift of 4 px"
+            right = found.noticed if bumped else POSES - found.noticed
+            rows.append(
+                Row(f"with markers, {name}: bump told rightly, of {POSES}", right, "frames", "16",
+                    POSES / max(right, 1), 1.0)
+            )  # fmt: skip
+        for name in ("turned by 1 degree", "tilted by 1 degree"):
+            found = measure(drawn, floor, BUMPS[name], MARKED, _lens(-0.3))
+            rows += _told(f"with markers, k1 = -0.3, {name}", found)
         return rows
     finally:
         cv2.setNumThreads(threads)
@@ -173,6 +224,10 @@ def _lens(k1: float) -> Lens:
     middle = 0.5 * (CAMERA.width_px - 1), 0.5 * (CAMERA.height_px - 1)
     matrix = np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
     return Lens((CAMERA.width_px, CAMERA.height_px), matrix, np.array([k1, 0.0, 0.0, 0.0, 0.0]))
+
+
+def _whole(frame: Floats) -> Image:
+    return np.clip(np.rint(frame), 0.0, 255.0).astype(np.uint8)
 
 
 def _bent(frame: Image, lens: Lens | None) -> Image:
@@ -187,18 +242,26 @@ def _bent(frame: Image, lens: Lens | None) -> Image:
     return np.asarray(bent, dtype=np.uint8)
 
 
-def measure(drawn: list[Scene], floor: Image, effect: Effect, lens: Lens | None) -> Found:
+def measure(
+    drawn: list[Scene], floor: Image, effect: Effect, camera: CameraConfig, lens: Lens | None
+) -> Found:
     """Track each pose from a belief that is off by up to 40 mm each way and 0.1 rad."""
-    robot = load_robot("yaw16")
-    model = CameraModel.straight_down(CAMERA, (0.0, 0.0), lens)
-    detector = OverheadDetector(model, _bent(floor, lens), robot.body_radius_m, CAMERA.shade)
-    off_m = []
+    robot, ground = load_robot("yaw16"), _bent(floor, lens)
+    model = (
+        CameraModel.straight_down(camera, (0.0, 0.0), lens)
+        if camera.markers_m is None
+        else CameraModel.from_markers(camera, (0.0, 0.0), lens, ground)
+    )
+    detector = OverheadDetector(model, ground, robot.body_radius_m, camera.shade)
+    off_m, noticed = [], 0
     for k, scene in enumerate(drawn):
         chance = np.random.default_rng((k, 7))
         body = body_in_world(robot, pose_at(scene.head_m, scene.heading_rad), scene.joint_rad)
         at = model.in_image(body.link_m[:, :2].mean(axis=0), robot.body_radius_m)
-        frame = effect(_bent(scene.picture, lens).astype(float), chance, at)
-        image = np.clip(np.rint(frame), 0.0, 255.0).astype(np.uint8)
+        if effect in BUMPS.values():  # before the lens
+            image = _bent(_whole(effect(scene.picture.astype(float), chance, at)), lens)
+        else:
+            image = _whole(effect(_bent(scene.picture, lens).astype(float), chance, at))
         believed = pose_at(
             scene.head_m + chance.uniform(-0.04, 0.04, 2),
             scene.heading_rad + float(chance.uniform(-0.1, 0.1)),
@@ -206,9 +269,11 @@ def measure(drawn: list[Scene], floor: Image, effect: Effect, lens: Lens | None)
         guess = body_in_world(robot, believed, scene.joint_rad)
         prior = BodyPrior(guess.link_m[:, :2], guess.forward[:, :2])
         found = detector.registered(image).track(image, 0.0, prior, robot)
+        noticed += found.bump is not None
         if not found.fault:
             off_m.append(float(np.hypot(*(found.head_m - scene.head_m))))
-    return Found(len(off_m), sum(d > WRONG_M for d in off_m), max(off_m, default=float("nan")))
+    wrong = sum(d > WRONG_M for d in off_m)
+    return Found(len(off_m), wrong, max(off_m, default=float("nan")), noticed)
 
 
 def _told(name: str, found: Found) -> list[Row]:

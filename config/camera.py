@@ -34,6 +34,14 @@ class CameraConfig(Strict):
     corners_m: tuple[Place, Place, Place, Place] | None = Field(
         None, description="the same on the floor; with them the camera may look aslant"
     )
+    markers_m: dict[str, Place] | None = Field(
+        None,
+        description="printed markers of `snakewalk camera markers`, by their numbers: where the "
+        "middle of each lies on the floor; in place of corners",
+    )
+    marker_side_m: float = Field(
+        0.15, gt=0.005, le=2.0, description="side of a printed marker, without its white margin"
+    )
     lens: str | None = Field(
         None,
         description="file of `snakewalk camera calibrate`: the distortion of a real camera is "
@@ -54,3 +62,21 @@ class CameraConfig(Strict):
         if (self.corners_px is None) != (self.corners_m is None):
             raise ValueError("corners_px and corners_m are given together")
         return self
+
+    @model_validator(mode="after")
+    def _markers_fix_a_floor(self) -> Self:
+        if self.markers_m is None:
+            return self
+        wrong = [name for name in self.markers_m if not (name.isdecimal() and int(name) < 50)]
+        if wrong:
+            raise ValueError(f"markers_m: {wrong[0]}: a marker's number is 0 to 49")
+        if len(self.markers_m) < 4:
+            raise ValueError(f"markers_m: four are needed, given are {len(self.markers_m)}")
+        if self.corners_m is not None:
+            raise ValueError("markers_m or corners_m, not both")
+        return self
+
+    @property
+    def marker_places_m(self) -> dict[int, Place]:
+        """``markers_m`` by number; empty where there are none."""
+        return {int(name): place for name, place in (self.markers_m or {}).items()}

@@ -16,6 +16,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.localization.dead_reckoning import DeadReckoning
+from snakewalk.controller.localization.floor_markers import Bump
 from snakewalk.controller.localization.overhead_camera import LineDetection
 from snakewalk.controller.localization.pose_fit import PoseFit, fit_both_ends
 from snakewalk.controller.localization.pose_tracking import BodyPrior, TrackedPose
@@ -81,7 +82,7 @@ class CameraPose:
         self._fixed_s: float | None = None
         self._reason = ""
         self._gap = False
-        self._moved_px = (0.0, 0.0)
+        self._bump: Bump | None = None
         self.frames = 0
         """Frames taken in so far."""
         self.used = 0
@@ -115,12 +116,9 @@ class CameraPose:
 
     def _follow(self, found: TrackedPose) -> None:
         self.frames += 1
-        if found.moved_px != self._moved_px:
-            self._moved_px = found.moved_px
-            away = float(np.hypot(*found.moved_px))
-            self._on_event(
-                f"the camera was bumped: its picture has moved by {away:.1f} px, which is undone"
-            )
+        if found.bump != self._bump:
+            self._bump = found.bump
+            self._on_event(str(found.bump))
         if found.fault:
             self._reason = found.fault
             return

@@ -6,8 +6,8 @@ covers the floor further out, at ``g = f + (p - f) h / (h - z)``, and that is un
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
 import cv2
 import numpy as np
@@ -21,6 +21,14 @@ from snakewalk.controller.capture.body_detector import BodyDetector, Detection
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.silhouette import Polarity
 from snakewalk.controller.localization.floor_light import lit_floor, unexplained
+from snakewalk.controller.localization.floor_markers import (
+    Bump,
+    Markers,
+    PictureMove,
+    find_markers,
+    fit_floor,
+    picture_move,
+)
 from snakewalk.controller.localization.lens import Lens
 from snakewalk.controller.localization.pose_tracking import (
     REACH_M,
@@ -38,6 +46,8 @@ _PARTS = 6, 4  # of a picture, across and down
 _BETTER = 0.8  # of the square of what is left in a part, where a move explains it (ours)
 _LEAST_PARTS = 3
 _LIKE = 0.2  # correlation of two pictures of the floor, noise and robot included (ours)
+MISPLACED_M = 0.03
+"""A marker that lies further from its measured place fixes no floor (ours)."""
 _LEAST_AREA = 0.01  # of the image: four corners that span less fix no plane
 
 
@@ -55,6 +65,8 @@ class CameraModel:
     """Where it distorts, the homography is of pixels without distortion."""
     moved_px: tuple[float, float] = (0.0, 0.0)
     """x, y by which the picture has moved since the homography was measured."""
+    markers: Markers = field(default_factory=dict)
+    """Printed markers in the picture in which the homography was measured."""
 
     @classmethod
     def straight_down(
@@ -93,6 +105,52 @@ class CameraModel:
                 raise InputError(f"camera: {name}: three of the four places lie on a line")
         found = np.asarray(cv2.getPerspectiveTransform(px, floor), dtype=float)
         return cls(found, np.array(centre_m, dtype=float), camera.height_m, lens)
+
+    @classmethod
+    def from_markers(
+        cls,
+        camera: CameraConfig,
+        centre_m: tuple[float, float],
+        lens: Lens | None,
+        background: Image,
+    ) -> Self:
+        """Build the model from printed markers in a picture of the empty floor.
+
+        Where the lens is known its height and foot are those that the markers show.
+
+        Raises:
+            InputError: too few are seen, they lie on a line, or one is not where it was measured.
+
+        """
+        places = camera.marker_places_m
+        markers = {name: px for name, px in find_markers(background).items() if name in places}
+        try:
+            fit = fit_floor(markers, places, lens)
+        except InputError as fault:
+            raise InputError(f"camera: markers_m: {fault}") from None
+        worst = max(fit.residual_m, key=lambda name: fit.residual_m[name])
+        if fit.residual_m[worst] > MISPLACED_M:
+            raise InputError(
+                f"camera: markers_m: marker {worst} lies {1e3 * fit.residual_m[worst]:.0f} mm from "
+                "where it must be by the others: is its place right, or another's?"
+            )
+        foot, height = np.array(centre_m, dtype=float), camera.height_m
+        if fit.lens_m is not None:
+            foot, height = fit.lens_m[:2], float(fit.lens_m[2])
+        return cls(fit.floor_from_px, foot, height, lens, markers=markers)
+
+    def matrix(self, size_px: tuple[int, int]) -> Floats:
+        """(3, 3) camera matrix; without a known lens, that of a lens so high above this floor."""
+        if self.lens is not None:
+            return self.lens.matrix
+        middle = 0.5 * (np.array(size_px, dtype=float) - 1.0)
+        places = _projected(
+            self.floor_from_px, middle + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        )
+        across, down = places[1:] - places[0]
+        metre_px = 1.0 / np.sqrt(abs(across[0] * down[1] - across[1] * down[0]))
+        focal = self.height_m * metre_px
+        return np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
 
     def on_plane(self, points_px: Floats, z_m: float) -> Floats:
         """(..., 2) world places of pixels (..., 2) of what is ``z_m`` above the floor."""
@@ -142,6 +200,10 @@ class OverheadDetector:
     axis_height_m: float
     shade: float = 0.0
     """Part of the floor's light that the body's shadow may take: so much darker is still floor."""
+    bump: Bump | None = None
+    """Of the camera since its floor was pictured."""
+    first: Self | None = None
+    """As it was before any bump that markers showed."""
 
     def detect(self, image: Image, time_s: float) -> LineDetection:
         """Find the body in one frame (H, W[, 3]).
@@ -157,15 +219,63 @@ class OverheadDetector:
     def registered(self, image: Image) -> Self:
         """Return the detector for a camera that was bumped; itself where the floor has not moved.
 
-        The floor's own texture is matched: tiles, joints, printed markers. A floor without any
-        tells nothing. What moves in the picture covers parts of it; so the move must explain
-        three parts more than it spoils.
+        Printed markers tell turns and tilts as well. Without three of them in view the floor's own
+        texture is matched: tiles, joints. A floor without any tells nothing.
 
         Raises:
             InputError: the frame is not as large as the background.
 
         """
         self._check_size(image)
+        first = self.first or self
+        if first.model.markers:
+            size_px = image.shape[1], image.shape[0]
+            model = first.model
+            move = picture_move(
+                model.markers, find_markers(image), model.floor_from_px, model.matrix(size_px),
+                model.lens,
+            )  # fmt: skip
+            if move is not None:
+                return self._moved_by_markers(first, move, size_px)
+        return self._moved_by_texture(image)
+
+    def _moved_by_markers(self, first: Self, move: PictureMove, size_px: tuple[int, int]) -> Self:
+        """Return the first detector with this move of its picture, where it is another than now."""
+        known, now = self.bump or Bump((0.0, 0.0)), move.bump
+        corners = np.array(
+            [[0.0, 0.0], [size_px[0], 0.0], [0.0, size_px[1]], list(size_px)], dtype=float
+        )
+        floor_from_px = first.model.floor_from_px @ np.linalg.inv(move.now_from_then)
+        back = np.linalg.inv(self.model.floor_from_px) @ floor_from_px
+        off = np.hypot(*(_projected(back, corners) - corners + self.model.moved_px).T)
+        same = known.left_out == now.left_out and known.undone == now.undone
+        if same and off.max() < (_MOVED_PX if now.undone else np.inf):
+            return self
+        if not now.undone:
+            return replace(self, bump=now, first=first)
+        model = replace(first.model, floor_from_px=floor_from_px)
+        columns, rows = size_px
+        grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).astype(float)
+        lens = first.model.lens
+        then = _projected(
+            np.linalg.inv(move.now_from_then), grid if lens is None else lens.undistorted(grid)
+        )
+        at = (then if lens is None else lens.distorted(then)).astype(np.float32)
+        ground = np.asarray(
+            cv2.remap(
+                first.background, at[..., 0], at[..., 1], cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_REPLICATE,
+            ),
+            dtype=np.uint8,
+        )  # fmt: skip
+        return replace(self, model=model, background=ground, bump=now, first=first)
+
+    def _moved_by_texture(self, image: Image) -> Self:
+        """The shift under which the floor's own texture lies best.
+
+        What moves in the picture covers parts of it; so the move must explain three parts more than
+        it spoils.
+        """
         floor, now = (_texture(one) for one in (self.background, image))
         far = _FURTHEST_PX // _HALF
         likeness = cv2.matchTemplate(now, floor[far:-far, far:-far], cv2.TM_CCOEFF_NORMED)
@@ -189,8 +299,9 @@ class OverheadDetector:
         )  # fmt: skip
         if _parts_explained(now, floor, _texture(moved)) < _LEAST_PARTS:
             return self
-        model = replace(self.model, moved_px=(old[0] + x, old[1] + y))
-        return replace(self, model=model, background=moved)
+        away = old[0] + x, old[1] + y
+        model = replace(self.model, moved_px=away)
+        return replace(self, model=model, background=moved, bump=Bump(away), first=self.first)
 
     def track(
         self, image: Image, time_s: float, prior: BodyPrior, robot: RobotConfig
@@ -204,10 +315,12 @@ class OverheadDetector:
         self._check_size(image)
         seen = self._standing_out(image, prior, robot)
         found = track_pose(robot, seen, prior, time_s)
+        if self.bump is not None and not self.bump.undone:
+            return replace(found, fault=str(self.bump), bump=self.bump)
         px = self.model.in_image(prior.links_m, self.axis_height_m)
         within = (px >= 0.0) & (px <= np.array(image.shape[1::-1]) - 1.0)
         fault = str(FrameStatus.CUT) if found.fault and not within.all() else found.fault
-        return replace(found, fault=fault, moved_px=self.model.moved_px)
+        return replace(found, fault=fault, bump=self.bump)
 
     def _standing_out(self, image: Image, prior: BodyPrior, robot: RobotConfig) -> StandingOut:
         to_px = self.model.projection(self.axis_height_m)
@@ -264,7 +377,7 @@ class OverheadDetector:
         return BodyDetector(np.zeros_like(apart), Polarity.BOTH, "given").detect(apart)
 
 
-def _projected(matrix: Floats, points: Floats) -> Floats:
+def _projected(matrix: NDArray[Any], points: Floats) -> Floats:
     x, y = points[..., 0], points[..., 1]
     moved = [row[0] * x + row[1] * y + row[2] for row in matrix]
     return np.stack([moved[0] / moved[2], moved[1] / moved[2]], axis=-1)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.localization.floor_markers import Bump
 from snakewalk.drivers.least_squares import least_squares
 
 REACH_M: Final = 0.10
@@ -61,8 +62,8 @@ class TrackedPose:
     """Root of the mean square distance of the sections' middles from the chain."""
     fault: str
     """Why it must not be used; empty where it may."""
-    moved_px: tuple[float, float] = (0.0, 0.0)
-    """x, y by which the camera's picture has moved since it was set up."""
+    bump: Bump | None = None
+    """Of the camera since it was set up."""
 
 
 @dataclass(frozen=True, slots=True)

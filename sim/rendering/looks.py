@@ -57,6 +57,17 @@ class SkinLook:
     then (7 L,), place and unit quaternion of each."""
 
 
+@dataclass(frozen=True, slots=True)
+class FloorPrint:
+    """A printed sheet on level ground, its upper edge to the north."""
+
+    place_m: tuple[float, float]
+    """Of its middle."""
+    side_m: float
+    picture: Image
+    """(N, N) grey."""
+
+
 def dressed_model(
     robot: RobotConfig,
     world: WorldConfig,
@@ -66,6 +77,7 @@ def dressed_model(
     *,
     look: SkinLook | None = None,
     fine: bool = False,
+    prints: Sequence[FloorPrint] = (),
 ) -> mujoco.MjModel:
     """Build the model with skin, floor, sky, and waypoints (poles and rings).
 
@@ -84,6 +96,8 @@ def dressed_model(
     else:
         _animal(spec, look)
     _water(spec, world, ground)
+    for k, sheet in enumerate(prints):
+        _print(spec, f"print{k}", sheet)
     for k, (x, y) in enumerate(waypoints_m):
         z = 0.0 if ground is None else float(ground.elevation_m(x, y))
         _add(
@@ -196,6 +210,20 @@ def _floor(spec: mujoco.MjSpec, ground: HeightField | None) -> None:
     floor.material = "ground"
     if ground is None:
         floor.size = [0.0, 0.0, 0.1]
+
+
+def _print(spec: mujoco.MjSpec, name: str, sheet: FloorPrint) -> None:
+    side = len(sheet.picture)
+    texture = spec.add_texture(
+        name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=side, height=side, nchannel=3
+    )
+    texture.data = np.repeat(sheet.picture[..., None], 3, axis=2).tobytes()
+    material = spec.add_material(name=name, specular=0.0, reflectance=0.0)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+    size = 0.5 * sheet.side_m, 0.5 * sheet.side_m, 0.001
+    place = *sheet.place_m, 0.001
+    geom = _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_PLANE, size, place, (1, 1, 1, 1))
+    geom.name, geom.material, geom.group = name, name, 0
 
 
 def _water(spec: mujoco.MjSpec, world: WorldConfig, ground: HeightField | None) -> None:

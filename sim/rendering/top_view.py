@@ -1,6 +1,7 @@
 """The view from above: the picture that a camera over the simulated robot takes."""
 
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -9,7 +10,7 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.sim.rendering.looks import dressed_model
+from snakewalk.sim.rendering.looks import FloorPrint, dressed_model
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import add_shade
 
@@ -36,9 +37,10 @@ class TopView:
         camera: CameraConfig,
         centre_m: tuple[float, float],
         seed: int = 0,
+        prints: Sequence[FloorPrint] = (),
     ) -> None:
         self._robot = robot
-        self._model = model = dressed_model(robot, world, None)
+        self._model = model = dressed_model(robot, world, None, prints=prints)
         self._data = mujoco.MjData(model)
         size = camera.width_px, camera.height_px
         field_m = camera.field_width_m * size[1] / size[0]

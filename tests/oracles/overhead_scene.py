@@ -1,6 +1,7 @@
 """A drawn view from above with known truth, where no OpenGL is needed: for tests and benchmarks."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.localization.floor_markers import marker_picture
 from snakewalk.controller.localization.overhead_camera import CameraModel
 from snakewalk.drivers.types import BodyPose
 
@@ -26,6 +28,9 @@ class DrawnView:
     """Width, height."""
     noise: float = 3.0
     seed: int = 0
+    markers_m: Mapping[int, Sequence[float]] = field(default_factory=dict)
+    """Places of printed markers, each with a cell of white around it."""
+    marker_side_m: float = 0.15
 
     def empty_floor(self) -> Image:
         """(H, W, 3) the same without the robot."""
@@ -51,7 +56,24 @@ class DrawnView:
     def _floor(self) -> Image:
         x, y = np.meshgrid(*(np.arange(side) // 80 for side in self.size_px))
         tiles = np.where((x + y) % 2, 150, 165).astype(np.uint8)
-        return np.dstack([tiles] * 3)
+        return np.dstack([self._printed(tiles)] * 3)
+
+    def _printed(self, floor: Image) -> Image:
+        """Lay the markers, drawn eight times larger, onto the floor (H, W)."""
+        large = cv2.resize(floor, None, fx=8, fy=8, interpolation=cv2.INTER_NEAREST)
+        for number, place in self.markers_m.items():
+            drawn = np.pad(marker_picture(number, 48), 8, constant_values=235)
+            side_m, ends = self.marker_side_m * len(drawn) / 48, len(drawn) - 0.5
+            half = 0.5 * side_m * np.array([[-1, 1], [1, 1], [1, -1], [-1, -1]])
+            px = 8.0 * (self.model.in_image(np.array(place) + half, 0.0) + 0.5) - 0.5
+            corners = np.array([[-0.5, -0.5], [ends, -0.5], [ends, ends], [-0.5, ends]])
+            there = cv2.getPerspectiveTransform(corners.astype(np.float32), px.astype(np.float32))
+            cv2.warpPerspective(
+                drawn, there, large.shape[::-1], dst=large, flags=cv2.INTER_NEAREST,
+                borderMode=cv2.BORDER_TRANSPARENT,
+            )  # fmt: skip
+        small = cv2.resize(large, self.size_px, interpolation=cv2.INTER_AREA)
+        return np.asarray(small, dtype=np.uint8)
 
     def _sensed(self, image: Image, frame: int) -> Image:
         chance = np.random.default_rng((self.seed, frame))

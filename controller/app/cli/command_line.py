@@ -29,6 +29,7 @@ from snakewalk.controller.app.cli.commands.bus import (
 )
 from snakewalk.controller.app.cli.commands.camera.board import board
 from snakewalk.controller.app.cli.commands.camera.lens import calibrate_camera
+from snakewalk.controller.app.cli.commands.camera.markers import markers
 from snakewalk.controller.app.cli.commands.capture import capture
 from snakewalk.controller.app.cli.commands.files.elevation import elevation
 from snakewalk.controller.app.cli.commands.files.init import init
@@ -474,7 +475,7 @@ terrain_app.command(
     ),
 )(stereo)
 
-camera_app = _App(no_args_is_help=True, help="The camera above the robot: its board, its lens.")
+camera_app = _App(no_args_is_help=True, help="The camera above the robot: its lens, its markers.")
 
 app.add_typer(camera_app, name="camera", rich_help_panel=_JOB)
 
@@ -490,6 +491,12 @@ camera_app.command(
         "camera calibrate pictures -o lens.yml", "camera calibrate 0 -o lens.yml --size 1280x720"
     ),
 )(calibrate_camera)
+
+camera_app.command(
+    epilog=_examples(
+        "camera markers -o markers.pdf", "camera markers -o a3.pdf --side 250 --count 4"
+    )
+)(markers)
 
 fish_app = _App(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
 

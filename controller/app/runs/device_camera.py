@@ -150,8 +150,8 @@ def overhead_detector(run: RunConfig, robot: RobotConfig) -> OverheadDetector:
     """Build the detector of a real camera from its table in the run.
 
     Raises:
-        InputError: no background image, of another size, no lens in its file, or corners that fix
-            no plane.
+        InputError: no background image, of another size, no lens in its file, or corners or
+            markers that fix no plane.
 
     """
     camera = run.camera
@@ -168,9 +168,12 @@ def overhead_detector(run: RunConfig, robot: RobotConfig) -> OverheadDetector:
             f"camera has {camera.width_px} x {camera.height_px}: calibrate in the size of the run"
         )
     centre_m = centre_of(run)
-    corners = camera.corners_px is not None
-    make = CameraModel.from_corners if corners else CameraModel.straight_down
-    model = make(camera, centre_m, lens)
+    if camera.markers_m is not None:
+        model = CameraModel.from_markers(camera, centre_m, lens, ground)
+    elif camera.corners_px is not None:
+        model = CameraModel.from_corners(camera, centre_m, lens)
+    else:
+        model = CameraModel.straight_down(camera, centre_m, lens)
     return OverheadDetector(model, ground, robot.body_radius_m, camera.shade)
 
 

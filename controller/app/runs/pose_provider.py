@@ -67,6 +67,7 @@ def _missing(camera: CameraConfig) -> list[str]:
             ("centre_m", "the floor's place under the lens"),
         )
         if getattr(camera, key) is None
+        and not (key == "centre_m" and camera.markers_m is not None and camera.lens is not None)
     ]
 
 

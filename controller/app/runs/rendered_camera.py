@@ -2,16 +2,19 @@
 
 from collections import deque
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.localization.camera_pose import PriorAt
+from snakewalk.controller.localization.floor_markers import marker_picture
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
     LineDetection,
@@ -19,6 +22,9 @@ from snakewalk.controller.localization.overhead_camera import (
 )
 from snakewalk.controller.localization.pose_tracking import BodyPrior, TrackedPose
 from snakewalk.drivers.clock import Clock
+
+if TYPE_CHECKING:
+    from snakewalk.sim.rendering.looks import FloorPrint
 
 CHECK_FRAMES = 15
 """After so many frames each it is looked whether the camera was bumped."""
@@ -45,6 +51,19 @@ def require_whole_body(detection: LineDetection, camera: str) -> LineDetection:
     return detection
 
 
+def floor_prints(camera: CameraConfig) -> "list[FloorPrint]":
+    """The printed markers of a simulated floor, each with a white margin of a cell."""
+    from snakewalk.sim.rendering.looks import FloorPrint  # noqa: PLC0415  the simulator is an extra
+
+    found = []
+    for number, place_m in camera.marker_places_m.items():
+        drawn = marker_picture(number, 96)
+        cell = len(drawn) // 6
+        sheet = np.pad(drawn, cell, constant_values=255)
+        found.append(FloorPrint(place_m, camera.marker_side_m * len(sheet) / len(drawn), sheet))
+    return found
+
+
 class RenderedCamera:
     """The simulated robot from above; each frame arrives one period after it was taken.
 
@@ -66,11 +85,14 @@ class RenderedCamera:
         from snakewalk.sim.rendering.top_view import TopView  # noqa: PLC0415  the simulator is an extra
 
         centre_m = centre_of(run)
-        self._view = TopView(robot, world, run.camera, centre_m, run.seed)
-        model = CameraModel.straight_down(run.camera, centre_m)
-        self.detector = OverheadDetector(
-            model, self._view.empty_floor(), robot.body_radius_m, run.camera.shade
+        self._view = TopView(robot, world, run.camera, centre_m, run.seed, floor_prints(run.camera))
+        ground = self._view.empty_floor()
+        model = (
+            CameraModel.straight_down(run.camera, centre_m)
+            if run.camera.markers_m is None
+            else CameraModel.from_markers(run.camera, centre_m, None, ground)
         )
+        self.detector = OverheadDetector(model, ground, robot.body_radius_m, run.camera.shade)
         self._qpos, self._clock = qpos, clock
         self._period_s = 1.0 / run.camera.rate_hz
         self._next_s = clock.now_s()

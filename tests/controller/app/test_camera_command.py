@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.localization.calibration_board import CalibrationBoard
+from snakewalk.controller.localization.floor_markers import find_markers
 from snakewalk.controller.localization.lens import Lens
 from tests.oracles.board_view import board_pictures
 
@@ -71,9 +72,28 @@ def test_the_board_is_drawn_in_its_size(ending: str, tmp_path: Path) -> None:
         assert box[2] / 72.0 * 25.4 == pytest.approx(272.0, abs=0.5), "with 10 mm around"
 
 
+def test_markers_are_printed_in_their_size_one_a_page(tmp_path: Path) -> None:
+    told = call("camera", "markers", "-o", str(tmp_path / "m.pdf"), "--count", "3")
+    assert told["numbers"] == [0, 1, 2]
+    assert (tmp_path / "m.pdf").read_bytes().count(b"/MediaBox") == 3
+    told = call("camera", "markers", "-o", str(tmp_path / "m.png"), "--count", "1", "--first", "7")
+    drawn = np.asarray(cv2.imread(str(tmp_path / "m.png"), cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
+    small = cv2.resize(drawn, None, fx=0.1, fy=0.1, interpolation=cv2.INTER_AREA)
+    ((number, corners),) = find_markers(np.asarray(small, dtype=np.uint8)).items()
+    assert number == 7
+    side_mm = 10.0 * np.hypot(*(corners[1] - corners[0])) / 300.0 * 25.4
+    assert side_mm == pytest.approx(150.0, abs=0.5)
+    assert drawn.shape[1] / 300.0 * 25.4 == pytest.approx(
+        float(str(told["page_width_mm"])), abs=0.2
+    )
+
+
 @pytest.mark.parametrize(
     ("words", "line"),
     [
+        (("markers", "-o", "m.png"), "holds one marker"),
+        (("markers", "-o", "m.pdf", "--first", "48"), "numbers end at 49"),
+        (("markers", "-o", "m.pdf", "--side", "2"), "must be 10 to 1000 mm"),
         (("board", "-o", "x.gif"), "ends in .pdf or .png"),
         (("board", "-o", "x.pdf", "--squares", "7"), "--squares 7: expected"),
         (("board", "-o", "x.pdf", "--pattern", "dots"), "is none of charuco, chessboard"),

@@ -97,7 +97,8 @@ def test_a_bumped_camera_is_noticed_and_undone() -> None:
     found = detector.track(moved, 0.0, prior(), ROBOT)
     assert found.fault == ""
     assert np.hypot(*(found.head_m - HEAD)) < 0.005
-    assert found.moved_px == detector.model.moved_px
+    assert found.bump is not None
+    assert found.bump.shift_px == detector.model.moved_px
     there = MODEL.on_plane(np.array([100.0, 80.0]), 0.03)
     px = detector.model.in_image(there, 0.03)
     np.testing.assert_allclose(px, np.array([100.0, 80.0]) + detector.model.moved_px)

@@ -1,1 +1,1 @@
-"""Commands of the camera above the robot: what to print, and its lens."""
+"""Commands of the camera above the robot: what to print, its lens, its markers."""
