@@ -64,11 +64,12 @@ campaign: setup
 SEEDS ?= 20
 FIRST_SEED ?= 1000
 FAILURES ?= runs/failures
-TRIALS := $(BIN)/snakewalk trials --motion walk --seeds $(SEEDS) --first-seed $(FIRST_SEED)
+TRIALS := $(BIN)/snakewalk trials --motion walk --seeds $(SEEDS) --first-seed $(FIRST_SEED) --force
 ANYWHERE := --over world.planner.slope_limit_rad=1.4 --over world.planner.variance_limit_m2=1
 BODIES := --robot alternating16 --robot yaw16
 
 failures: setup
+	mkdir -p $(FAILURES)
 	$(TRIALS) steps-4cm $(BODIES) $(ANYWHERE) --over world.ground.height_m=0.01,0.02,0.04,0.06 \
 	  -o $(FAILURES)/steps.csv --picture $(FAILURES)/steps.png
 	$(TRIALS) gaps-8cm $(BODIES) $(ANYWHERE) --over world.ground.width_m=0.04,0.08,0.12,0.16 \

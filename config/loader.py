@@ -117,16 +117,24 @@ def load_robot(name_or_path: str, beside: Path | None = None) -> "RobotConfig":
 
 
 def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
-    """Load a world by shipped name or path."""
+    """Load a world by shipped name or path; its ground's file is looked for beside it.
+
+    Raises:
+        ConfigError: no such file, world or ground; each fault of it.
+
+    """
     from snakewalk.config.world import ElevationGround, MapGround, WorldConfig  # noqa: PLC0415
 
     path = locate("worlds", name_or_path, beside)
     world = load(path, WorldConfig)
     if isinstance(world.ground, ElevationGround | MapGround):
-        source = path.parent / world.ground.source
-        if source.is_file():  # beside the world that names it
+        named = world.ground.source
+        source = (path.parent / named).absolute()  # a log names it to other folders
+        if source.is_file():
             ground = world.ground.model_copy(update={"source": str(source)})
             return world.model_copy(update={"ground": ground})
+        if named.endswith(".npz") and not Path(named).is_file():
+            raise ConfigError(f"{path}: ground.source: {named}: no such file beside it, nor here")
     return world
 
 

@@ -116,10 +116,17 @@ class PathBar(RunBar):
 
 
 class TimeBar(RunBar):
-    """How much of its time a gait, or anything else that takes a known time, has gone."""
+    """How much of its time a gait, or anything else that takes a known time, has gone.
 
-    def __init__(self, name: str, seconds: float) -> None:
+    ``name_at`` takes the time gone by, in seconds, and returns what then moves: a run may change
+    its gait.
+    """
+
+    def __init__(
+        self, name: str, seconds: float, name_at: Callable[[float], str] | None = None
+    ) -> None:
         super().__init__(name, seconds)
+        self._name_at = name_at if name_at is not None else lambda gone_s: name
         self._start_s: float | None = None
 
     def on_progress(self, progress: RunProgress) -> None:
@@ -128,7 +135,7 @@ class TimeBar(RunBar):
             self._start_s = progress.time_s
         if self._is_due(progress):
             gone_s = progress.time_s - self._start_s
-            self.update(gone_s, note=f"{gone_s:5.1f} s")
+            self.update(gone_s, description=self._name_at(gone_s), note=f"{gone_s:5.1f} s")
 
 
 def in_real_time(on_progress: Callable[[RunProgress], None]) -> Callable[[RunProgress], None]:

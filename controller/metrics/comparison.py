@@ -1,6 +1,6 @@
 """Differences between a replay and its original: first time and joint, largest and RMS."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +27,8 @@ class Difference:
     """Time of the first row that differs; None if none does."""
     first_column: int | None
     """Joint, or axis, that differs there."""
+    first_name: str = ""
+    """What people call it: ``joint 5 (ID 5)``, ``y``; empty where nothing differs."""
     decides: bool = True
     """Whether it has a tolerance; else it is reported only."""
 
@@ -70,6 +72,8 @@ class Comparison:
                     "by_column": [x if np.isfinite(x) else None for x in d.by_column],
                     "first_s": d.first_s,
                     "first_column": d.first_column,
+                    "first_name": d.first_name,
+                    "judged": d.decides,
                 }
                 for d in self.differences
             },
@@ -104,12 +108,14 @@ def compare(
     limits = dict(tolerances or {})
     a, b = original.cycle, replay.cycle
     names = ("asked_rad", "sent_rad", "measured_rad", "velocity_rad_s", "current_a")
-    pairs: list[tuple[str, Floats, Floats, Floats]] = [
-        (name, a.deadline_s, getattr(a, name), getattr(b, name)) for name in names
+    robot = original.header.robot
+    joints = tuple(map(robot.joint_name, range(robot.joint_count)))
+    pairs: list[tuple[str, tuple[str, ...], Floats, Floats, Floats]] = [
+        (name, joints, a.deadline_s, getattr(a, name), getattr(b, name)) for name in names
     ]
     p, q = original.pose, replay.pose
-    pairs += [("head_m", p.time_s, p.head_m, q.head_m)]
-    pairs += [("deadline_s", a.deadline_s, a.deadline_s[:, None], b.deadline_s[:, None])]
+    pairs += [("head_m", ("x", "y", "z"), p.time_s, p.head_m, q.head_m)]
+    pairs += [("deadline_s", ("",), a.deadline_s, a.deadline_s[:, None], b.deadline_s[:, None])]
     return Comparison(
         same_config=original.header.config_hash == replay.header.config_hash,
         cycles=(len(a.time_s), len(b.time_s)),
@@ -117,7 +123,9 @@ def compare(
     )
 
 
-def _difference(name: str, time_s: Floats, a: Floats, b: Floats, tolerance: float) -> Difference:
+def _difference(
+    name: str, columns: Sequence[str], time_s: Floats, a: Floats, b: Floats, tolerance: float
+) -> Difference:
     rows = min(len(a), len(b))
     if a.shape[1:] != b.shape[1:]:
         first_s = float(time_s[0]) if rows else 0.0
@@ -130,9 +138,9 @@ def _difference(name: str, time_s: Floats, a: Floats, b: Floats, tolerance: floa
     sizes = float(gap.max(initial=0.0)), rms, tuple(gap.max(axis=0, initial=0.0).tolist())
     bad = np.argwhere(gap > tolerance)
     if len(bad) == 0:
-        return Difference(name, rows, *sizes, None, None, bool(np.isfinite(tolerance)))
+        return Difference(name, rows, *sizes, None, None, decides=bool(np.isfinite(tolerance)))
     row, column = bad[0]
-    return Difference(name, rows, *sizes, float(time_s[row]), int(column))
+    return Difference(name, rows, *sizes, float(time_s[row]), int(column), columns[column])
 
 
 def _line(d: Difference) -> str:
@@ -141,7 +149,6 @@ def _line(d: Difference) -> str:
     if d.same:
         judged = "within its tolerance" if d.decides else "not judged"
         return f"{d.name}: {judged}; {d.largest:.3g} at most, {d.rms:.3g} RMS"
-    part = "axis" if d.name == "head_m" else "joint"
-    where = "" if d.first_column is None or d.name == "deadline_s" else f", {part} {d.first_column}"
+    where = f", {d.first_name}" if d.first_name else ""
     size = f"{d.largest:.3g} at most, {d.rms:.3g} RMS"
     return f"{d.name}: differs first at {d.first_s:.3f} s{where}; by {size}"

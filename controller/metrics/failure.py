@@ -28,8 +28,9 @@ class Failure:
 
     cause: Cause
     """The first that holds, in this order: safety stopped the run; the body rolled over at any
-    time; the joints did not follow; the body advanced too little, on a climb or on other ground; it
-    advanced, but not towards the waypoints; it was on its way and ran out of time."""
+    time; the time limit is shorter than what the plan takes; the joints did not follow; the body
+    advanced too little, on a climb or on other ground; it advanced, but not towards the waypoints;
+    it was on its way and ran out of time."""
     text: str
     """With the numbers that say so."""
 
@@ -37,7 +38,7 @@ class Failure:
 def failure(record: RunRecord) -> Failure | None:
     """Return what ended a run; None if it reached every waypoint, or had none, without a trip.
 
-    All but roll and trip is judged over the last ``WINDOW_S`` seconds.
+    All but trip, roll and the limit is judged over the last ``WINDOW_S`` seconds.
     """
     plan, pose, cycle = record.header.plan, record.pose, record.cycle
     trip = next((event.text for event in record.events if event.kind == "trip"), None)
@@ -53,6 +54,14 @@ def failure(record: RunRecord) -> Failure | None:
             "roll",
             f"rolled over after {pose.time_s[over[0]]:.0f} s, "
             f"up to {np.degrees(roll.max()):.0f} deg",
+        )
+    limit_s, speed_m_s = record.header.run.time_limit_s, plan.predicted_speed_m_s
+    way_m = length_m(plan.path_m) - plan.waypoint_radius_m
+    if way_m > speed_m_s * limit_s > 0.0:  # no body that does what was planned comes to the end
+        return Failure(
+            "time",
+            f"its path takes {way_m / speed_m_s:.0f} s at the {speed_m_s:.2f} m/s of the plan; "
+            f"time_limit_s is {limit_s:g}",
         )
     clamped = np.array([verdict == "clamp" for verdict in cycle.verdict], dtype=bool)
     clamped = clamped[cycle.time_s >= record.end_s - WINDOW_S]

@@ -127,10 +127,16 @@ def test_the_source_of_a_ground_stands_beside_the_world_that_names_it(
     )
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    assert build_ground(load_world("../w.toml")) is not None
+    world = load_world("../w.toml")
+    monkeypatch.chdir("/")  # where a log is replayed, its world is that of the header
+    assert build_ground(world) is not None
+    monkeypatch.chdir(tmp_path / "elsewhere")
     (tmp_path / "hill.npz").write_text("x,y\n1,2\n")
     with pytest.raises(ConfigError, match=r"is not an \.npz with an array 'elevation'"):
         build_ground(load_world("../w.toml"))
+    (tmp_path / "hill.npz").unlink()
+    with pytest.raises(ConfigError, match=r"ground\.source: hill\.npz: no such file beside"):
+        load_world("../w.toml")
 
 
 @pytest.mark.parametrize("name", ["nosuch", "missing/file.toml"])

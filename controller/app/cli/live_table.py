@@ -103,7 +103,10 @@ def _draw(line: Connection, make_decoder: MakeDecoder) -> None:
 
 def view(shown: Snapshot, recent: deque[DecodedPacket], columns: int) -> Group:
     """Counts, registers and the latest packets, each in one line."""
-    table = Table(*(shown.rows[0] if shown.rows else ()), box=None, header_style="bold")
+    # 80 columns hold the headings and the largest registers, a column apart
+    table = Table(box=None, header_style="bold", padding=(0, 1, 0, 0), pad_edge=False)
+    for heading in shown.rows[0] if shown.rows else ():
+        table.add_column(heading, min_width=len(heading), no_wrap=True)
     for row in shown.rows:
         style = "red" if row["error"] or not row["power"] else "" if row["torque"] else "dim"
         table.add_row(*(str(value) for value in row.values()), style=style)

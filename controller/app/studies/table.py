@@ -53,11 +53,8 @@ class CsvTable:
             whole = self._path.read_bytes()
             if not whole.endswith(b"\n"):
                 os.truncate(self._path, whole.rfind(b"\n") + 1)
-        self._path.parent.mkdir(parents=True, exist_ok=True)
         self._file = self._path.open("a", newline="")
         self._writer = csv.DictWriter(self._file, self._columns, restval="", lineterminator="\n")
-        if self._file.tell() == 0:
-            self._writer.writeheader()
         return self
 
     def __exit__(
@@ -66,8 +63,11 @@ class CsvTable:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Close."""
+        """Close; nothing is left of a table without rows."""
+        empty = self._file.tell() == 0
         self._file.close()
+        if empty:
+            self._path.unlink()
 
     def held(self, place: tuple[str, ...]) -> dict[str, str] | None:
         """Return the row of a place; None if the table does not hold it yet."""
@@ -76,6 +76,8 @@ class CsvTable:
     def append(self, row: Mapping[str, object]) -> None:
         """Append a row, and have it on the disk."""
         text = {key: str(value) for key, value in row.items()}
+        if self._file.tell() == 0:
+            self._writer.writeheader()
         self._writer.writerow(text)
         self._file.flush()
         os.fsync(self._file.fileno())

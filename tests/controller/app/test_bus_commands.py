@@ -1,41 +1,27 @@
-"""``scan``, ``doctor`` and ``bus set`` as a user calls them, on a pseudo-terminal."""
+"""``scan``, ``doctor`` and ``bus set`` as a user calls them, on a line of 16 servos."""
 
 import json
-import threading
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 
 from snakewalk.controller.app.cli.main import main
-from snakewalk.controller.app.service import doctor
-from snakewalk.controller.app.service.doctor import examine
-from snakewalk.controller.app.service.finding import Finding
-from snakewalk.drivers.clock import WallClock
-from snakewalk.sim.line.sim_line import SimLine
-from snakewalk.sim.serve.pty import PtyServer
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
+from tests.helpers.line_port import OpenedLine, line_port
 
 pytestmark = pytest.mark.usefixtures("device")
 
 
 @pytest.fixture
-def line() -> SimLine:
-    return SimLine(ServoBank(range(1, 17)), BenchPlant(16))
+def line() -> OpenedLine:
+    return OpenedLine(ServoBank(range(1, 17)), BenchPlant(16))
 
 
 @pytest.fixture
-def device(line: SimLine) -> Iterator[str]:
-    stop = threading.Event()
-    with PtyServer(line, WallClock()) as server:
-        thread = threading.Thread(target=server.serve, args=(stop.is_set,))
-        thread.start()
-        try:
-            yield server.path
-        finally:
-            stop.set()
-            thread.join()
+def device(line: OpenedLine) -> Iterator[str]:
+    with line_port(line) as name:
+        yield name
 
 
 def call(
@@ -59,24 +45,18 @@ def test_scan(
 
 
 def test_doctor(
-    device: str, line: SimLine, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    device: str,
+    line: OpenedLine,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    kept: list[Finding] = []
-
-    def keep(*given: Any, **options: Any) -> list[Finding]:
-        kept.extend(examine(*given, **options))
-        return kept
-
     line.bank["Hardware Error Status"][4] = 0x20
-    monkeypatch.setattr(doctor, "examine", keep)
     code, out, _ = call(monkeypatch, capsys, "doctor", "--port", device, "--json")
     found = json.loads(out)
     grades = {f["check"]: f["grade"] for f in found["findings"]}
     assert (grades["return delay"], grades["alarms"]) == ("warn", "fail")
     assert grades["model"] == grades["supply"] == "ok"
     assert (code, found["worst"]) == (1, "fail")
-    # the same findings in words: an examination on a pseudo-terminal waits for seconds
-    monkeypatch.setattr(doctor, "examine", lambda *given, **options: kept)
     code, out, _ = call(monkeypatch, capsys, "doctor", "--port", device)
     assert code == 1
     assert "servo 5: overload" in out
@@ -84,7 +64,10 @@ def test_doctor(
 
 
 def test_bus_set_shows_asks_and_writes(
-    device: str, line: SimLine, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    device: str,
+    line: OpenedLine,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     words = ("bus", "set", "--port", device, "--id", "16", "--new-id", "40")
     code, out, err = call(monkeypatch, capsys, *words)

@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import re
 import struct
 import subprocess
 import sys
@@ -192,7 +193,7 @@ def test_live_from_a_terminal(tmp_path: Path) -> None:
     assert "space: halt, go on" in shown
     assert "m: mirror" in shown, "no key breaks inside its words"
     assert "t: torque off" in shown
-    os.write(ours, b"mq")
+    os.write(ours, b"mnq")
     printed, said = process.communicate()
     os.close(ours)
     os.close(theirs)
@@ -200,6 +201,10 @@ def test_live_from_a_terminal(tmp_path: Path) -> None:
     found = json.loads(printed.splitlines()[-1])
     assert found["duration_s"] < 5.0
     assert "mirror = True" in said
+    became = re.search(r"^gait (\S+)$", said, re.M)
+    assert became is not None
+    assert became[1] != "rolling"
+    assert f"\n{became[1]} ━" in said, "the bar has the gait that moves"
 
 
 @pytest.mark.parametrize("columns", [80, 120])

@@ -11,7 +11,10 @@ from rich.console import Console
 
 from snakewalk.controller.app.cli.live_table import LiveScreen, Snapshot, view
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket, encode_instruction
+from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.serve.live_table import KEPT, LiveTable, servo_rows
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
 from snakewalk.sim.sniff.decode import Decoder
 from tests.helpers.bus import a_line
 
@@ -69,3 +72,16 @@ def test_the_view_has_a_row_a_servo_and_a_line_a_packet() -> None:
     assert len(shown) == 1 + 1 + 2 + 1
     assert "ping" in shown[-1]
     assert len(shown[-1].rstrip()) <= 40
+
+
+def test_80_columns_hold_the_headings_and_the_largest_values() -> None:
+    """Rows of a chain of which some measure their current and some their load."""
+    line = SimLine(ServoBank([1, 25], ["XM430-W350", "XL430-W250"]), BenchPlant(2))
+    line.bank["Goal Position"][:] = -1_048_575
+    line.bank["Present Velocity"][:] = -1023
+    rows = servo_rows(line)
+    text = io.StringIO()
+    Console(file=text, width=80).print(view(Snapshot("", rows, ()), deque(), 80))
+    _, headings, *shown = text.getvalue().splitlines()
+    assert headings.split() == list(rows[0])
+    assert [each.split() for each in shown[:2]] == [list(map(str, r.values())) for r in rows]

@@ -41,7 +41,7 @@ from tests.oracles.rendered_snake import SnakeScene, film
 MOTION_S = 0.2
 LOOKS = 5
 PENDULUM = "needs recordings of a pendulum: tests/controller/app/identification"
-BUS = "needs a bus: run on a pseudo-terminal by tests/controller/app (test_bus_commands and others)"
+BUS = "needs a bus: run on a simulated line by tests/controller/app (test_bus_commands and others)"
 FOUND = "needs what calibrate finds on a bus: tests/controller/app/test_chain_calibration.py"
 SEARCH = "a search takes 18 whole runs at least: tests/controller/app/test_set.py"
 NOT_RUN = {

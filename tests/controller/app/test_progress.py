@@ -4,7 +4,7 @@ from contextlib import suppress
 
 import pytest
 
-from snakewalk.controller.app.progress import PathBar
+from snakewalk.controller.app.progress import PathBar, TimeBar
 from snakewalk.controller.runtime.drive import Progress
 
 
@@ -22,6 +22,17 @@ def test_a_run_that_fails_before_its_first_cycle_leaves_no_bar(
 ) -> None:
     _run(0, OSError("no port"))
     assert capsys.readouterr().err == ""
+
+
+def test_the_bar_of_a_run_that_changes_its_gait_names_the_one_that_moves(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with TimeBar("rolling", 4.0, lambda gone_s: "rolling" if gone_s < 2.0 else "wheel") as bar:
+        for time_s in (1.0, 3.5):
+            bar.on_progress(Progress(time_s, 0.1, 0, 0.2, done=True))
+    shown = capsys.readouterr().err
+    assert "wheel" in shown
+    assert "rolling" not in shown
 
 
 def _run(cycles: int, error: OSError | None) -> None:

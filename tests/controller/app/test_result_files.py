@@ -1,7 +1,10 @@
 """Results are whole or absent: an error or a full disk in mid-write leaves an old file alone."""
 
 import ast
+import json
 import resource
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -250,3 +253,46 @@ def test_a_full_disk_ends_a_run_and_says_what_became_of_torque_and_log(
     )
     assert [path.name for path in folder.iterdir()] == ["log.mcap.part"]
     assert len(read_log(part).cycle.time_s) > 0
+
+
+BEFORE_WORK = [
+    "sweep rolling -o nosuch/a.csv",
+    "sweep rolling --picture nosuch/a.png",
+    "trials -o nosuch/a.csv",
+    "trials --picture nosuch/a.png",
+    "trials --picture held.png",
+    "tune rolling -o nosuch/a.toml",
+    "repertoire record -o nosuch/a.npz",
+    "repertoire show --picture nosuch/a.png",
+    "track worm-like -o nosuch/a.npz",
+    "walk --picture nosuch/a.png",
+    "gait show rolling --picture nosuch/a.png",
+]
+PROGRAM = """
+import json, sys
+from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli.command_line import app
+said = []
+for words in json.loads(sys.argv[1]):
+    try:
+        app(words.split())
+    except InputError as error:
+        said.append(str(error))
+heavy = {"numba", "scipy", "mujoco", "matplotlib", "networkx"} & set(sys.modules)
+print(json.dumps([said, sorted(heavy)]))
+"""
+
+
+def test_where_nothing_can_be_written_is_told_before_anything_heavy_is_imported(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "held.png").touch()
+    words = [sys.executable, "-c", PROGRAM, json.dumps(BEFORE_WORK)]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    said, heavy = json.loads(done.stdout)
+    expected = [
+        "held.png: exists; --force overwrites it" if "held" in command else "nosuch: no such folder"
+        for command in BEFORE_WORK
+    ]
+    assert said == expected
+    assert heavy == []

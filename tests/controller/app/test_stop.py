@@ -15,7 +15,9 @@ from snakewalk.controller.app.service import emergency_stop
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.drivers.safety.stop_button import StopButton
-from snakewalk.sim.serve.servo_bus import ServoBus
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+from tests.helpers.line_port import OpenedLine, line_port
 
 HUNG = """
 import signal, sys
@@ -44,6 +46,11 @@ def stop(
         return int(end.value.code or 0), shown.out, shown.err
 
     return call
+
+
+@pytest.fixture
+def three() -> OpenedLine:
+    return OpenedLine(ServoBank(range(1, 4)), BenchPlant(3))
 
 
 def test_a_simulated_run_is_stopped_from_another_program_and_its_log_says_so(
@@ -75,32 +82,36 @@ def test_a_simulated_run_is_stopped_from_another_program_and_its_log_says_so(
 
 
 def test_a_run_that_does_not_answer_is_killed_and_its_servos_switched_off_from_here(
-    servo_bus: Callable[..., ServoBus],
+    three: OpenedLine,
     stop: Callable[..., tuple[int, str, str]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     for name in ("LATCH_S", "END_S"):
         monkeypatch.setattr(emergency_stop, name, 0.05)
-    bus = servo_bus("1-3")
-    bus.line.bank["Torque Enable"][:] = 1
-    with subprocess.Popen(
-        [sys.executable, "-c", HUNG, bus.path], stdout=subprocess.PIPE, text=True
-    ) as child:
+    torque = three.bank["Torque Enable"]
+    torque[:] = 1
+    with (
+        line_port(three) as port,
+        subprocess.Popen(
+            [sys.executable, "-c", HUNG, port], stdout=subprocess.PIPE, text=True
+        ) as child,
+    ):
         assert child.stdout is not None
         assert child.stdout.readline() == "up\n"
-        code, out, err = stop("--port", bus.path, "--baud", "1000000", "--json")
+        code, out, err = stop("--port", port, "--baud", "1000000", "--json")
     killed, off = json.loads(out)["stopped"]
     assert (code, child.returncode) == (0, -9), err
     assert (killed["how"], killed["safe"]) == ("killed", False)
     assert off["text"] == "torque is off: 3 servos confirm it, 1000000 baud"
-    assert bus["Torque Enable"].tolist() == [0] * 3
+    assert torque.tolist() == [0] * 3
 
 
 def test_a_port_where_nobody_answers_ends_with_exit_code_1(
-    servo_bus: Callable[..., ServoBus], stop: Callable[..., tuple[int, str, str]]
+    three: OpenedLine, stop: Callable[..., tuple[int, str, str]]
 ) -> None:
-    bus = servo_bus("1-3", faults=None, baud=57_600)
-    code, out, _ = stop("--port", bus.path, "--baud", "1000000")
+    three.bank["Baud Rate"][:] = 1
+    with line_port(three) as port:
+        code, out, _ = stop("--port", port, "--baud", "1000000")
     assert code == 1
     assert "nobody answers: is the power on?" in out
 

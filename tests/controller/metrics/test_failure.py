@@ -104,6 +104,29 @@ def test_one_thing_wrong(record: RunRecord, wrong: dict[str, float], cause: str)
     assert found.cause == cause
 
 
+@pytest.mark.parametrize(
+    ("limit_s", "wrong", "cause"),
+    [
+        (118.0, {"progress": 0.2}, "time"),  # 29.7 m at 0.25 m/s take 118.8 s
+        (118.0, {"share": 0.3, "clamped": 0.5}, "time"),
+        (118.0, {"roll_deg": 70.0}, "roll"),
+        (119.0, {"progress": 0.2}, "steering"),
+        (119.0, {"share": 0.3}, "slip"),
+    ],
+)
+def test_a_limit_too_short_for_the_plan_is_told_whatever_else_went_on(
+    record: RunRecord, limit_s: float, wrong: dict[str, float], cause: str
+) -> None:
+    run = made(record, **wrong)
+    plan = dataclasses.replace(run.header.plan, predicted_speed_m_s=PREDICTED_M_S)
+    limited = run.header.run.model_copy(update={"time_limit_s": limit_s})
+    header = dataclasses.replace(run.header, plan=plan, run=limited)
+    found = failure(dataclasses.replace(run, header=header))
+    assert found is not None
+    assert found.cause == cause
+    assert ("time_limit_s is 118" in found.text) == (cause == "time")
+
+
 def test_a_run_that_reached_everything_has_no_failure(record: RunRecord) -> None:
     assert failure(made(record, seconds=130.0)) is None
 

@@ -89,6 +89,9 @@ def match(
     as_json: Json = False,
 ) -> None:
     """Lay a deformable fish over every frame: head, spine angles, and from the side its pitch."""
+    refuse_to_overwrite([output, picture], force)
+    check_picture(picture)
+
     from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
     from snakewalk.controller.app.recordings.fish_matching import (  # noqa: PLC0415
         MIDLINES,
@@ -98,8 +101,6 @@ def match(
     from snakewalk.controller.capture.fish.accuracy import compare  # noqa: PLC0415
     from snakewalk.controller.capture.fish.postures import load_postures, save_postures  # noqa: PLC0415
 
-    refuse_to_overwrite([output, picture], force)
-    check_picture(picture)
     _check_npz(output)
     if length is not None and not 0.0 < length < 1e3:
         raise InputError(f"--length: a body length in metres, above 0; not {length:g}")
@@ -159,14 +160,15 @@ def synthesise(
     as_json: Json = False,
 ) -> None:
     """Put segments of a film together anew, at random or through control points."""
+    refuse_to_overwrite([output, picture], force)
+    check_picture(picture)
+
     from snakewalk.controller.app.recordings.fish_synthesis import (  # noqa: PLC0415
         SynthesisOptions,
         synthesise_motion,
     )
     from snakewalk.controller.capture.fish.postures import load_postures  # noqa: PLC0415
 
-    refuse_to_overwrite([output, picture], force)
-    check_picture(picture)
     options = SynthesisOptions(
         through=_points(through or []), seconds=seconds, seed=seed, radius=radius, limit_s=limit,
         mirror=mirror, within_deg=within, merge_deg=merge, reference=reference, blend_s=blend,

@@ -65,13 +65,14 @@ def show_gait(
     as_json: Json = False,
 ) -> None:
     """Show a gait's parameters with ranges and units, its source, and how fast joints must be."""
+    check_picture(picture)
+    refuse_to_overwrite([picture], force)
+
     from snakewalk.controller.app.report.plots.gait import draw_gait  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_gait  # noqa: PLC0415
     from snakewalk.controller.gaits.gait import ranges  # noqa: PLC0415
     from snakewalk.controller.motion.gait_cycle import GaitCycle  # noqa: PLC0415
 
-    check_picture(picture)
-    refuse_to_overwrite([picture], force)
     prepared = prepare_gait(name, robot=robot, parameters=parameters(param))
     gait, body = prepared.gait, prepared.robot
     cycle = GaitCycle(gait, body)

@@ -1,6 +1,7 @@
 """``snakewalk gait run``: a gait on servos or in the simulator."""
 
 import math
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
     from snakewalk.controller.app.cli.gamepad import Gamepad
     from snakewalk.controller.app.cli.keyboard import Keyboard
+    from snakewalk.controller.app.runs.gait_run import GaitRun
     from snakewalk.controller.motion.gait_motion import GaitMotion
     from snakewalk.controller.motion.operator import Operator
     from snakewalk.controller.runtime.drive import OnEvent
@@ -108,7 +110,7 @@ def run_gait(
         prepared = replace(prepared, run=with_compliance(prepared.run, compliance))
         run = prepared.run
         folder = stack.enter_context(run_folder(f"gait-{run.name}-{prepared.robot.name}", out))
-        bar = stack.enter_context(TimeBar(run.name, seconds))
+        bar = stack.enter_context(TimeBar(run.name, seconds, _names(prepared, hands)))
         paced = (view or prepared.make_operator is not None) and port is None
         on_progress = in_real_time(bar.on_progress) if paced else bar.on_progress
         finished = execute(
@@ -166,6 +168,12 @@ class _Hands:
         self._devices = devices
         self._waiting: list[str] = []
         self._off = False
+        self._motion: GaitMotion | None = None
+
+    @property
+    def gait(self) -> str | None:
+        """Name of the gait that they have chosen; None before the run."""
+        return None if self._motion is None else self._motion.gait.name
 
     def torque_off(self) -> str | None:
         """Why torque goes off, asked by the safe link in every read and write; it stays so."""
@@ -180,6 +188,7 @@ class _Hands:
         """Put the keys that were pressed in charge of a motion."""
         from snakewalk.controller.motion.operator import Operator  # noqa: PLC0415
 
+        self._motion = motion
         return Operator(motion, robot, self._take, on_event, self._held)
 
     def _take(self) -> list[str]:
@@ -212,6 +221,17 @@ def _hands(stack: ExitStack, live: bool, gamepad: Path | None) -> _Hands | None:
         keys += ["hold LB or RB: it moves", "right stick pressed: torque off"]
     Console(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
     return _Hands(devices)
+
+
+def _names(prepared: "GaitRun", hands: _Hands | None) -> Callable[[float], str]:
+    """What moves at a time of the run: gaits change by keys or as planned."""
+    name = prepared.run.name
+    if hands is not None:
+        return lambda gone_s: hands.gait or name
+    return lambda gone_s: [
+        name,
+        *(change.name for change in prepared.config.then if change.at_s <= gone_s),
+    ][-1]
 
 
 def _change(text: str) -> tuple[float, str, dict[str, Any]]:

@@ -59,6 +59,10 @@ def sweep(
     as_json: Json = False,
 ) -> None:
     """Measure gaits over their parameters: speed, cost of transport, torque, heat, slip."""
+    check_picture(picture)
+    refuse_to_overwrite([picture], force)
+    refuse_to_overwrite([out], force=True)  # a table grows
+
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.studies.pool import each  # noqa: PLC0415
     from snakewalk.controller.app.studies.sweep_measure import measure  # noqa: PLC0415
@@ -66,9 +70,6 @@ def sweep(
     from snakewalk.controller.app.studies.sweep_table import Table as Sweep  # noqa: PLC0415
     from snakewalk.controller.app.studies.sweep_table import digest, read_table  # noqa: PLC0415
 
-    check_picture(picture)
-    refuse_to_overwrite([picture], force)
-    refuse_to_overwrite([out], force=True)  # a table grows
     require_extra("a sweep needs", "mujoco" if dask is None else "distributed")
     planned = plan_sweep(gaits, robot, points, seed=seed, seconds=seconds)
     for line in () if as_json else planned.left_out:
@@ -90,11 +91,12 @@ def sweep(
                 refused[row.ended] += 1
     for why, times in refused.items():
         LOGGER.warning("%d of %d points %s", times, len(missing), why)
-    rows = [asdict(one) for one in digest(read_table(out))]
+    held = read_table(out) if out.exists() else []
+    rows = [asdict(one) for one in digest(held)]
     if picture is not None:
         from snakewalk.controller.app.report.plots.sweep import draw_sweep  # noqa: PLC0415
 
-        draw_sweep(read_table(out), picture)
+        draw_sweep(held, picture)
     if as_json:
         found = {"table": str(out), "run": len(missing), "held": len(planned.points)}
         print(json.dumps(found | {"left_out": planned.left_out, "gaits": rows}))

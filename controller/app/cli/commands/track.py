@@ -54,6 +54,9 @@ def track(
     as_json: Json = False,
 ) -> None:
     """Examine recordings: wave, bends, states this robot can use, slowing for its servos."""
+    check_picture(picture)
+    refuse_to_overwrite([picture, output], force)
+
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.recordings.recording import examine  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.capture.readers.arrays import save_track  # noqa: PLC0415
@@ -61,11 +64,9 @@ def track(
     from snakewalk.controller.capture.readers.keypoints import ALL, choice_of  # noqa: PLC0415
     from snakewalk.controller.capture.readers.load import check_rate  # noqa: PLC0415
 
-    check_picture(picture)
     names = recordings or list(EMBEDDED)
     if output is not None and (len(names) > 1 or output.suffix.lower() != ".npz"):
         raise InputError(f"{output}: one recording makes one .npz; {len(names)} are named")
-    refuse_to_overwrite([picture, output], force)
     check_rate(rate, names)
     choice = choice_of(individual, keypoints, plane)
     found = [

@@ -13,9 +13,9 @@ from rich.table import Table
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli import completion
-from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, TrackFile, World, console
+from snakewalk.controller.app.cli.options import DEFAULT_RUN, Force, Json, TrackFile, World, console
 from snakewalk.controller.app.messages import LOGGER
-from snakewalk.controller.app.result_files import check_picture
+from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
 _HEADS = {
     "run": "run",
@@ -94,6 +94,7 @@ def trials(
         Path | None,
         typer.Option(help="draw what was complete and why not (.png, .svg, .pdf)"),
     ] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Simulate runs or gaits over seeds; tabulate what was reached, and why not.
@@ -101,12 +102,15 @@ def trials(
     Each seed moves the start, so that its runs differ also where the motion takes no chances. A run
     is the same for the same files: after an update of the program begin a new --out.
     """
+    check_picture(picture)
+    refuse_to_overwrite([picture], force)
+    refuse_to_overwrite([out], force=True)  # a table grows
+
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.runs.factory import moves_by_gait  # noqa: PLC0415
     from snakewalk.controller.app.studies import trials as study  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.studies.trials_table import TrialsTable  # noqa: PLC0415
 
-    check_picture(picture)
     require_extra("trials need", "mujoco")
     motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
     overs = [study.parse_over(text) for text in over or ()]

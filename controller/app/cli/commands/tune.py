@@ -33,15 +33,16 @@ def tune(
     as_json: Json = False,
 ) -> None:
     """Search a gait's parameters for speed or efficiency, and compare with the defaults."""
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: a set of parameters ends in .toml")
+    refuse_to_overwrite([out], force)
+
     from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
     from snakewalk.controller.app.studies import tune as search  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.studies.sweep_points import robot_file  # noqa: PLC0415
     from snakewalk.controller.gaits.gait import fitting_robot  # noqa: PLC0415
     from snakewalk.controller.gaits.registry import make_gait  # noqa: PLC0415
 
-    if out is not None and out.suffix != ".toml":
-        raise InputError(f"{out}: a set of parameters ends in .toml")
-    refuse_to_overwrite([out], force)
     require_extra("tuning needs", "mujoco")
     body = robot or fitting_robot([make_gait(gait).needs])
     body = robot_file(body) or body  # the set may lie in another folder

@@ -38,12 +38,13 @@ def walk(
     as_json: Json = False,
 ) -> None:
     """Walk graphs of states until all are seen: how many steps, and how soon states come again."""
+    check_picture(picture)
+    refuse_to_overwrite([picture], force)
+
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.studies.graph_study import graph_source, run_study  # noqa: PLC0415
     from snakewalk.controller.shape.walks import RULES, check_rule  # noqa: PLC0415
 
-    check_picture(picture)
-    refuse_to_overwrite([picture], force)
     graphs, rules = graph or ["er:1000:9"], rule or list(RULES)
     for spec in graphs:  # refuse bad input before any work starts
         graph_source(spec)

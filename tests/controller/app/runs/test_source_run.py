@@ -1,7 +1,6 @@
 """A user's own motion source: checked before torque, run over the physics, held by its log."""
 
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +21,9 @@ from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.source import MotionSource, Pace
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.drivers.types import BodyPose
-from snakewalk.sim.serve.servo_bus import ServoBus
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+from tests.helpers.line_port import OpenedLine, line_port
 
 
 class Bend:
@@ -185,8 +186,9 @@ def test_no_walk_is_prepared_of_another_motion(motion: str) -> None:
 
 
 def test_a_run_on_a_port_is_replayed(tmp_path: Path) -> None:
-    with closing(ServoBus("1-16", baud=1_000_000)) as bus:
-        served = execute(prepare_source(Bend, seconds=0.4), tmp_path, str(bus.path))
+    with line_port(OpenedLine(ServoBank(range(1, 17)), BenchPlant(16))) as port:
+        served = execute(prepare_source(Bend, seconds=0.4), tmp_path, port)
+    assert served.record.header.backend == port
     assert served.record.header.initial_pose is None
     replay(served.record, tmp_path / "again.mcap")
 

@@ -60,6 +60,8 @@ def play_actions(
     as_json: Json = False,
 ) -> None:
     """Play recorded actions on servos or in the simulator, as wanted speed and turn ask for."""
+    refuse_to_overwrite([picture], force)
+    check_picture(picture)
     import numpy as np  # noqa: PLC0415  --help stays quick
 
     from snakewalk.config.playback import ScheduleConfig  # noqa: PLC0415  heavy; --help stays quick
@@ -76,8 +78,6 @@ def play_actions(
     asked = ScheduleConfig() if schedule is None else read_schedule(schedule)
     if seconds is not None and seconds <= 0.0:
         raise InputError(f"--seconds {seconds:g}: must be over 0")
-    refuse_to_overwrite([picture], force)
-    check_picture(picture)
     prepared = prepare_schedule(
         file,
         asked.model_copy(update=changes),

@@ -48,6 +48,9 @@ def record(
     as_json: Json = False,
 ) -> None:
     """Run forward, left and right actions on the physics and keep a settled cycle of each."""
+    check_picture(picture)
+    refuse_to_overwrite([out, picture], force)
+
     from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
     from snakewalk.controller.app.studies.repertoire_planning import default_file, flat  # noqa: PLC0415
@@ -57,7 +60,6 @@ def record(
     flat(ground)
     file = out or default_file(robot, world)
     refuse_to_overwrite([file, picture], force)
-    check_picture(picture)
     require_extra("recording needs", "mujoco")
     with ProgressBar("record", float(len(ACTIONS))) as bar:
         begun: list[str] = []
@@ -85,11 +87,12 @@ def show_file(
     as_json: Json = False,
 ) -> None:
     """Show the actions of a repertoire: speed, turn and closure error of a cycle."""
+    refuse_to_overwrite([picture], force)
+    check_picture(picture)
+
     from snakewalk.controller.repertoire.repertoire import load_repertoire  # noqa: PLC0415
 
     repertoire = load_repertoire(file)
-    refuse_to_overwrite([picture], force)
-    check_picture(picture)
     if picture is not None:
         from snakewalk.controller.app.report.plots import repertoire as plots  # noqa: PLC0415
 
@@ -110,9 +113,10 @@ def run_plan(
     as_json: Json = False,
 ) -> None:
     """Run a plan on servos or in the simulator, and compare predicted with measured poses."""
+    refuse_to_overwrite([picture], force)
+
     from snakewalk.controller.app.studies.repertoire_planning import load_plan  # noqa: PLC0415  heavy
 
-    refuse_to_overwrite([picture], force)
     job = load_plan(plan, replan=not open_loop)
     found, complete = carry_out(job, port, out, film, picture, force)
     show({"plan": str(plan), **found}, as_json)

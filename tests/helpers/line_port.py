@@ -1,0 +1,57 @@
+"""A simulated line where ports are opened: commands on a port, in simulated time and one thread.
+
+A server on the machine's clock answers too late as soon as the machine is busy, and the command
+under test then says what it says of a bad bus.
+"""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Self
+from unittest import mock
+
+from snakewalk.drivers.port import network_port
+from snakewalk.sim.line.sim_line import SimLine
+
+_OPENERS = (
+    "snakewalk.drivers.port.network_port.open_port",
+    "snakewalk.controller.app.service.torque_off.open_port",
+    "snakewalk.controller.app.runs.backend.open_port",
+)
+
+
+class OpenedLine(SimLine):
+    """What ``open_port`` gives, besides the line."""
+
+    latency_s = 0.0
+    latency_timer_ms = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+@contextmanager
+def line_port(line: OpenedLine) -> Iterator[str]:
+    """Yield a device that exists, and opens ``line``; all other devices are opened as ever."""
+    master, slave = os.openpty()
+    device, really = os.ttyname(slave), network_port.open_port
+
+    def opened(name: str, baud: int = 1_000_000) -> Any:
+        if name != device:
+            return really(name, baud)
+        line.setBaudRate(baud)
+        return line
+
+    patches = [mock.patch(each, opened) for each in _OPENERS]
+    try:
+        for each in patches:
+            each.start()
+        yield device
+    finally:
+        for each in patches:
+            each.stop()
+        os.close(master)
+        os.close(slave)
