@@ -49,6 +49,9 @@ STALL_CURRENT_A: Mapping[str, float] = {
 model of the X series, "Specifications"; XD models as their XH twins."""
 _LIMIT_SHARE = 2.0 / 2.3
 """Of the stall current, up to which a run goes on (ours): 2 A of an XM430."""
+_LAST_ID = 252
+SIMULATED = "sim"
+"""The port of servos that are simulated while the others of the chain are real."""
 _PROTOCOL_1 = ("AX-", "RX-", "EX-", "DX-")
 
 
@@ -258,6 +261,19 @@ class ImuConfig(Strict):
 _SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 
 
+class PortConfig(Strict):
+    """One adapter, and the segment of the chain that is behind it."""
+
+    port: str = Field(
+        min_length=1,
+        description="a device such as /dev/ttyUSB0, a URL such as socket://host:5000, or sim: "
+        "these servos are simulated, beside real ones",
+    )
+    ids: tuple[int, ...] = Field(
+        min_length=1, description="of all servos on it, and of the IMU where it is on it"
+    )
+
+
 class LimbsConfig(Strict):
     """A pair of legs at one link of the spine, mirror images: left, then right.
 
@@ -346,6 +362,11 @@ class RobotConfig(Strict):
     )
     servo: ServoConfig = ServoConfig()
     imu: ImuConfig | None = Field(None, description="a table [imu]; default: there is none")
+    ports: tuple[PortConfig, ...] = Field(
+        (),
+        description="tables [[ports]], where segments of the chain are on adapters of their own, "
+        "for --port robot; default: all servos are on the one port of --port",
+    )
 
     @model_validator(mode="after")
     def _axes_of_the_joints(self) -> Self:
@@ -427,8 +448,8 @@ class RobotConfig(Strict):
     @model_validator(mode="after")
     def _ids_fit_the_bus(self) -> Self:
         ids = self.servo_ids
-        if max(ids) > 252:
-            raise ValueError(f"servo IDs would run to {max(ids)}; the bus has 0 to 252")
+        if max(ids) > _LAST_ID:
+            raise ValueError(f"servo IDs would run to {max(ids)}; the bus has 0 to {_LAST_ID}")
         twice = sorted(each for each, count in Counter(ids).items() if count > 1)
         if twice:
             raise ValueError(f"joints: ID {', '.join(map(str, twice))} is of more than one joint")
@@ -440,6 +461,30 @@ class RobotConfig(Strict):
             raise ValueError(f"imu: link {self.imu.link} of {self.link_count}: 0 is the head")
         if self.imu is not None and self.imu.id in self.servo_ids:
             raise ValueError(f"imu: id {self.imu.id} is a joint's")
+        return self
+
+    @model_validator(mode="after")
+    def _ports_have_every_id(self) -> Self:
+        if not self.ports:
+            return self
+        needed = [*self.servo_ids, *(() if self.imu is None else (self.imu.id,))]
+        told = Counter(each for port in self.ports for each in port.ids)
+        names = Counter(port.port for port in self.ports)
+        for what, wrong in (
+            ("is on none of them", [each for each in needed if each not in told]),
+            ("is on more than one", [each for each, count in told.items() if count > 1]),
+            ("is not of this robot", [each for each in told if each not in needed]),
+        ):
+            if wrong:
+                raise ValueError(f"ports: ID {', '.join(map(str, sorted(wrong)))} {what}")
+        twice = [name for name, count in names.items() if count > 1]
+        if twice:
+            raise ValueError(f"ports: {twice[0]} is named twice: one table a port")
+        bare = [port.port for port in self.ports if not set(port.ids) & set(self.servo_ids)]
+        if bare:
+            raise ValueError(f"ports: {bare[0]} has no servo: an IMU shares a segment's port")
+        if len(self.ports) == 1:
+            raise ValueError("ports: only one: leave the table out, and name it by --port")
         return self
 
     @model_validator(mode="after")
@@ -722,9 +767,12 @@ class RobotConfig(Strict):
     def joint_name(self, joint: int) -> str:
         """Name of a joint in all messages: its place, counted from 1 at the head, and servo ID.
 
-        Of a leg, the side and the link of the spine are told as well.
+        Of a leg, the side and the link of the spine are told as well; where segments of the chain
+        are on ports of their own, the port.
         """
-        name = f"joint {joint + 1} (ID {self.servo_ids[joint]})"
+        servo_id = self.servo_ids[joint]
+        on = "".join(f" on {each.port}" for each in self.ports if servo_id in each.ids)
+        name = f"joint {joint + 1} (ID {servo_id}{on})"
         if joint < len(self.joint_axes):
             return name
         limb = self.limb_joints[joint - len(self.joint_axes)]

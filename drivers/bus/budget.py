@@ -121,9 +121,23 @@ def chain_budget(servos: int, baud: int, *, fast: bool) -> WireBudget:
 
 
 def robot_budget(robot: RobotConfig, baud: int, *, fast: bool) -> WireBudget:
-    """``chain_budget`` of a robot's servos, and of its IMU where it has one."""
-    budget = chain_budget(robot.joint_count, baud, fast=fast)
-    if robot.imu is None:
+    """``chain_budget`` of a robot's servos, and of its IMU where it has one.
+
+    Where segments are on ports of their own, that of the busiest port: all of them run at once.
+    """
+    if not robot.ports:
+        return _port_budget(robot.joint_count, baud, fast=fast, with_imu=robot.imu is not None)
+    imu = set() if robot.imu is None else {robot.imu.id}
+    budgets = (
+        _port_budget(len(set(port.ids) - imu), baud, fast=fast, with_imu=bool(imu & set(port.ids)))
+        for port in robot.ports
+    )
+    return max(budgets, key=lambda budget: budget.cycle_s)
+
+
+def _port_budget(servos: int, baud: int, *, fast: bool, with_imu: bool) -> WireBudget:
+    budget = chain_budget(servos, baud, fast=fast)
+    if not with_imu:
         return budget
     return replace(
         budget,

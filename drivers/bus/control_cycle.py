@@ -88,8 +88,8 @@ class ControlCycle:
         self._default_order = tuple(range(len(ids)))
         self._order = self._default_order
         self._requests: dict[tuple[bool, int, tuple[int, ...]], GroupReadRequest] = {}
-        self._read_address = read_address
-        self._length = read_bytes
+        self.read_address, self.read_bytes = read_address, read_bytes
+        """Of the block."""
         self._latency_s = latency_s
         self._failed_in_a_row = 0
         self._clean_in_a_row = 0
@@ -101,9 +101,19 @@ class ControlCycle:
             self._fast_path = SerialFastPath(
                 port, self._goals, self._default_request, latency_s=latency_s, spin_s=spin_s
             )
+        self._awaited: tuple[GroupReadRequest, tuple[int, ...], SerialFastPath | float] = (
+            *(self._default_request, self._default_order),
+            self._sent_until_s,
+        )
+        """Request whose reply is awaited, its order, and what receives it, else until when."""
         self.fast = fast
         """Whether the next read is a fast one."""
         self.counters = CycleCounters()
+
+    @property
+    def given_up_on(self) -> tuple[str, ...]:
+        """The port's name, where fast reads were given up on it."""
+        return (self._port.name,) if self.counters.fast_given_up else ()
 
     @property
     def since_sent_s(self) -> float:
@@ -133,7 +143,8 @@ class ControlCycle:
             PortError: the port is gone.
 
         """
-        return self._read(goals)
+        self.begin_read(goals)
+        return self.finish_read()
 
     def read(self) -> GroupReadReply:
         """Read the block of all servos; ``data`` is (N, read_bytes).
@@ -142,22 +153,41 @@ class ControlCycle:
             PortError: the port is gone.
 
         """
-        return self._read(None)
+        self.begin_read()
+        return self.finish_read()
 
-    def _read(self, goals: NDArray[np.int32] | None) -> GroupReadReply:
-        """Send the request, behind goals if there are any, and receive the reply."""
+    def begin_read(self, goals: NDArray[np.int32] | None = None) -> None:
+        """Send the request, behind goals (N,) if there are any; ``finish_read`` has the reply.
+
+        Between the two, requests may begin on other ports.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
         self.counters.reads += 1
-        fast_path, request, order = self._fast_path, self._next_request(), self._order
-        raw = None
-        if fast_path is not None and request is self._default_request:
-            found = fast_path.transact(goals)
+        fast_path, request = self._fast_path, self._next_request()
+        if fast_path is not None and request is self._default_request and fast_path.begin(goals):
+            self._awaited = request, self._order, fast_path
+        else:
+            self._awaited = request, self._order, self._begin_read(request, goals)
+
+    def finish_read(self) -> GroupReadReply:
+        """Receive the reply to the request of ``begin_read``.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        request, order, by = self._awaited
+        if isinstance(by, float):
+            raw, reply = self._receive(request, b"", by)
+        else:
+            found = by.finish()
             if isinstance(found, GroupReadReply):
                 self._succeeded()
                 return found
-            if found is not None:
-                raw, reply = self._receive_rest(request, found, fast_path.remaining_s)
-        if raw is None:
-            raw, reply = self._transact(request, goals)
+            raw, reply = self._receive_rest(request, found, by.remaining_s)
         responded = reply.answered
         if not self._pending.empty:
             reply = self._without_late(request, reply)
@@ -165,11 +195,11 @@ class ControlCycle:
             self._succeeded()
         else:
             self._failed(request, reply, responded, timed_out=len(raw) < request.reply_bytes)
-        if order == self._default_order and self._length == reply.data.shape[1]:
+        if order == self._default_order and self.read_bytes == reply.data.shape[1]:
             return reply
         back = np.argsort(order)
         return GroupReadReply(
-            reply.data[back, : self._length],
+            reply.data[back, : self.read_bytes],
             reply.valid[back],
             reply.error[back],
             reply.answered[back],
@@ -193,7 +223,7 @@ class ControlCycle:
 
     def _next_request(self) -> GroupReadRequest:
         """The default request, unless order, kind or length must differ now."""
-        length, default = self._length, self._default_request
+        length, default = self.read_bytes, self._default_request
         none_pending = self._pending.empty
         if self._order is self._default_order and self.fast is default.fast and none_pending:
             return default
@@ -206,7 +236,7 @@ class ControlCycle:
             if len(self._requests) >= _KEPT_REQUESTS:
                 self._requests.clear()
             ids = [self._ids[k] for k in self._order]
-            request = GroupReadRequest(ids, self._read_address, length, fast=self.fast)
+            request = GroupReadRequest(ids, self.read_address, length, fast=self.fast)
             self._requests[key] = request
         return request
 
@@ -219,15 +249,12 @@ class ControlCycle:
             self._sent_until_s = now_s + self._fast_path.reserve_line(wire_s)
         self._port.write(packet)
 
-    def _transact(
-        self, request: GroupReadRequest, goals: NDArray[np.int32] | None
-    ) -> tuple[bytes, GroupReadReply]:
-        """Send, and receive until the reply is complete or the deadline has passed."""
+    def _begin_read(self, request: GroupReadRequest, goals: NDArray[np.int32] | None) -> float:
+        """Send a request; until when its reply is awaited."""
         goal_packet = b"" if goals is None else self._goals.encode(goals)
         self._port.clearPort()
         self._send(goal_packet + request.packet)
-        wait_s = self._wire_s(request.reply_bytes) + self._latency_s
-        return self._receive(request, b"", self._sent_until_s + wait_s)
+        return self._sent_until_s + self._wire_s(request.reply_bytes) + self._latency_s
 
     def _receive_rest(
         self, request: GroupReadRequest, raw: bytes, remaining_s: float

@@ -22,7 +22,7 @@ from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.bus.probe import Probe, probe
 from snakewalk.drivers.bus.register_io import check_accepted, read_register, write_register
 from snakewalk.drivers.errors import BusError, ControlTableError, NoAnswerError
-from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.port.byte_port import BytePort, reopen
 from snakewalk.drivers.protocol.control_table import ControlTable, Register, load_control_table
 from snakewalk.drivers.protocol.packet import (
     ALERT,
@@ -85,6 +85,24 @@ class DynamixelBus:
         self._tries = max(1, tries)
         self._pending = PendingReplies(port.clock)
         self._sdk = sdk.PacketHandler(2.0)
+
+    @property
+    def parts(self) -> "tuple[DynamixelBus, ...]":
+        """Itself: what ``SegmentedBus`` has one of for each port."""
+        return (self,)
+
+    def port_of(self, servo_id: int) -> BytePort:
+        """Port that a servo, or another device, is on."""
+        return self.port
+
+    def reopen(self) -> None:
+        """Close and open the port.
+
+        Raises:
+            PortError: it is not there.
+
+        """
+        reopen(self.port)
 
     def ping(self, servo_id: int) -> PingReply:
         """Ping one servo.

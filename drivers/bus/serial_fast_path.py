@@ -157,6 +157,7 @@ class SerialFastPath:
         self._plan[FAST] = request.fast
         self._plan[LATENCY_NS], self._plan[SPIN_NS] = latency_s * 1e9, spin_s * 1e9
         self._baud = 0
+        self._awaited = -1, False
 
     def reserve_line(self, wire_s: float) -> float:
         """Note that something else is sent now; returns how long until all has left the line, s."""
@@ -183,11 +184,8 @@ class SerialFastPath:
         values[:] = goals
         return int(_send_goals(fd, self._work, values, self._plan))
 
-    def transact(self, goals: NDArray[np.int32] | None) -> GroupReadReply | bytes | None:
-        """Send the request, behind ``goals`` (N,) if there are any, and receive the reply.
-
-        Returns:
-            The reply; the bytes that arrived, if they are irregular; None if nothing was sent.
+    def begin(self, goals: NDArray[np.int32] | None) -> bool:
+        """Send the request, behind ``goals`` (N,) if there are any; False if nothing was sent.
 
         Raises:
             PortError: the port is gone.
@@ -195,24 +193,34 @@ class SerialFastPath:
         """
         fd = self._port.descriptor
         if fd is None:
-            return None
+            return False
         values = _NO_GOALS
         if goals is not None:
             values = self._values
             values[:] = goals
-        work, plan = self._work, self._plan
-        sent = _send_request(fd, work, values, plan)
-        # from here on the bytes are on the line: time that costs nothing
+        sent = _send_request(fd, self._work, values, self._plan)
         begin = self._write_bytes if goals is None else 0
         if sent < self._request_end - begin:
             if not sent:
-                return None
-            self._port.write(work[begin + sent : self._request_end].tobytes())
+                return False
+            self._port.write(self._work[begin + sent : self._request_end].tobytes())
+        self._awaited = fd, goals is not None
+        return True
+
+    def finish(self) -> GroupReadReply | bytes:
+        """Receive the reply to the request of ``begin``.
+
+        Returns:
+            The reply; the bytes that arrived, if they are irregular.
+
+        """
+        # while the bytes are on the line: time that costs nothing
+        fd, with_goals = self._awaited
         if self._port.getBaudRate() != self._baud:
             self._update_wire_times()
         data = np.empty(self._shape, np.uint8)
         reply = self._request.regular(FLAWLESS, data, self._error)
-        found = _receive(fd, work, data, goals is not None, plan)
+        found = _receive(fd, self._work, data, with_goals, self._plan)
         if found == FLAWLESS:
             return reply
         if found > IRREGULAR:

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import ImuConfig
 from snakewalk.drivers.attitude import AttitudeFilter
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.errors import ChainError, NoAnswerError
 from snakewalk.drivers.protocol.imu_table import BLOCK_BYTES, IMU_TABLES, ImuSample, decode
 from snakewalk.drivers.types import ImuState
@@ -20,8 +20,8 @@ SILENT_S = 1.0
 class ImuReader:
     """Reads the IMU of ``config`` on ``bus``, once a call."""
 
-    def __init__(self, bus: DynamixelBus, config: ImuConfig) -> None:
-        self._bus, self._config = bus, config
+    def __init__(self, bus: ChainBus, config: ImuConfig) -> None:
+        self._bus, self._config, self._port = bus, config, bus.port_of(config.id)
         self._cycle = bus.device_block(config.id, IMU_TABLES[config.model].address, BLOCK_BYTES)
         in_link = Rotation.from_euler("xyz", config.mounting_deg, degrees=True).as_matrix()
         self._to_link: Floats = np.asarray(in_link)
@@ -43,7 +43,7 @@ class ImuReader:
             reply = self._bus.ping(config.id)
         except NoAnswerError:
             raise ChainError(
-                f"imu (ID {config.id}): no answer at {self._bus.port.getBaudRate()} baud: power, "
+                f"imu (ID {config.id}): no answer at {self._port.getBaudRate()} baud: power, "
                 "cable, id or baud rate; without one, take [imu] out of the robot's file"
             ) from None
         if number is not None and reply.model_number != number:
@@ -60,7 +60,7 @@ class ImuReader:
 
         """
         reply = self._cycle.read()
-        now_s = self._bus.port.clock.now_s()
+        now_s = self._port.clock.now_s()
         measured_at_s = now_s - self._cycle.since_sent_s
         if reply.valid[0]:
             self._take(decode(self._config, reply.data[0].tobytes()), measured_at_s)

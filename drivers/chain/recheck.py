@@ -8,7 +8,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import Inspection, inspect
 from snakewalk.drivers.errors import ChainFault, FaultCause
@@ -39,7 +39,7 @@ class Recheck:
 
 
 def recheck(
-    bus: DynamixelBus,
+    bus: ChainBus,
     robot: RobotConfig,
     units: JointUnits,
     before: Inspection | None,

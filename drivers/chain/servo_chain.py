@@ -1,7 +1,7 @@
 """The chain of servos as a joint link: radians to raw goals, raw blocks to a ``JointState``."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,8 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Int32s, Ints
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.budget import WireBudget, robot_budget
-from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, ControlCycle, CycleCounters
+from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
+from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, CycleCounters
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Readings
@@ -24,7 +25,6 @@ from snakewalk.drivers.chain.start_up import (
 )
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import BusError, ChainError, PortError
-from snakewalk.drivers.port.byte_port import BytePort, reopen
 from snakewalk.drivers.protocol.registers import (
     WATCHDOG_TICKS_MAX,
     WATCHDOG_TRIPPED,
@@ -56,7 +56,7 @@ class ServoChain:
 
     def __init__(
         self,
-        bus: DynamixelBus,
+        bus: ChainBus,
         robot: RobotConfig,
         *,
         watchdog_s: float = 0.2,
@@ -81,8 +81,11 @@ class ServoChain:
         self.on_event: Callable[[str], None] = lambda line: None
         """Gets a line on each setting that another program has left in a servo, and when fast reads
         are given up."""
+        self.on_state: Callable[[JointState], None] = lambda state: None
+        """Gets each state that was read."""
         self._bus = bus
-        self._clock = bus.port.clock
+        self._port = bus.port_of(robot.servo_ids[0])
+        self._clock = self._port.clock
         tables = [bus.table_of(servo_id) for servo_id in robot.servo_ids]
         self._units = JointUnits.of(robot, [ServoUnits.of(table) for table in tables])
         # rounded up: at least the time that was asked for
@@ -104,11 +107,6 @@ class ServoChain:
     def joint_count(self) -> int:
         """Number of joints J."""
         return self.robot.joint_count
-
-    @property
-    def port(self) -> BytePort:
-        """The line."""
-        return self._bus.port
 
     @property
     def clock(self) -> Clock:
@@ -195,13 +193,13 @@ class ServoChain:
             raise
 
     def reopen(self) -> None:
-        """Close and open the port again.
+        """Close and open the port again; of several, those that are gone.
 
         Raises:
             PortError: it is still not there.
 
         """
-        reopen(self.port)
+        self._bus.reopen()
 
     def hold(self) -> None:
         """Set all goals to the positions that were last read.
@@ -237,57 +235,80 @@ class ServoChain:
     def disable(self) -> None:
         """Torque off, then the watchdog, on every servo, also where others fail.
 
-        Servos that do not confirm it in a group read are asked once more, for a limited time.
+        Servos that do not confirm it in a group read are asked once more, for a limited time. Where
+        one of several ports is gone, the servos on the others are off before it is waited for.
 
         Raises:
             BusError: servos that did not confirm; their watchdog stays armed and stops them.
-            PortError: the port is gone and does not come back; the watchdog stops the servos.
+            PortError: a port is gone and does not come back; the watchdog stops its servos.
 
         """
         self._armed = False
-        try:
-            self._send_torque_off()
-            silent = self._without_torque_off()
-        except PortError as error:
-            raise PortError(
-                f"{error}; torque is not off: a servo that has torque holds where its bus watchdog "
-                f"({self._watchdog_s:.3g} s) stops it: switch the servo power off"
-            ) from error
-        if silent:
-            names = ", ".join(map(self.robot.joint_name, silent))
+        give_up_s = self._clock.now_s() + _PORT_PATIENCE_S
+        on = {part: self._joints_on(part) for part in self._bus.parts}
+        gone: list[DynamixelBus] = []
+        for part, joints in on.items():
+            try:
+                part.sync_write(self._ids_of(joints), "Torque Enable", 0)
+            except PortError:
+                gone.append(part)
+        silent: list[int] = []
+        faults: list[PortError] = []
+        for part in sorted(on, key=gone.__contains__):
+            try:
+                if part in gone:
+                    self._wait_to_send_torque_off(part, on[part], give_up_s)
+                silent += self._without_torque_off(part, on[part])
+            except PortError as error:
+                faults.append(error)
+        names = ", ".join(map(self.robot.joint_name, sorted(silent)))
+        if faults:
+            which = "its servos: a servo" if len(on) > 1 else "a servo"
+            text = (
+                f"{'; '.join(map(str, faults))}; torque is not off: {which} that has torque holds "
+                f"where its bus watchdog ({self._watchdog_s:.3g} s) stops it: switch the servo "
+                "power off"
+            )
+            if len(on) > len(faults) and not silent:
+                text += "; on the other ports torque is off"
+            raise PortError(f"{text}; {names}: not confirmed" if names else text) from faults[0]
+        if names:
             raise BusError(f"{names}: torque off is not confirmed")
 
-    def _send_torque_off(self) -> None:
-        """Torque off to all, unconfirmed; waits a little for a port that is gone."""
-        give_up_s = self._clock.now_s() + _PORT_PATIENCE_S
-        while True:
-            try:
-                self._bus.sync_write(self.robot.servo_ids, "Torque Enable", 0)
-                return
-            except PortError:
-                late = self._clock.now_s() >= give_up_s
-                try:
-                    reopen(self._bus.port)  # it may be back
-                except PortError:
-                    if late:
-                        raise
-                    self._clock.sleep_until_s(self._clock.now_s() + _REOPEN_S)
-                else:
-                    if late:
-                        raise
+    def _joints_on(self, part: DynamixelBus) -> list[int]:
+        """Joints whose servos are on one of the ports."""
+        return [k for k, i in enumerate(self.robot.servo_ids) if self._bus.port_of(i) is part.port]
 
-    def _without_torque_off(self) -> list[int]:
+    def _ids_of(self, joints: Iterable[int]) -> list[int]:
+        return [self.robot.servo_ids[joint] for joint in joints]
+
+    def _wait_to_send_torque_off(
+        self, part: DynamixelBus, joints: Sequence[int], give_up_s: float
+    ) -> None:
+        """Torque off, unconfirmed, on a port that is gone: wait a little, it may be back."""
+        while True:
+            late = self._clock.now_s() >= give_up_s
+            try:
+                part.reopen()
+                part.sync_write(self._ids_of(joints), "Torque Enable", 0)
+            except PortError:
+                if late:
+                    raise
+                self._clock.sleep_until_s(self._clock.now_s() + _REOPEN_S)
+            else:
+                return
+
+    def _without_torque_off(self, bus: DynamixelBus, on_it: Sequence[int]) -> list[int]:
         """Joints that do not confirm that their torque is off; the others' watchdogs are off."""
-        bus, ids = self._bus, self.robot.servo_ids
-        joints = list(range(self.joint_count))
+        ids, joints = self.robot.servo_ids, list(on_it)
         for _ in range(_OFF_ROUNDS):
-            asked = [ids[joint] for joint in joints]
+            asked = self._ids_of(joints)
             reply = bus.block(asked, "Torque Enable", "Torque Enable", fast=False).read()
             off = reply.valid & (reply.data[:, 0] == 0)
             joints = [joint for joint, done in zip(joints, off, strict=True) if not done]
             if not joints:
                 break
-            bus.sync_write([ids[joint] for joint in joints], "Torque Enable", 0)
+            bus.sync_write(self._ids_of(joints), "Torque Enable", 0)
         give_up_s = self._clock.now_s() + _OFF_S
         silent = []
         for joint in joints:  # those behind a silent servo stay silent in a group read
@@ -297,7 +318,7 @@ class ServoChain:
                 bus.write(ids[joint], "Torque Enable", 0, tries=1)
             except BusError:
                 silent.append(joint)
-        confirmed = [servo_id for joint, servo_id in enumerate(ids) if joint not in silent]
+        confirmed = self._ids_of(joint for joint in on_it if joint not in silent)
         if confirmed:
             bus.sync_write(confirmed, "Bus Watchdog", 0)
             # the port may be closed right behind it: a reply shows that the packet has arrived
@@ -328,10 +349,12 @@ class ServoChain:
             self._readings.update_slow(reply, slow_at_s)
         if self._armed and self._liveness is not None:
             self._liveness.check(self._reads - 1)
-        if self._imu is None:
-            return self._readings.state(self._clock.now_s())
-        imu = self._imu.read(self.on_event)
-        return self._readings.state(self._clock.now_s())._replace(imu=imu)
+        imu = None if self._imu is None else self._imu.read(self.on_event)
+        state = self._readings.state(self._clock.now_s())
+        if imu is not None:
+            state = state._replace(imu=imu)
+        self.on_state(state)
+        return state
 
     def write(self, command: JointCommand) -> None:
         """Send goal positions, kept inside the joint limits.
@@ -353,12 +376,12 @@ class ServoChain:
 
     def _prepare_reads(self, *, fast: bool) -> None:
         bus, ids = self._bus, self.robot.servo_ids
-        self._cycle: ControlCycle = bus.cycle(ids, fast=fast)
-        self._slow: ControlCycle = bus.slow_cycle(ids, fast=fast)
+        self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
+        self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
         self._fast_reads = fast
 
     def _budget(self, *, fast: bool) -> WireBudget:
-        return robot_budget(self.robot, self.port.getBaudRate(), fast=fast)
+        return robot_budget(self.robot, self._port.getBaudRate(), fast=fast)
 
     def _report_plain_reads(self) -> None:
         """Tell that fast reads were given up, and whether the wire still carries the rate."""
@@ -366,6 +389,8 @@ class ServoChain:
         line = (
             f"fast sync reads given up after {FAST_FAILURES} failures in a row, plain from now on"
         )
+        if len(self._bus.parts) > 1:
+            line = f"{', '.join(self._cycle.given_up_on)}: {line}"
         budget = self._budget(fast=False)
         if self._rate_hz is not None and budget.share(self._rate_hz) > 1.0:
             line += (
@@ -410,7 +435,7 @@ class LivenessCheck:
 
     def __init__(
         self,
-        bus: DynamixelBus,
+        bus: ChainBus,
         robot: RobotConfig,
         configured: Mapping[int, Mapping[str, int]],
         watchdog_ticks: int,
@@ -487,7 +512,7 @@ class _RegisterCheck:
     """Group read of one register, and what it must return."""
 
     register: str
-    cycle: ControlCycle
+    cycle: GroupCycle
     joints: tuple[int, ...]
     expected: Ints
     """(N,) of these joints."""

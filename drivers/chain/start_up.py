@@ -4,14 +4,14 @@ The order avoids what users of such buses report: goals not synced before torque
 of 500 us a servo, alarms from before, turn counts lost at a reboot.
 """
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.errors import BusError, ChainError, ChainFault, FaultCause, ServoError
 from snakewalk.drivers.protocol.control_table import model_numbers
@@ -68,20 +68,22 @@ class Inspection:
 
 
 def inspect(
-    bus: DynamixelBus, robot: RobotConfig, servo_ids: Collection[int] | None = None
+    bus: ChainBus, robot: RobotConfig, servo_ids: Collection[int] | None = None
 ) -> Inspection:
     """Read identity and state of every servo of the robot, or of some; changes nothing."""
     asked = robot.servo_ids if servo_ids is None else servo_ids
     found = bus.find(asked)
     faults: list[ChainFault] = []
-    missing = [str(servo_id) for servo_id in asked if servo_id not in found]
-    if missing:
-        text = (
-            f"{bus.port.name}: no answer from servo {', '.join(missing)} of "
-            f"{_ids_in_words(robot.servo_ids)} at {bus.port.getBaudRate()} baud: "
-            "power, cable, id or baud rate"
-        )
-        faults.append(ChainFault(FaultCause.NO_ANSWER, text))
+    for part in bus.parts:
+        on_it = [i for i in robot.servo_ids if bus.port_of(i) is part.port]
+        missing = [str(i) for i in on_it if i in asked and i not in found]
+        if missing:
+            text = (
+                f"{part.port.name}: no answer from servo {', '.join(missing)} of "
+                f"{_ids_in_words(on_it)} at {part.port.getBaudRate()} baud: "
+                "power, cable, id or baud rate"
+            )
+            faults.append(ChainFault(FaultCause.NO_ANSWER, text))
     servos = []
     for servo_id, servo in found.items():
         joint = robot.joint_name(robot.servo_ids.index(servo_id))
@@ -102,7 +104,7 @@ def inspect(
     return Inspection(tuple(servos), tuple(faults))
 
 
-def read_report(bus: DynamixelBus, servo_id: int, name: str) -> ServoReport:
+def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
     """Read what a servo tells of itself; changes nothing.
 
     Raises:
@@ -174,7 +176,7 @@ def chain_settings(
 
 
 def configure(
-    bus: DynamixelBus,
+    bus: ChainBus,
     robot: RobotConfig,
     units: JointUnits,
     joints: Iterable[int] | None = None,
@@ -211,7 +213,7 @@ def configure(
 
 
 def _configure_joint(
-    bus: DynamixelBus,
+    bus: ChainBus,
     robot: RobotConfig,
     units: JointUnits,
     joint: int,
@@ -239,7 +241,7 @@ def _configure_joint(
 
 
 def _apply(
-    bus: DynamixelBus,
+    bus: ChainBus,
     robot: RobotConfig,
     joint: int,
     setting: ChainSetting,
@@ -266,7 +268,7 @@ def _apply(
     return value
 
 
-def _limit_current(bus: DynamixelBus, robot: RobotConfig, joint: int, units: JointUnits) -> int:
+def _limit_current(bus: ChainBus, robot: RobotConfig, joint: int, units: JointUnits) -> int:
     servo_id, current_a = robot.servo_ids[joint], robot.current_limits_a[joint]
     limit = bus.read(servo_id, "Current Limit")
     goal = max(1, units.current_raw(joint, current_a))
@@ -280,7 +282,7 @@ def _limit_current(bus: DynamixelBus, robot: RobotConfig, joint: int, units: Joi
     return goal
 
 
-def let_reply(bus: DynamixelBus, robot: RobotConfig) -> None:
+def let_reply(bus: ChainBus, robot: RobotConfig) -> None:
     """Let servos reply to every instruction, whose Status Return Level(68) forbids it.
 
     At level 0 a servo replies to pings only, at level 1 to pings and reads: what it must be told
@@ -292,8 +294,8 @@ def let_reply(bus: DynamixelBus, robot: RobotConfig) -> None:
         bus.sync_write(right, "Status Return Level", ALL_REPLY)
 
 
-def _ids_in_words(ids: tuple[int, ...]) -> str:
-    if ids == tuple(range(ids[0], ids[-1] + 1)):
+def _ids_in_words(ids: Sequence[int]) -> str:
+    if list(ids) == list(range(ids[0], ids[-1] + 1)):
         return f"{ids[0]} to {ids[-1]}"
     return ", ".join(map(str, ids))
 

@@ -26,14 +26,19 @@ _FIXED: Final = ("socket://",)
 """URLs that carry no baud rate: that of the far end stays what it is."""
 
 
-def open_port(device: str, baud: int = 1_000_000) -> SerialPort | NetworkPort:
+def open_port(
+    device: str, baud: int = 1_000_000, clock: Clock | None = None
+) -> SerialPort | NetworkPort:
     """Open a serial device, or a line behind a network where ``device`` is a URL.
+
+    Ports of one chain share a ``clock``; None: one of its own.
 
     Raises:
         PortError: it is not there, or cannot be opened.
 
     """
-    return NetworkPort(device, baud) if is_url(device) else SerialPort(device, baud)
+    kind = NetworkPort if is_url(device) else SerialPort
+    return kind(device, baud, clock)
 
 
 class NetworkPort(LinePort):

@@ -14,7 +14,7 @@ import mmap
 import os
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -39,8 +39,8 @@ class StoppableRun:
     process: int
     name: str
     """Of the run, for people."""
-    port: str | None
-    """As ``resolved`` says it; None in simulation."""
+    ports: tuple[str, ...]
+    """As ``resolved`` says them; none in simulation."""
     folder: str | None
     """Where its log is; absolute."""
 
@@ -53,10 +53,16 @@ class StopButton:
 
     """
 
-    def __init__(self, name: str, port: str | None = None, folder: Path | None = None) -> None:
-        device = None if port is None else resolved(port)
+    def __init__(
+        self,
+        name: str,
+        port: str | Sequence[str] | None = None,
+        folder: Path | None = None,
+    ) -> None:
+        ports = [port] if isinstance(port, str) else port or ()
+        devices = tuple(map(resolved, ports))
         where = None if folder is None else str(folder.absolute())
-        self.run = StoppableRun(os.getpid(), name, device, where)
+        self.run = StoppableRun(os.getpid(), name, devices, where)
         place = button_folder()
         self._file, made = tempfile.mkstemp(prefix=f"{os.getpid()}-", dir=place)  # mode 0600
         # locked and filled before it gets a name that others look for
@@ -112,7 +118,8 @@ class PressedButton:
             if info.st_uid != os.getuid() or info.st_size != _BYTES:
                 raise PermissionError(f"{path}: is no stop button of this user")
             self._map = mmap.mmap(self._file, _BYTES)
-            self.run = StoppableRun(**json.loads(_read_text(self._map, _RUN)))
+            known = json.loads(_read_text(self._map, _RUN))
+            self.run = StoppableRun(**known | {"ports": tuple(known["ports"])})
             self.since_s = info.st_mtime
             """Time of day at which it was made, s."""
         except BaseException:
@@ -191,7 +198,9 @@ def stoppable_runs() -> Iterator[PressedButton]:
     """
     found = []
     for path in button_folder().glob(f"*{_SUFFIX}"):
-        with suppress(OSError, ValueError, TypeError):  # gone just now, or nothing of ours
+        with suppress(
+            OSError, ValueError, TypeError, KeyError
+        ):  # gone just now, or nothing of ours
             button = PressedButton(path)
             if button.is_held:
                 found.append(button)

@@ -1,4 +1,6 @@
-"""Simulated time: it passes only when somebody waits for it."""
+"""Simulated time: it passes only when somebody waits for it, or as real time does."""
+
+from snakewalk.drivers.clock import WallClock
 
 
 class SimClock:
@@ -25,3 +27,26 @@ class SimClock:
         if seconds < 0.0:
             raise ValueError(f"time does not run back ({seconds} s)")
         self._now_s += seconds
+
+
+class RealTimeClock(SimClock):
+    """Simulated time that is real time, from 0 on: for servos that share a bus with real ones.
+
+    What the host waits for, it waits for indeed; physics catches up whenever the line is used.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._wall = WallClock()
+
+    def now_s(self) -> float:
+        """Seconds since creation."""
+        return self._wall.now_s()
+
+    def sleep_until_s(self, time_s: float) -> None:
+        """Sleep until ``time_s``."""
+        self._wall.sleep_until_s(time_s)
+
+    def advance(self, seconds: float) -> None:
+        """Sleep for ``seconds``."""
+        self._wall.sleep_until_s(self._wall.now_s() + seconds)

@@ -6,9 +6,9 @@ A model holds for the IDs before it, back to the model before; IDs behind the la
 from dataclasses import dataclass
 
 from snakewalk.config.errors import InputError
+from snakewalk.drivers.port.port_map import id_range
 
 DEFAULT_MODEL = "XM430-W350"
-_LAST = 252
 _EXAMPLE = "write 1-16, 1,2,5-8:XL330-M288 or 1-2:XL430-W250,3-6:XL330-M288"
 
 
@@ -46,23 +46,8 @@ def parse_chain(text: str) -> ChainSpec:
         numbers, colon, model = (part.strip() for part in piece.partition(":"))
         if colon and not model:
             raise InputError(f"--servos {text}: {piece.strip()!r} names no model; {_EXAMPLE}")
-        ids += _range(numbers, text)
+        ids += id_range(numbers, f"--servos {text}", _EXAMPLE)
         if colon:
             models += [model.upper().replace("_", "-")] * (len(ids) - len(models))
     rest = models[-1] if models else DEFAULT_MODEL
     return ChainSpec(tuple(ids), (*models, *[rest] * (len(ids) - len(models))))
-
-
-def _range(piece: str, text: str) -> range:
-    first, dash, last = piece.partition("-")
-    try:
-        low = int(first)
-        high = int(last) if dash else low
-    except ValueError:
-        raise InputError(f"--servos {text}: {piece!r} is no ID; {_EXAMPLE}") from None
-    if high < low:
-        raise InputError(f"--servos {text}: {piece} runs backwards")
-    wrong = [each for each in (low, high) if not 0 <= each <= _LAST]
-    if wrong:
-        raise InputError(f"--servos {text}: ID {wrong[0]}: a servo has 0 to {_LAST}")
-    return range(low, high + 1)

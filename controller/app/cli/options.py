@@ -51,7 +51,9 @@ Port = Annotated[
 RunPort = Annotated[
     str | None,
     typer.Option(
-        help="serial port, or a URL such as socket://host:5000; without it, the simulator"
+        help="serial port, or a URL such as socket://host:5000; 1-8=PORT,9-16=PORT where segments "
+        "of the chain have ports of their own (sim: simulated servos beside real ones), or robot, "
+        "whose file says which; without it, the simulator"
     ),
 ]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]

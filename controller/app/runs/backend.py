@@ -4,21 +4,31 @@ Everything above the byte port is the same object for both.
 """
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import Final
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.heightfield import HeightField
-from snakewalk.config.robot import RobotConfig
+from snakewalk.config.loader import with_keys
+from snakewalk.config.robot import SIMULATED, RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.shadow.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
-from snakewalk.drivers.clock import Clock
+from snakewalk.drivers.clock import Clock, WallClock
+from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.port.network_port import open_port
-from snakewalk.drivers.types import BodyPose
+from snakewalk.drivers.port.port_map import is_port_map, parse_port_map, port_map_text
+from snakewalk.drivers.types import BodyPose, JointState
+
+FILE_PORTS: Final = "robot"
+"""``--port`` of a robot whose file names the ports of its segments."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +87,7 @@ def simulated(
     )
     chain = ServoChain(
         DynamixelBus(line, robot.models_by_id),
-        robot,
+        robot.model_copy(update={"ports": ()}),  # here they are on one wire
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
     )
@@ -95,18 +105,135 @@ def simulated(
     )
 
 
-def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
-    """Real servos on ``port``, a device or a URL; nothing measures the pose.
+def on_ports(robot: RobotConfig, port: str | None) -> RobotConfig:
+    """Return the robot with its segments on the ports that ``--port`` means.
+
+    Args:
+        robot: whose ``[[ports]]`` are meant by ``robot``.
+        port: a device or a URL, ``1-8=PORT,9-16=PORT``, ``robot``; None: the simulator.
 
     Raises:
-        PortError: the port is not there, is taken, or may not be opened.
+        InputError: the robot's file names no ports, or what is named does not fit its servos.
 
     """
-    serial = open_port(port, robot.servo.baud)
-    chain = ServoChain(
-        DynamixelBus(serial, robot.models_by_id, latency_s=serial.latency_s),
-        robot,
-        watchdog_s=run.safety.watchdog_s,
-        rate_hz=run.cycle_hz,
+    if port is None:
+        return robot
+    if port == FILE_PORTS:
+        if not robot.ports:
+            raise InputError(
+                f"--port {FILE_PORTS}: the file of {robot.name} has no [[ports]]; name them by "
+                "--port 1-8=PORT,9-16=PORT"
+            )
+        return robot
+    found = parse_port_map(port) if is_port_map(port) else []
+    return with_keys(
+        robot, {"ports": [{"port": name, "ids": ids} for name, ids in found]}, f"--port {port}"
     )
-    return Backend(port, chain, serial.clock, None, None, lambda: float("nan"))
+
+
+def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
+    """Real servos on ``port``, a device or a URL, or on the robot's ports; nothing measures a pose.
+
+    Raises:
+        PortError: a port is not there, is taken, or may not be opened.
+
+    """
+    bus = _bus_on_ports(robot, WallClock()) if robot.ports else _bus_on(robot, port)
+    chain = ServoChain(bus, robot, watchdog_s=run.safety.watchdog_s, rate_hz=run.cycle_hz)
+    name = port_map_text((each.port, each.ids) for each in robot.ports) or port
+    return Backend(name, chain, chain.clock, None, None, lambda: float("nan"))
+
+
+def split(
+    run: RunConfig,
+    robot: RobotConfig,
+    world: WorldConfig,
+    ground: HeightField | None,
+    initial_pose: InitialPose,
+) -> Backend:
+    """Real servos on the robot's ports, the others on a simulated line, in real time.
+
+    The joints of the simulated body that have real servos follow what those measure, so that the
+    others feel their weight and friction; the body's pose is the simulator's.
+
+    Raises:
+        PortError: a port is not there, is taken, or may not be opened.
+
+    """
+    require_extra("simulated servos need", "mujoco")
+    from snakewalk.sim.line.clock import RealTimeClock  # noqa: PLC0415
+    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
+    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
+    from snakewalk.sim.physics.split_plant import SplitPlant  # noqa: PLC0415
+    from snakewalk.sim.plant import Mounting  # noqa: PLC0415
+    from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
+    from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
+
+    (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)
+    rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in here]
+    plant = MujocoPlant(robot, world, ground, run.physics_step_s)
+    plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
+    body = SplitPlant(
+        plant, robot.servo_models, [j for j in range(robot.joint_count) if j not in rows]
+    )
+    baud, mounting, clock = robot.servo.baud, Mounting.of(robot), RealTimeClock()
+    imu = plant_imu(robot, plant, baud, run.seed)
+    bank = ServoBank(
+        [robot.servo_ids[row] for row in rows], [robot.servo_models[row] for row in rows], baud
+    )
+    line = SimLine(
+        bank,
+        body,
+        clock,
+        baud=baud,
+        mounting=Mounting(mounting.sign[rows], mounting.zero_rad[rows]),
+        supply_and_ambient=SupplyAndAmbient(supply_v=robot.servo.supply_v),
+        imu=imu if imu is not None and imu.config.id in here else None,
+    )
+    bus = _bus_on_ports(robot, clock, line)
+    chain = ServoChain(bus, robot, watchdog_s=run.safety.watchdog_s, rate_hz=run.cycle_hz)
+
+    def follow(state: JointState) -> None:
+        body.follow(state.time_s - state.age_s, state.position_rad, state.velocity_rad_s)
+
+    chain.on_state = follow
+    return Backend(
+        port_map_text((each.port, each.ids) for each in robot.ports),
+        chain,
+        clock,
+        plant.head_pose,
+        lambda: plant.qpos,
+        lambda: float("nan"),
+    )
+
+
+def is_split(robot: RobotConfig) -> bool:
+    """Whether some of the robot's servos are simulated, beside real ones."""
+    return any(each.port == SIMULATED for each in robot.ports)
+
+
+def real_ports(robot: RobotConfig) -> list[str]:
+    """Ports of the robot's segments, without that of simulated servos."""
+    return [each.port for each in robot.ports if each.port != SIMULATED]
+
+
+def _bus_on(robot: RobotConfig, port: str, clock: Clock | None = None) -> DynamixelBus:
+    line = open_port(port, robot.servo.baud, clock)
+    return DynamixelBus(line, robot.models_by_id, latency_s=line.latency_s)
+
+
+def _bus_on_ports(
+    robot: RobotConfig, clock: Clock, simulated_line: BytePort | None = None
+) -> SegmentedBus:
+    """A bus for each segment; what is open is closed where another port cannot be opened."""
+    parts = []
+    with ExitStack() as opened:
+        for each in robot.ports:
+            if each.port == SIMULATED and simulated_line is not None:
+                bus = DynamixelBus(simulated_line, robot.models_by_id)
+            else:
+                bus = _bus_on(robot, each.port, clock)
+            opened.callback(bus.port.closePort)
+            parts.append((bus, each.ids))
+        opened.pop_all()
+    return SegmentedBus(parts)

@@ -14,7 +14,14 @@ from snakewalk.config.run import RunConfig
 from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.report.artifacts import write_summary
 from snakewalk.controller.app.result_files import LOG, clear_run, refuse_another_run
-from snakewalk.controller.app.runs.backend import metal, simulated
+from snakewalk.controller.app.runs.backend import (
+    is_split,
+    metal,
+    on_ports,
+    real_ports,
+    simulated,
+    split,
+)
 from snakewalk.controller.app.runs.pose_provider import PoseProvider, pose_faults, pose_provider
 from snakewalk.controller.app.runs.prepared_run import PreparedRun, pose_with
 from snakewalk.controller.app.shadow.diagnosis import check_level
@@ -68,6 +75,9 @@ def execute(
 ) -> Finished:
     """Run on ``port``, or on the simulator where it is None; nothing else differs.
 
+    ``port`` is a device or a URL, ``1-8=PORT,9-16=PORT`` where segments of the chain are on ports
+    of their own, or ``robot``, whose file says so; a port ``sim`` has simulated servos.
+
     The folder is made; one that holds a run's files is refused without ``force``, which deletes
     them when the new log begins. A ``stoppable`` run has a button that ``snakewalk stop`` presses;
     the simulated runs of a study have none. ``view`` is a page that shows the run. With
@@ -84,28 +94,30 @@ def execute(
 
     """
     refuse_another_run(folder, force)
-    _check(prepared, metal=port is not None, shadow=shadow)
+    robot = on_ports(prepared.robot, port)
+    body_simulated = port is None or is_split(robot)
+    _check(prepared, metal=not body_simulated, shadow=shadow)
     plan = prepared.check_plan()
-    initial_pose = prepared.initial_pose() if port is None else None
-    if initial_pose is not None:
-        backend = simulated(
-            prepared.run, prepared.robot, prepared.world, prepared.ground, initial_pose
-        )
+    initial_pose = prepared.initial_pose() if body_simulated else None
+    if initial_pose is None:
+        backend = metal(prepared.run, robot, port or "")
     else:
-        backend = metal(prepared.run, prepared.robot, port or "")
+        make = simulated if port is None else split
+        backend = make(prepared.run, robot, prepared.world, prepared.ground, initial_pose)
     log_path = folder / LOG
     clear_run(folder)
     LOGGER.debug(
         "%s on %s; the plan keeps the limits; log: %s", prepared.robot.name, backend.name, log_path
     )
     torque_constant_n_m_a, winding = _motor(prepared.robot)
-    made = StopButton(prepared.run.name, port, folder) if stoppable else nullcontext()
+    ports = None if port is None else real_ports(robot) or [port]
+    made = StopButton(prepared.run.name, ports, folder) if stoppable else nullcontext()
     with made as button, RunLog(log_path, None if view is None else view.on_row) as log:
         if view is not None and button is not None:
             view.on_button(button.path)
         log.config(
             prepared.run,
-            prepared.robot,
+            robot,
             prepared.world,
             backend=backend.name,
             plan=plan,
@@ -136,7 +148,7 @@ def execute(
             source = prepared.make_source(log_event)
             link = SafeLink(
                 backend.chain,
-                SafetyLimits.from_config(prepared.robot, safety),
+                SafetyLimits.from_config(robot, safety),
                 clock,
                 recovery,
                 lambda: stop_requested() or (None if button is None else button.pressed()),

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Final, Literal
 
 from snakewalk.drivers.clock import WallClock
+from snakewalk.drivers.port.port_map import ports_in
 from snakewalk.drivers.safety.stop_button import PressedButton, resolved, stoppable_runs
 
 How = Literal["latched", "terminated", "killed", "torque off"]
@@ -37,19 +38,24 @@ class StopOutcome:
     after_s: float | None = None
     """From the request until the run had switched torque off; None where no run held the port."""
     process: int | None = None
-    port: str | None = None
+    ports: tuple[str, ...] = ()
     folder: str | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its ports; the run's name where it holds none."""
+        return self.ports or (self.what,)
 
     def to_dict(self) -> dict[str, object]:
         """For JSON."""
-        return asdict(self)
+        return asdict(self) | {"port": ", ".join(self.ports) or None}
 
 
 def runs_of(port: str | None = None, run: str | None = None) -> list[PressedButton]:
     """Open the buttons of the runs meant, the newest first.
 
     Args:
-        port: the run that holds this device, or URL.
+        port: the run that holds this device, or URL; of several (``1-8=PORT,9-16=PORT``) any.
         run: name, folder, log or process of a run.
 
     With neither: all that hold a port; where none does, the newest in simulation.
@@ -57,11 +63,12 @@ def runs_of(port: str | None = None, run: str | None = None) -> list[PressedButt
     """
     every = list(stoppable_runs())
     if port is not None:
-        meant = [button for button in every if button.run.port == resolved(port)]
+        asked = set(map(resolved, ports_in(port)))
+        meant = [button for button in every if asked & set(button.run.ports)]
     elif run is not None:
         meant = [button for button in every if _is_meant(button, run)]
     else:
-        meant = [button for button in every if button.run.port is not None] or every[:1]
+        meant = [button for button in every if button.run.ports] or every[:1]
     for button in every:
         if button not in meant:
             button.close()
@@ -104,7 +111,7 @@ def _ended(button: PressedButton, clock: WallClock) -> StopOutcome:
     safe = said is not None and "torque off failed" not in said and "torque may be on" not in said
     if said is None:
         said = "it ended without a word" if not button.is_held else "it does not end"
-        safe = run.port is None and not button.is_held
+        safe = not run.ports and not button.is_held
     return StopOutcome(
-        run.name, how, said, safe, round(after_s, 4), run.process, run.port, run.folder
+        run.name, how, said, safe, round(after_s, 4), run.process, run.ports, run.folder
     )

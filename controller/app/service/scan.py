@@ -11,6 +11,7 @@ from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
 from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.errors import BusError, ControlTableError, PortError
 from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.port.port_map import is_port_map
 from snakewalk.drivers.protocol.control_table import model_numbers
 from snakewalk.drivers.protocol.imu_table import imu_model
 from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, SECONDARY_ID_LIMIT
@@ -39,10 +40,12 @@ def pick_port(port: str | None) -> str:
     """The port that was asked for, or the only one there is.
 
     Raises:
-        PortError: none was asked for, and there is none, or more than one.
+        PortError: none was asked for, and there is none, or more than one; several were.
 
     """
     if port is not None:
+        if is_port_map(port):
+            raise PortError(f"--port {port}: one port at a time; runs and stop take several")
         return port
     there = sorted(found.device for found in list_ports.comports() if found.vid is not None)
     if len(there) == 1:

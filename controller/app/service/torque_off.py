@@ -63,14 +63,14 @@ def torque_off(
                 ]
                 text = f"torque is off: {len(found) - len(failed)} servos confirm it, {rate} baud"
                 return StopOutcome(
-                    device, "torque off", "; ".join([text, *failed]), not failed, port=device
+                    device, "torque off", "; ".join([text, *failed]), not failed, ports=(device,)
                 )
     return StopOutcome(
         device,
         "torque off",
         f"torque off was sent at {sent} baud rates, and nobody answers: is the power on?",
         False,
-        port=device,
+        ports=(device,),
     )
 
 

@@ -47,7 +47,7 @@ def test_a_button_is_private_seen_while_it_is_held_and_gone_after(own_folder: Pa
         assert own_folder.stat().st_mode & 0o777 == 0o700
         (seen,) = stoppable_runs()
         assert seen.run == button.run
-        assert (seen.run.process, seen.run.port) == (os.getpid(), "/dev/null")
+        assert (seen.run.process, seen.run.ports) == (os.getpid(), ("/dev/null",))
         assert seen.is_held
         assert seen.end is None
     assert seen.end == ""
@@ -57,11 +57,20 @@ def test_a_button_is_private_seen_while_it_is_held_and_gone_after(own_folder: Pa
     seen.close()
 
 
+def test_a_run_on_several_ports_is_found_by_each(own_folder: Path) -> None:
+    with StopButton("walk", ["/dev/null", "/dev/zero"], own_folder):
+        for port in ("/dev/null", "/dev/zero", "1-8=/dev/full,9-16=/dev/zero"):
+            (found,) = runs_of(port=port)
+            assert found.run.ports == ("/dev/null", "/dev/zero")
+            found.close()
+        assert runs_of(port="1-8=/dev/full,9-16=/dev/tty") == []
+
+
 def test_a_url_is_the_same_port_in_every_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with StopButton("far", "socket://snake.example:5000") as button:
-        assert button.run.port == "socket://snake.example:5000"
+        assert button.run.ports == ("socket://snake.example:5000",)
         monkeypatch.chdir(tmp_path)
         (found,) = runs_of(port="socket://snake.example:5000")
         found.close()

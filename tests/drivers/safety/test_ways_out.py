@@ -126,7 +126,7 @@ def test_a_pressed_button_latches_within_two_cycles_and_nothing_is_sent_after(
     servos.line.taps.append(tap)
     (button,) = (each for each in stoppable_runs() if each.run.process == servos.child.pid)
     with button:
-        assert button.run.port == servos.server.path
+        assert button.run.ports == (servos.server.path,)
         servos.serve_until(lambda: len(sent) >= 5)
         assert set(sent) == {"goals"}  # it runs
         sent.clear()

@@ -42,13 +42,13 @@ def stop(
     outcomes = emergency_stop.stop_runs(emergency_stop.runs_of(port, run), who)
     if run is not None and not outcomes:
         raise InputError(f"{run}: no such run is under way")
-    devices = [_free_port(port)] if not outcomes else []
+    devices = _free_ports(port) if not outcomes else []
     # a run that was killed leaves its servos holding
-    devices += [each.port for each in outcomes if each.port is not None and not each.safe]
+    devices += [port for each in outcomes if not each.safe for port in each.ports]
     if devices:
         outcomes += _torque_off(devices, baud or ())
-    stopped = {each.port or each.what for each in outcomes if each.safe}
-    safe = all((each.port or each.what) in stopped for each in outcomes)
+    stopped = {name for each in outcomes if each.safe for name in each.names}
+    safe = all(name in stopped for each in outcomes for name in each.names)
     if as_json:
         print(json.dumps({"safe": safe, "stopped": [each.to_dict() for each in outcomes]}))
     else:
@@ -59,12 +59,15 @@ def stop(
         raise SystemExit(1)
 
 
-def _free_port(port: str | None) -> str:
+def _free_ports(port: str | None) -> list[str]:
     from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415  heavy: the bus
     from snakewalk.drivers.errors import PortError  # noqa: PLC0415
+    from snakewalk.drivers.port.port_map import is_port_map, ports_in  # noqa: PLC0415
 
+    if port is not None and is_port_map(port):
+        return ports_in(port)
     try:
-        return pick_port(port)
+        return [pick_port(port)]
     except PortError as fault:
         raise PortError(f"nothing to stop: no run is under way; {fault}") from None
 

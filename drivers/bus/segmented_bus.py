@@ -1,0 +1,273 @@
+"""The bus of a chain whose segments are on ports of their own: one transaction a port and cycle.
+
+Requests begin on all ports before a reply is awaited on any, so that a cycle takes as long as that
+of the longest segment. A fault of one port is told with its name, and ends the cycle of all; what
+goes to all, such as torque off, goes to every port that is there, whatever the others do.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import astuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.drivers.bus.control_cycle import ControlCycle, CycleCounters
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
+from snakewalk.drivers.bus.group_read import GroupReadReply
+from snakewalk.drivers.errors import BusError, ControlTableError, PortError
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.control_table import ControlTable
+
+
+class SegmentedBus:
+    """Servos of one chain, each on the part of its segment; implements ``ChainBus``."""
+
+    def __init__(self, parts: Sequence[tuple[DynamixelBus, Sequence[int]]]) -> None:
+        """Prepare; nothing is sent.
+
+        Args:
+            parts: bus of each port, and the IDs that are on it. The ports share one clock.
+
+        Raises:
+            ValueError: their clocks differ, or an ID is on two of them.
+
+        """
+        if len({id(bus.port.clock) for bus, _ in parts}) != 1:
+            raise ValueError("the ports of one chain share one clock: ages are counted in it")
+        self._bus_of = {servo_id: bus for bus, ids in parts for servo_id in ids}
+        if len(self._bus_of) != sum(len(ids) for _, ids in parts):
+            raise ValueError("an ID is on one port")
+        self._parts = tuple(bus for bus, _ in parts)
+        self._lost: list[DynamixelBus] = []
+
+    @property
+    def parts(self) -> Sequence[DynamixelBus]:
+        """The bus on each port."""
+        return self._parts
+
+    def port_of(self, servo_id: int) -> BytePort:
+        """Port that a servo, or another device, is on."""
+        return self._bus_of[servo_id].port
+
+    def reopen(self) -> None:
+        """Close and open the ports that are gone.
+
+        Raises:
+            PortError: one is still not there.
+
+        """
+        for bus in tuple(self._lost):
+            bus.reopen()
+            self._lost.remove(bus)
+
+    def table_of(self, servo_id: int) -> ControlTable:
+        """Control table of one servo's model."""
+        return self._bus_of[servo_id].table_of(servo_id)
+
+    def ping(self, servo_id: int) -> PingReply:
+        """Ping one servo; raises as ``DynamixelBus.ping``."""
+        with self._with_port_name(servo_id) as bus:
+            return bus.ping(servo_id)
+
+    def find(self, servo_ids: Iterable[int]) -> dict[int, PingReply]:
+        """Ping each servo; returns those that replied."""
+        found: dict[int, PingReply] = {}
+        for servo_id in servo_ids:
+            with self._with_port_name(servo_id) as bus:
+                found |= bus.find([servo_id])
+        return found
+
+    def read(self, servo_id: int, name: str) -> int:
+        """Value of a register by its name; raises as ``DynamixelBus.read``."""
+        with self._with_port_name(servo_id) as bus:
+            return bus.read(servo_id, name)
+
+    def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
+        """Write a register by its name; raises as ``DynamixelBus.write``."""
+        with self._with_port_name(servo_id) as bus:
+            bus.write(servo_id, name, value, tries)
+
+    def write_verified(self, servo_id: int, name: str, value: int) -> None:
+        """Write a register if it differs, and read it back; raises as ``DynamixelBus`` does."""
+        with self._with_port_name(servo_id) as bus:
+            bus.write_verified(servo_id, name, value)
+
+    def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
+        """Write one value to all servos, also on the ports behind one that is gone.
+
+        Raises:
+            ControlTableError: no such register, or the value does not fit it.
+            PortError: a port is gone; the others have got it.
+
+        """
+        self._each(
+            lambda bus, places: bus.sync_write([servo_ids[k] for k in places], name, value),
+            self._places(servo_ids),
+        )
+
+    def cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> "SegmentedCycle":
+        """Control cycle of these servos; raises as ``DynamixelBus.cycle``."""
+        return self._cycles(servo_ids, lambda bus, ids: bus.cycle(ids, fast=fast))
+
+    def slow_cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> "SegmentedCycle":
+        """Group read of the slow state block; raises as ``DynamixelBus.slow_cycle``."""
+        return self._cycles(servo_ids, lambda bus, ids: bus.slow_cycle(ids, fast=fast))
+
+    def block(
+        self, servo_ids: Sequence[int], first: str, last: str, *, fast: bool = True
+    ) -> "SegmentedCycle":
+        """Group read of the registers from ``first`` to ``last``; raises as ``DynamixelBus``."""
+        return self._cycles(servo_ids, lambda bus, ids: bus.block(ids, first, last, fast=fast))
+
+    def device_block(self, device_id: int, address: int, length: int) -> "SegmentedCycle":
+        """Group read of one device that is no servo."""
+        return self._cycles(
+            [device_id], lambda bus, _: bus.device_block(device_id, address, length)
+        )
+
+    def _places(self, servo_ids: Sequence[int]) -> dict[DynamixelBus, list[int]]:
+        """Places in ``servo_ids`` of the servos of each part that has any."""
+        found: dict[DynamixelBus, list[int]] = {}
+        for place, servo_id in enumerate(servo_ids):
+            found.setdefault(self._bus_of[servo_id], []).append(place)
+        return found
+
+    def _cycles(
+        self,
+        servo_ids: Sequence[int],
+        make: Callable[[DynamixelBus, Sequence[int]], ControlCycle],
+    ) -> "SegmentedCycle":
+        places = self._places(servo_ids)
+        cycles = {bus: make(bus, [servo_ids[k] for k in at]) for bus, at in places.items()}
+        spans = {(cycle.read_address, cycle.read_bytes) for cycle in cycles.values()}
+        if len(spans) > 1:
+            raise ControlTableError(
+                "the models on the ports have the block of a control cycle at different places: "
+                "such servos are no one chain"
+            )
+        return SegmentedCycle(cycles, places, self._each)
+
+    def _each(
+        self,
+        do: Callable[[DynamixelBus, list[int]], None],
+        places: Mapping[DynamixelBus, list[int]],
+    ) -> None:
+        """Do something on each port, on the others also where one is gone; then raise its error."""
+        gone: list[PortError] = []
+        for bus, at in places.items():
+            try:
+                do(bus, at)
+            except PortError as error:
+                if bus not in self._lost:
+                    self._lost.append(bus)
+                gone.append(error)
+        if len(gone) > 1:
+            raise PortError("; ".join(map(str, gone))) from gone[0]
+        if gone:
+            raise gone[0]
+
+    @contextmanager
+    def _with_port_name(self, servo_id: int) -> Iterator[DynamixelBus]:
+        """Bus of one servo, whose faults are told with the name of its port."""
+        bus = self._bus_of[servo_id]
+        try:
+            yield bus
+        except PortError:
+            if bus not in self._lost:
+                self._lost.append(bus)
+            raise
+        except BusError as error:
+            error.args = (f"{bus.port.name}: {error}",)
+            raise
+
+
+class SegmentedCycle:
+    """Control cycle, or group read, of servos on several ports; implements ``GroupCycle``."""
+
+    def __init__(
+        self,
+        cycles: Mapping[DynamixelBus, ControlCycle],
+        places: Mapping[DynamixelBus, list[int]],
+        each: Callable[
+            [Callable[[DynamixelBus, list[int]], None], Mapping[DynamixelBus, list[int]]], None
+        ],
+    ) -> None:
+        """Prepare.
+
+        Args:
+            cycles: of each port.
+            places: of each port's servos in the arrays of all.
+            each: ``SegmentedBus._each``: does something on all ports that are there.
+
+        """
+        self._cycles, self._places, self._each = cycles, places, each
+        self._count = sum(map(len, places.values()))
+
+    @property
+    def fast(self) -> bool:
+        """Whether all reads are fast ones."""
+        return all(cycle.fast for cycle in self._cycles.values())
+
+    @property
+    def given_up_on(self) -> tuple[str, ...]:
+        """Names of the ports on which fast reads were given up."""
+        return tuple(name for cycle in self._cycles.values() for name in cycle.given_up_on)
+
+    @property
+    def counters(self) -> CycleCounters:
+        """Irregular reads so far, of all ports together."""
+        each = (astuple(cycle.counters) for cycle in self._cycles.values())
+        return CycleCounters(*map(sum, zip(*each, strict=True)))
+
+    @property
+    def since_sent_s(self) -> float:
+        """How old the values of a read are at most, s: those of the port that was asked first."""
+        return max(cycle.since_sent_s for cycle in self._cycles.values())
+
+    def write_goals(self, goals: NDArray[np.int32]) -> None:
+        """Send raw goals (N,).
+
+        Raises:
+            PortError: a port is gone; the servos on the others have their goals.
+
+        """
+        self._each(lambda bus, at: self._cycles[bus].write_goals(goals[at]), self._places)
+
+    def read(self) -> GroupReadReply:
+        """Read the block of all servos: ask on all ports, then receive.
+
+        Raises:
+            PortError: a port is gone; the replies of the others are received all the same.
+
+        """
+        asked: dict[DynamixelBus, list[int]] = {}
+        replies: dict[DynamixelBus, GroupReadReply] = {}
+
+        def ask(bus: DynamixelBus, at: list[int]) -> None:
+            self._cycles[bus].begin_read()
+            asked[bus] = at
+
+        def receive(bus: DynamixelBus, at: list[int]) -> None:
+            replies[bus] = self._cycles[bus].finish_read()
+
+        try:
+            self._each(ask, self._places)
+        finally:  # else a reply would meet the next request
+            self._each(receive, asked)
+        return self._whole(replies)
+
+    def _whole(self, replies: Mapping[DynamixelBus, GroupReadReply]) -> GroupReadReply:
+        """One reply with the results of all ports at their servos' places."""
+        width = next(iter(replies.values())).data.shape[1]
+        data = np.zeros((self._count, width), np.uint8)
+        valid, answered = np.zeros(self._count, np.bool_), np.zeros(self._count, np.bool_)
+        error = np.zeros(self._count, np.uint8)
+        for bus, reply in replies.items():
+            at = self._places[bus]
+            data[at], valid[at], answered[at] = reply.data, reply.valid, reply.answered
+            error[at] = reply.error
+        each = replies.values()
+        return GroupReadReply(
+            data, valid, error, answered, all(r.clean for r in each), all(r.whole for r in each)
+        )

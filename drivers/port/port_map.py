@@ -1,0 +1,81 @@
+"""Which port each servo of a chain is on: ``[[ports]]`` of a robot's file, ``--port`` of a run."""
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+from snakewalk.config.errors import InputError
+
+_LAST: Final = 252
+_SEGMENT: Final = re.compile(r"\s*(?P<ids>\d[\d\s,-]*)=(?P<port>[^,]+)(?:,|$)")
+_EXAMPLE: Final = "write 1-8=/dev/ttyUSB0,9-16=/dev/ttyUSB1"
+
+
+def is_port_map(text: str) -> bool:
+    """Whether ``--port`` names a port for each segment, ``1-8=PORT,9-16=PORT``."""
+    return _SEGMENT.match(text) is not None
+
+
+def parse_port_map(text: str) -> list[tuple[str, tuple[int, ...]]]:
+    """Read ``IDS=PORT,IDS=PORT``, IDs as ``1-8`` or ``1,2,5-8``; ports and the IDs on each.
+
+    Raises:
+        InputError: what cannot be read, an ID out of 0 to 252, or a range that runs backwards.
+
+    """
+    found, at = [], 0
+    while at < len(text):
+        segment = _SEGMENT.match(text, at)
+        if segment is None:
+            raise InputError(f"--port {text}: {text[at:]!r} names no IDs and port; {_EXAMPLE}")
+        pieces = segment["ids"].rstrip(", ").split(",")
+        ids = [each for piece in pieces for each in id_range(piece, f"--port {text}", _EXAMPLE)]
+        found.append((segment["port"].strip(), tuple(ids)))
+        at = segment.end()
+    return found
+
+
+def ports_in(text: str) -> list[str]:
+    """Return the ports that ``--port`` names, one or several.
+
+    Raises:
+        InputError: as ``parse_port_map``.
+
+    """
+    return [port for port, _ in parse_port_map(text)] if is_port_map(text) else [text]
+
+
+def port_map_text(ports: Iterable[tuple[str, Sequence[int]]]) -> str:
+    """Write ports as ``parse_port_map`` reads them."""
+    return ",".join(f"{_ids_text(ids)}={port}" for port, ids in ports)
+
+
+def id_range(piece: str, source: str, example: str) -> range:
+    """Read ``7`` or ``1-8``; faults begin with ``source`` and end with ``example``.
+
+    Raises:
+        InputError: no numbers, an ID out of 0 to 252, or a range that runs backwards.
+
+    """
+    first, dash, last = piece.partition("-")
+    try:
+        low = int(first)
+        high = int(last) if dash else low
+    except ValueError:
+        raise InputError(f"{source}: {piece!r} is no ID; {example}") from None
+    if high < low:
+        raise InputError(f"{source}: {piece} runs backwards")
+    wrong = [each for each in (low, high) if not 0 <= each <= _LAST]
+    if wrong:
+        raise InputError(f"{source}: ID {wrong[0]}: a servo has 0 to {_LAST}")
+    return range(low, high + 1)
+
+
+def _ids_text(ids: Sequence[int]) -> str:
+    runs: list[list[int]] = []
+    for each in ids:
+        if runs and each == runs[-1][-1] + 1:
+            runs[-1].append(each)
+        else:
+            runs.append([each])
+    return ",".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)

@@ -1,0 +1,81 @@
+"""A body of which some shafts are turned by simulated servos, and the others follow real ones."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.sim.plant import Plant, ServoDrive
+from snakewalk.sim.servo.motor import MOTORS, make_drive
+
+FOLLOW_GAIN_PER_RAD = 20.0
+"""Of the motors that make shafts follow: full output at 0.05 rad (ours)."""
+FOLLOW_STRENGTH = 4.0
+"""Their supply, as a multiple of the motor's nominal one (ours): what the real servo carries, they
+carry as well."""
+AHEAD_S = 0.1
+"""How far a measured velocity is extrapolated, at most (ours)."""
+_INPUTS = 9
+"""Columns of a drive that servos write; the plant writes the others."""
+
+
+class SplitPlant:
+    """The shafts of ``plant`` that simulated servos turn; implements ``sim.plant.Plant``.
+
+    The others are drawn to where ``follow`` says that they were measured, by strong motors: their
+    weight, contacts and friction act on the simulated ones, and nothing acts back on the real ones.
+    """
+
+    def __init__(self, plant: Plant, models: Sequence[str], real: Sequence[int]) -> None:
+        """Prepare; the shafts that follow are limp until the first ``follow``.
+
+        Args:
+            plant: the whole body, J shafts.
+            models: of the J servos.
+            real: places of the shafts that follow.
+
+        """
+        self._plant = plant
+        self._real = np.array(sorted(real), np.intp)
+        self._simulated = np.setdiff1d(np.arange(len(models)), self._real)
+        motors = [MOTORS[model] for model in models]
+        supply_v = FOLLOW_STRENGTH * np.array([motor.nominal_v for motor in motors])
+        self._drive = make_drive(motors, supply_v)
+        self._drive.p_gain_per_rad[self._real] = FOLLOW_GAIN_PER_RAD / FOLLOW_STRENGTH
+        self._measured_at_s = np.zeros(len(self._real))
+        self._position_rad, self._velocity_rad_s = np.zeros((2, len(self._real)))
+
+    @property
+    def time_s(self) -> float:
+        """Time of the state that the shafts show."""
+        return self._plant.time_s
+
+    @property
+    def position_rad(self) -> Floats:
+        """(S,) angles of the simulated shafts, a copy."""
+        return self._plant.position_rad[self._simulated]
+
+    @property
+    def velocity_rad_s(self) -> Floats:
+        """(S,) rad/s, a copy."""
+        return self._plant.velocity_rad_s[self._simulated]
+
+    def follow(self, measured_at_s: Floats, position_rad: Floats, velocity_rad_s: Floats) -> None:
+        """Take over where the real joints were measured, (J,) each; what is not finite stays."""
+        known = np.isfinite(position_rad[self._real])
+        rows = self._real[known]
+        self._measured_at_s[known] = measured_at_s[rows]
+        self._position_rad[known] = position_rad[rows]
+        self._velocity_rad_s[known] = velocity_rad_s[rows]
+        self._drive.torque_on[rows] = 1.0
+
+    def advance(self, until_s: float, drive: ServoDrive) -> None:
+        """Step the body under ``drive`` (S,), its other shafts towards where they should be."""
+        whole, rows = self._drive, self._simulated
+        for mine, given in zip(whole.columns()[:_INPUTS], drive.columns(), strict=False):
+            mine[rows] = given
+        ahead_s = np.clip(until_s - self._measured_at_s, 0.0, AHEAD_S)
+        whole.goal_rad[self._real] = self._position_rad + self._velocity_rad_s * ahead_s
+        self._plant.advance(until_s, whole)
+        for mine, given in zip(whole.columns()[_INPUTS:], drive.columns()[_INPUTS:], strict=True):
+            given[:] = mine[rows]
