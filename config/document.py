@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from snakewalk.config.animal import AnimalConfig, SkinConfig
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.gait import GaitSetConfig
 from snakewalk.config.loader import Kind, locate, shipped
@@ -19,7 +20,6 @@ from snakewalk.config.playback import ScheduleConfig
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.config.skin import SkinConfig
 from snakewalk.config.synthesis import SynthesisConfig
 from snakewalk.config.world import WorldConfig
 
@@ -31,6 +31,7 @@ SCHEMAS: Final[Mapping[str, type[BaseModel]]] = {
     "gait": GaitSetConfig,
     "recording": RecordingConfig,
     "skin": SkinConfig,
+    "animal": AnimalConfig,
     "schedule": ScheduleConfig,
     "faults": FaultPlan,
 }

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from snakewalk.config.world import WorldConfig
 
 M = TypeVar("M", bound=BaseModel)
-Kind = Literal["robots", "worlds", "runs", "recordings", "gaits", "skins"]
+Kind = Literal["robots", "worlds", "runs", "recordings", "gaits", "skins", "animals"]
 
 
 def shipped(kind: Kind) -> tuple[str, ...]:

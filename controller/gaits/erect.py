@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.gaits.footfall import lift, swing
 from snakewalk.controller.gaits.gait import Frequency, GaitParameters, Needs
 from snakewalk.controller.gaits.trot import LegGait, Turn
 from snakewalk.controller.gaits.wave import TURN
@@ -54,8 +55,8 @@ class ErectGait(LegGait):
             shorter = max(p.turn if left else -p.turn, 0.0)
             upper_m, lower_m = pair.segments_m[1:]
             leg_m = upper_m + lower_m
-            forward_m = leg_m * (1.0 - shorter) * p.stride * self._swing(at)
-            down_m = leg_m * (p.reach - p.lift * self._lift(at))
+            forward_m = leg_m * (1.0 - shorter) * p.stride * swing(at, self.duty)
+            down_m = leg_m * (p.reach - p.lift * lift(at, self.duty))
             hip, knee = hip_and_knee_rad(forward_m, down_m, upper_m, lower_m)
             joints[:, first + k + 1], joints[:, first + k + 2] = hip, knee
         return joints

@@ -4,8 +4,7 @@ The lizard of [KP] 4.2.2 has a body that may bend where the pairs of legs are, a
 to the body over one cycle say everything. Here the angles are computed: on the ground a foot goes
 back at an even rate, in the air it goes forward again; the girdles turn with the legs, the front
 one against the hind one (a standing wave between them), which makes the strides longer, while head
-and tail keep their heading. Correction of the cyclic legs of [GC] 2.2.2, Eq. 9-10: there both feet
-take their height from one ``T_y``; here each foot has a phase of its own in height and way.
+and tail keep their heading.
 """
 
 from abc import ABC
@@ -15,9 +14,9 @@ import numpy as np
 from pydantic import Field
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.gaits.footfall import lift, swing
 from snakewalk.controller.gaits.gait import Frequency, Gait, GaitParameters, Needs
 from snakewalk.controller.gaits.wave import TURN
-from snakewalk.controller.kinematics import smoothstep
 
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
@@ -67,23 +66,10 @@ class LegGait(Gait, ABC):
             axis = robot.limbs[joint.pair].joint_axes[joint.place]
             if axis == "y":
                 shorter = max(p.turn if left else -p.turn, 0.0)
-                joints[:, first + k] = (1.0 - shorter) * p.stride_rad * self._swing(at)
+                joints[:, first + k] = (1.0 - shorter) * p.stride_rad * swing(at, self.duty)
             elif joint.place == _first_roll(robot.limbs[joint.pair].joint_axes):
-                joints[:, first + k] = -p.stance_rad + p.lift_rad * self._lift(at)
+                joints[:, first + k] = -p.stance_rad + p.lift_rad * lift(at, self.duty)
         return joints
-
-    def _swing(self, at: Floats) -> Floats:
-        """1 where a foot comes down, evenly to -1 where it leaves, and back; no step in speed."""
-        ground = 1.0 - 2.0 * at / self.duty
-        air = np.clip((at - self.duty) / (1.0 - self.duty), 0.0, 1.0)
-        slope = -2.0 * (1.0 - self.duty) / self.duty  # at both ends of the air, as on the ground
-        back = 2.0 * smoothstep.cubic(air) - 1.0 + slope * air * (1.0 - air) * (1.0 - 2.0 * air)
-        return np.where(at < self.duty, ground, back)
-
-    def _lift(self, at: Floats) -> Floats:
-        """0 on the ground, to 1 in the middle of the air."""
-        air = np.clip((at - self.duty) / (1.0 - self.duty), 0.0, 1.0)
-        return np.sin(0.5 * TURN * air) ** 2
 
     def _bend(self, robot: "RobotConfig", phase_rad: Floats, joints: Floats) -> None:
         """Turn the girdles: each is turned furthest when its legs are.

@@ -318,7 +318,11 @@ app.command(
 
 app.command(
     "synthesise",
-    epilog=_examples("synthesise -o motion", "synthesise my-run.toml --seed 3 --json"),
+    epilog=_examples(
+        "synthesise -o motion",
+        "synthesise my-run.toml --seed 3 --json",
+        "synthesise jacksboro-traverse --animal lizard -o lizard --film",
+    ),
     rich_help_panel=_MOTION,
 )(synthesise_walk)
 

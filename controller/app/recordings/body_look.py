@@ -1,19 +1,19 @@
 """The body in a film by name: servos, the captured animal, or any skin of ``snakewalk body``."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.world import Water
 from snakewalk.controller.runlog.record import Header
 
 if TYPE_CHECKING:
-    from snakewalk.controller.app.recordings.body_skin import BodySkin
-    from snakewalk.controller.capture.mesh.skin import Skin
+    from snakewalk.controller.capture.mesh.rig import Rig
     from snakewalk.sim.rendering.looks import SkinLook
 
 SERVOS: Final = "servos"
@@ -55,46 +55,35 @@ def skin_look(look: str, header: Header) -> "SkinLook | None":
     require_extra("a skin needs", "trimesh", "mujoco")
     from snakewalk.controller.app.recordings.body_motion import robot_skin  # noqa: PLC0415  an extra
     from snakewalk.controller.app.recordings.body_skin import body_skin  # noqa: PLC0415
-    from snakewalk.controller.capture.mesh.skin import rest_fronts_m  # noqa: PLC0415
+    from snakewalk.controller.capture.mesh.rig import spine_rig  # noqa: PLC0415
 
     dressed = body_skin(animal(header.run.track) if look == ANIMAL else look)
     robot = header.robot
     skin = robot_skin(dressed.skin, robot, isinstance(header.world.ground, Water))
-    bone_m = np.array(robot.link_lengths_m)
-    origins = rest_fronts_m(bone_m, skin.axis_m)  # a body begins at its joint, the head's amidst
-    origins[0, 0] -= 0.5 * bone_m[0]
-    return _look(skin, bone_m, origins, dressed.texture)
+    rig = spine_rig(skin, np.array(robot.link_lengths_m))
+    origins = rig.rest_m.copy()  # a body begins at its joint, the head's amidst
+    origins[0, 0] -= 0.5 * robot.link_lengths_m[0]
+    return rig_look(replace(rig, rest_m=origins), dressed.texture, free=False)
 
 
-def bone_look(dressed: "BodySkin", skin: "Skin", bone_m: Floats) -> "SkinLook":
-    """Make a look of floating bones (K,), for a motion that no robot makes.
+def rig_look(rig: "Rig", texture: Image | None, *, free: bool = True) -> "SkinLook":
+    """Make the look of a rig.
 
     Args:
-        dressed: whose texture is worn.
-        skin: its skin, of the motion's size.
-        bone_m: lengths of the bones; a body begins at its bone's front.
+        rig: its size is the motion's.
+        texture: what it wears; None is one colour.
+        free: whether its bones float, for a motion that no robot makes.
 
     """
-    from snakewalk.controller.capture.mesh.skin import rest_fronts_m  # noqa: PLC0415  an extra
+    from snakewalk.sim.rendering.looks import SkinLook  # noqa: PLC0415  an extra
 
-    origins = rest_fronts_m(bone_m, skin.axis_m)
-    return _look(skin, bone_m, origins, dressed.texture, free=True)
-
-
-def _look(
-    skin: "Skin", bone_m: Floats, origins_m: Floats, texture: Image | None, *, free: bool = False
-) -> "SkinLook":
-    from snakewalk.controller.capture.mesh.skin import weights  # noqa: PLC0415  an extra
-    from snakewalk.sim.rendering.looks import SkinLook  # noqa: PLC0415
-
-    held = weights(skin, bone_m)
     return SkinLook(
-        vertices_m=skin.mesh.vertices,
-        uv=skin.mesh.uv,
-        faces=skin.mesh.faces,
-        link=held.bones,
-        share=held.shares,
-        rest_m=origins_m,
+        vertices_m=rig.mesh.vertices,
+        uv=rig.mesh.uv,
+        faces=rig.mesh.faces,
+        link=rig.held.bones,
+        share=rig.held.shares,
+        rest_m=rig.rest_m,
         texture=texture,
         free=free,
     )

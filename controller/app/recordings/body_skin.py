@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from snakewalk.config.animal import SkinConfig
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load, locate, shipped
-from snakewalk.config.skin import SkinConfig
 from snakewalk.controller.capture.mesh.body_model import (
     BodyModel,
     body_model,

@@ -6,13 +6,14 @@ from pathlib import Path
 from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.app.progress import ProgressBar
-from snakewalk.controller.app.recordings.body_look import ANIMAL, animal, bone_look
+from snakewalk.controller.app.recordings.body_look import ANIMAL, animal, rig_look
 from snakewalk.controller.app.recordings.body_motion import robot_skin
 from snakewalk.controller.app.recordings.body_skin import BodySkin, body_skin
 from snakewalk.controller.app.recordings.snake_synthesis import SynthesisedWalk
 from snakewalk.controller.app.report.film import film_motion
 from snakewalk.controller.app.result_files import atomic_write
 from snakewalk.controller.app.runs.walk_run import WalkRun
+from snakewalk.controller.capture.mesh.rig import spine_rig
 from snakewalk.controller.capture.mesh.skin import Skin
 
 FILM_SEGMENTS = 5
@@ -42,11 +43,10 @@ class SynthesisSkin:
         """Write the animated glTF, ``file`` ends in .glb."""
         from snakewalk.controller.capture.mesh.skin_file import write_skin  # noqa: PLC0415  an extra
 
-        worn = self.dressed
+        worn, bones = self.dressed, made.bones()
+        rig = spine_rig(self.skin, bones.bone_m)
         with atomic_write(file) as part:
-            write_skin(
-                part, self.skin, made.bones(), worn.texture, worn.name, both_sides=worn.both_sides
-            )
+            write_skin(part, rig, bones, worn.texture, worn.name, both_sides=worn.both_sides)
 
     def film(self, made: SynthesisedWalk, prepared: WalkRun, file: Path) -> int:
         """Draw the film, ``file`` ends in .mp4; shows progress on standard error.
@@ -61,7 +61,7 @@ class SynthesisSkin:
             return film_motion(
                 bones,
                 part,
-                look=bone_look(self.dressed, self.skin, bones.bone_m),
+                look=rig_look(spine_rig(self.skin, bones.bone_m), self.dressed.texture),
                 robot=prepared.robot,
                 world=prepared.world,
                 ground=prepared.ground,

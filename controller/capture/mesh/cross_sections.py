@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from snakewalk.config.animal import SkinConfig
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.skin import SkinConfig
 from snakewalk.controller.capture.mesh.body_model import BodyModel
 from snakewalk.controller.capture.mesh.mesh import round_tips, tips
 from snakewalk.controller.capture.mesh.pde_surface import TURN

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from snakewalk.config.animal import FinConfig
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
-from snakewalk.config.skin import FinConfig
 from snakewalk.controller.capture.mesh.pde_surface import TURN, PdeSurface
 
 FIN_CURVES = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)

@@ -14,7 +14,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from snakewalk.config.arrays import Floats, Ints
-from snakewalk.controller.capture.mesh.bone_motion import BoneMotion
 from snakewalk.controller.capture.mesh.cross_sections import AROUND, CrossSections
 from snakewalk.controller.capture.mesh.mesh import Mesh, tube_faces, vertex_normals
 from snakewalk.controller.capture.mesh.patches import Fin, Tube
@@ -120,15 +119,6 @@ def rest_fronts_m(bone_m: Floats, axis_m: float) -> Floats:
     """(K, 3) front ends of the bones of the straight body."""
     start = np.concatenate([[0.0], np.cumsum(bone_m)[:-1]])
     return np.stack([-start, np.zeros(len(start)), np.full(len(start), axis_m)], axis=1)
-
-
-def posed_m(skin: Skin, motion: BoneMotion, frame: int) -> Floats:
-    """(V, 3) corners of the skin in one frame of a motion; the skin has the motion's length."""
-    held = weights(skin, motion.bone_m)
-    local = skin.mesh.vertices[:, None] - rest_fronts_m(motion.bone_m, skin.axis_m)[held.bones]
-    turned = np.einsum("vkij,vkj->vki", motion.rotation[frame][held.bones], local)
-    placed = turned + motion.front_m[frame][held.bones]
-    return np.asarray((held.shares[..., None] * placed).sum(axis=1))
 
 
 def _fin_faces(points: Floats, tip: Floats) -> Ints:

@@ -13,11 +13,11 @@ import pygltflib
 from PIL import Image as Pillow
 from scipy.spatial.transform import Rotation
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.mesh.bone_motion import BoneMotion
 from snakewalk.controller.capture.mesh.mesh_files import SKIN_RGB
-from snakewalk.controller.capture.mesh.skin import Skin, rest_fronts_m, weights
+from snakewalk.controller.capture.mesh.rig import Rig
 
 MOST_BONES: Final = 256
 """Bones count in bytes."""
@@ -29,7 +29,7 @@ _STILL_M = 1e-6
 
 def write_skin(
     file: Path,
-    skin: Skin,
+    rig: Rig,
     motion: BoneMotion,
     texture: Image | None,
     name: str,
@@ -40,8 +40,8 @@ def write_skin(
 
     Args:
         file: ends in .glb.
-        skin: of the motion's length.
-        motion: at most 256 bones.
+        rig: of the motion's size.
+        motion: of the rig's bones, at most 256.
         texture: (H, W, 3), first row at v = 1; None paints the skin in one colour.
         name: of mesh and animation.
         both_sides: draw the inside of the mesh, too: for one with holes.
@@ -56,7 +56,7 @@ def write_skin(
     if len(motion.time_s) < 2:
         raise InputError(f"{file}: an animation needs two frames or more")
     out = _Builder()
-    mesh, held = skin.mesh, weights(skin, motion.bone_m)
+    mesh, held, rest = rig.mesh, rig.held, rig.rest_m
     shares = np.zeros((len(mesh.vertices), 4), np.float32)
     shares[:, [0, 2]] = held.shares[:, [0, 2]]
     shares[:, 1] = np.float32(1.0) - shares[:, 0] - shares[:, 2]  # sum 1 in single precision
@@ -73,29 +73,33 @@ def write_skin(
     if texture is not None:
         attributes.TEXCOORD_0 = out.add(mesh.uv * [1.0, -1.0] + [0.0, 1.0], "VEC2", array)
     faces = out.add(mesh.faces.astype(np.uint32).ravel(), "SCALAR", element)
-    rest = rest_fronts_m(motion.bone_m, skin.axis_m)
     inverse = np.zeros((bones, 4, 4))  # column by column, as glTF wants it
     inverse[:, :3, :3] = Y_UP
     inverse[:, 3, :3] = -rest
     inverse[:, 3, 3] = 1.0
-    turn, place = _chained(motion)
-    local = np.vstack([rest[:1], np.diff(rest, axis=0)])
+    turn, place = _carried(motion, rig.parent)
+    carried = rig.parent >= 0
+    local = np.where(carried[:, None], rest - rest[rig.parent], rest)
     nodes = [
         pygltflib.Node(name="body", mesh=0, skin=0),
-        pygltflib.Node(name="spine", rotation=_ROOT_QUATERNION, children=[2]),
+        pygltflib.Node(
+            name="spine",
+            rotation=_ROOT_QUATERNION,
+            children=(np.flatnonzero(~carried) + 2).tolist(),
+        ),
     ]
     for k in range(bones):
-        children = [k + 3] if k + 1 < bones else []
+        children = (np.flatnonzero(rig.parent == k) + 2).tolist()
         nodes.append(
             pygltflib.Node(name=f"bone{k}", translation=local[k].tolist(), children=children)
         )
     time = out.add(motion.time_s, "SCALAR", None, bounds=True)
     samplers: list[pygltflib.AnimationSampler] = []
     channels: list[pygltflib.AnimationChannel] = []
-    slides = np.abs(place - local).max(axis=(0, 2)) > _STILL_M * skin.length_m
+    slides = np.abs(place - local).max(axis=(0, 2)) > _STILL_M * motion.length_m
     for k in range(bones):
         paths: list[tuple[str, Floats, str]] = [("rotation", turn[:, k], "VEC4")]
-        if slides[k] or k == 0:
+        if slides[k] or not carried[k]:
             paths.append(("translation", place[:, k], "VEC3"))
         for path, values, kind in paths:
             target = pygltflib.AnimationChannelTarget(node=k + 2, path=path)
@@ -135,13 +139,15 @@ def write_skin(
     file.write_bytes(b"".join(gltf.save_to_bytes()))
 
 
-def _chained(motion: BoneMotion) -> tuple[Floats, Floats]:
-    """Quaternions (T, K, 4), x y z w, and places (T, K, 3) of each bone in the one before it."""
+def _carried(motion: BoneMotion, parent: Ints) -> tuple[Floats, Floats]:
+    """Quaternions (T, K, 4), x y z w, and places (T, K, 3) of bones in those that carry them."""
     frames, bones = motion.front_m.shape[:2]
     rotation, place = motion.rotation.copy(), motion.front_m.copy()
-    before = motion.rotation[:, :-1]
-    rotation[:, 1:] = np.einsum("tkji,tkjl->tkil", before, motion.rotation[:, 1:])
-    place[:, 1:] = np.einsum("tkji,tkj->tki", before, np.diff(motion.front_m, axis=1))
+    rows = np.flatnonzero(parent >= 0)
+    before = motion.rotation[:, parent[rows]]
+    off = motion.front_m[:, rows] - motion.front_m[:, parent[rows]]
+    rotation[:, rows] = np.einsum("tkji,tkjl->tkil", before, motion.rotation[:, rows])
+    place[:, rows] = np.einsum("tkji,tkj->tki", before, off)
     turn = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_quat().reshape(frames, bones, 4)
     flips = np.where((turn[1:] * turn[:-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
     turn[1:] *= flips.cumprod(axis=0)[..., None]  # the short way from frame to frame

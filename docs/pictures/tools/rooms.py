@@ -29,6 +29,8 @@ PLACES = {
     "controller/localization": (2.9, 8.4),
     "controller/capture": (2.9, 7.4),
     "controller/gaits": (4.9, 7.4),
+    "controller/animal": (6.3, 8.4),
+    "controller/mapping": (8.0, 8.4),
     "controller/terrain": (7.9, 6.4),
     "controller/shape": (1.4, 6.4),
     "controller/mechanics": (6.2, 7.4),

@@ -155,6 +155,9 @@ ROWS = [
     ("init file.txt/x", "file.txt/x: cannot be made: Not a directory"),
     ("schema", "Missing argument 'kind'"),
     ("synthesise flat-square -o x --motion nosuch", "motion: must be 'walk'"),
+    ("synthesise flat-square -o x --animal nosuch", "--animal nosuch: no such animal; shipped are"),
+    ("synthesise flat-square -o x --animal goat --motion kp", "--motion: is for snakes; --animal"),
+    ("synthesise flat-square -o x --animal nosuch.toml", "nosuch.toml: no such file"),
     ("synthesise flat-square -o x --look nosuch", "--look nosuch: is for --film and --glb"),
     ("nosuch", "No such command 'nosuch'"),
 ]

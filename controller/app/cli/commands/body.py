@@ -177,13 +177,21 @@ class _Made:
             files = self._write(skin.mesh, body.texture)
         else:
             from snakewalk.controller.app.recordings.body_motion import animated  # noqa: PLC0415
+            from snakewalk.controller.capture.mesh.rig import spine_rig  # noqa: PLC0415
             from snakewalk.controller.capture.mesh.skin_file import write_skin  # noqa: PLC0415
 
             if self.output.suffix.lower() != ".glb":
                 raise InputError(f"{self.output}: a skin that moves is written as .glb")
             skin, motion = animated(skin, animate, fps)
             with atomic_write(self.output) as part:
-                write_skin(part, skin, motion, body.texture, body.name, both_sides=body.both_sides)
+                write_skin(
+                    part,
+                    spine_rig(skin, motion.bone_m),
+                    motion,
+                    body.texture,
+                    body.name,
+                    both_sides=body.both_sides,
+                )
             files = [str(self.output), *map(str, self.drawn)]
             facts = {
                 "animated_by": animate,

@@ -1,11 +1,12 @@
 """``snakewalk synthesise``: a motion without a robot."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import (
     DEFAULT_RUN,
     Force,
@@ -20,6 +21,9 @@ from snakewalk.controller.app.cli.options import (
     show,
 )
 from snakewalk.controller.app.result_files import atomic_write, check_picture, refuse_to_overwrite
+
+if TYPE_CHECKING:
+    from snakewalk.controller.app.runs.walk_run import WalkRun
 
 _SYNTHESISED = ("walk", "walk-printed", "kp")
 
@@ -42,6 +46,13 @@ def synthesise(
             help="walk; walk-printed: aimed as [PT] prints it; kp: the older state graph of [KP]"
         ),
     ] = None,
+    animal: Annotated[
+        str | None,
+        typer.Option(
+            help="with legs, in place of a snake: lizard, goat, or a .toml ([KP])",
+            autocompletion=completion.ANIMALS,
+        ),
+    ] = None,
     set_: Set = None,
     frames: Annotated[
         int | None, typer.Option(min=2, help="exactly so many; default: to the last waypoint")
@@ -54,7 +65,7 @@ def synthesise(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make a snake's motion over a world: plan, states, walk, speed, skeleton, ground ([PT])."""
+    """Make an animal's motion over a world: a snake's by states ([PT]), or that of legs ([KP])."""
     from snakewalk.controller.app.recordings.snake_synthesis import SnakeSynthesis  # noqa: PLC0415  heavy
     from snakewalk.controller.app.report.plots.snake_synthesis import draw_walk  # noqa: PLC0415
     from snakewalk.controller.app.runs.factory import prepare_walk  # noqa: PLC0415
@@ -72,6 +83,11 @@ def synthesise(
     more = [file for file, wanted in ((moving, film), (solid, glb)) if wanted]
     refuse_to_overwrite([recording, picture, *more], force)
     check_picture(picture)
+    files = {"film": str(moving) if film else None, "skin": str(solid) if glb else None}
+    if animal is not None:
+        kept = {"--motion": motion, "--track": track, "--look": None if look == "animal" else look}
+        _with_legs(animal, prepared, frames, (recording, picture), more, kept, files, as_json)
+        return
     worn = None
     if more:
         from snakewalk.controller.app.recordings.synthesis_skin import SynthesisSkin  # noqa: PLC0415
@@ -87,7 +103,46 @@ def synthesise(
         worn.write(made, solid)
     if worn is not None and film:
         worn.film(made, prepared, moving)
-    files = {"film": str(moving) if film else None, "skin": str(solid) if glb else None}
+    show(made.facts() | {"track": str(recording), "picture": str(picture)} | files, as_json)
+    if frames is None and not made.complete:
+        raise SystemExit(1)
+
+
+def _with_legs(
+    name: str,
+    prepared: "WalkRun",
+    frames: int | None,
+    written: tuple[Path, Path],
+    more: list[Path],
+    kept: dict[str, str | None],
+    files: dict[str, str | None],
+    as_json: bool,
+) -> None:
+    """Synthesise an animal with legs."""
+    from snakewalk.controller.app.recordings.animal_synthesis import (  # noqa: PLC0415  heavy
+        read_animal,
+        synthesise_animal,
+    )
+    from snakewalk.controller.app.report.plots.animal_synthesis import draw_animal  # noqa: PLC0415
+
+    wrong = [option for option, value in kept.items() if value is not None]
+    if wrong:
+        raise InputError(f"{wrong[0]}: is for snakes; --animal {name} has its own motion and skin")
+    recording, picture = written
+    config = read_animal(name)
+    body = None
+    if more:
+        from snakewalk.controller.app.recordings.animal_film import AnimalBody  # noqa: PLC0415
+
+        body = AnimalBody.of(config)
+    made = synthesise_animal(prepared, config, frames)
+    with atomic_write(recording) as part:
+        made.save(part, recording.stem)
+    draw_animal(made, picture, f"{config.name} on {prepared.world.name}")
+    if body is not None and files["skin"] is not None:
+        body.write(made, Path(files["skin"]))
+    if body is not None and files["film"] is not None:
+        body.film(made, prepared, Path(files["film"]))
     show(made.facts() | {"track": str(recording), "picture": str(picture)} | files, as_json)
     if frames is None and not made.complete:
         raise SystemExit(1)

@@ -16,7 +16,8 @@ from snakewalk.controller.capture.mesh.body_model import BodyModel
 from snakewalk.controller.capture.mesh.bone_motion import BoneMotion
 from snakewalk.controller.capture.mesh.mesh import Mesh
 from snakewalk.controller.capture.mesh.mesh_files import SKIN_RGB
-from snakewalk.controller.capture.mesh.skin import Skin, posed_m
+from snakewalk.controller.capture.mesh.rig import posed_m, spine_rig
+from snakewalk.controller.capture.mesh.skin import Skin
 
 _SUN = np.array([0.3, 0.5, 0.81])
 
@@ -95,7 +96,11 @@ def draw_skin(file: Path, skin: Skin, motion: BoneMotion | None, texture: Image 
         figure = Figure(figsize=(9.0, 5.6), layout="constrained", dpi=88)
         panels: Any = figure.subfigures(1 if motion is None else 2, len(shown) // 2 or 1)
         for frame, panel in zip(shown, np.ravel(panels), strict=True):
-            corners = skin.mesh.vertices if motion is None else posed_m(skin, motion, int(frame))
+            corners = (
+                skin.mesh.vertices
+                if motion is None
+                else posed_m(spine_rig(skin, motion.bone_m), motion, int(frame))
+            )
             _solid(panel, replace(skin.mesh, vertices=corners), texture)
             if motion is not None:
                 panel.suptitle(f"{motion.time_s[frame]:.2f} s", fontsize=9)

@@ -14,7 +14,7 @@ from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.controller.app.recordings.body_look import check_look, skin_look
 from snakewalk.controller.app.recordings.body_motion import from_poses, robot_skin
 from snakewalk.controller.app.recordings.body_skin import body_skin
-from snakewalk.controller.capture.mesh.skin import posed_m
+from snakewalk.controller.capture.mesh.rig import posed_m, spine_rig
 from snakewalk.sim.rendering.looks import dressed_model
 
 
@@ -40,7 +40,7 @@ def test_mujoco_draws_the_posed_skin() -> None:
     drawn = np.array(scene.skinvert).reshape(-1, 3)
     skin = robot_skin(body_skin("snake").skin, of.robot)
     motion = from_poses(of.robot, np.zeros(1), qpos[None])
-    np.testing.assert_allclose(drawn, posed_m(skin, motion, 0), atol=2e-6)
+    np.testing.assert_allclose(drawn, posed_m(spine_rig(skin, motion.bone_m), motion, 0), atol=2e-6)
 
 
 def test_a_skin_stands_in_place_of_capsules_and_adds_no_mass() -> None:
@@ -87,5 +87,5 @@ def test_the_skin_rests_where_the_belly_does_and_at_its_axis_in_water() -> None:
 def test_a_look_that_is_none_is_refused_before_a_run() -> None:
     check_look("servos")
     check_look("animal")
-    with pytest.raises(InputError, match=r"lizard: no such body; shipped skins are dolphin"):
-        check_look("lizard")
+    with pytest.raises(InputError, match=r"unicorn: no such body; shipped skins are dolphin"):
+        check_look("unicorn")

@@ -10,13 +10,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from snakewalk.config.ground import build_ground
-from snakewalk.config.loader import load_world
-from snakewalk.controller.app.recordings.body_look import bone_look
+from snakewalk.config.loader import load_world, locate
+from snakewalk.controller.app.recordings.body_look import rig_look
 from snakewalk.controller.app.recordings.snake_synthesis import SnakeSynthesis, SynthesisedWalk
 from snakewalk.controller.app.recordings.synthesis_skin import FILM_SEGMENTS, SynthesisSkin
 from snakewalk.controller.app.runs.factory import prepare_playback, prepare_walk
 from snakewalk.controller.capture.mesh.body_model import read_silhouettes
-from snakewalk.controller.capture.mesh.skin import posed_m
+from snakewalk.controller.capture.mesh.rig import posed_m, spine_rig
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.sim.rendering.looks import dressed_model
 from tests.helpers.in_process import snakewalk
@@ -136,7 +136,7 @@ def test_the_bones_lie_on_the_skeleton_and_the_film_draws_the_posed_skin(
     np.testing.assert_allclose(bones.front_m, points[:, :-1:FILM_SEGMENTS])
     np.testing.assert_allclose(ends, points[:, FILM_SEGMENTS::FILM_SEGMENTS], atol=2e-3)  # bent
 
-    look = bone_look(worn.dressed, worn.skin, bones.bone_m)
+    look = rig_look(spine_rig(worn.skin, bones.bone_m), worn.dressed.texture)
     model = dressed_model(prepared.robot, prepared.world, prepared.ground, look=look)
     assert model.nbody == 1 + len(bones.bone_m)  # the robot's links are gone
     data, scene = mujoco.MjData(model), mujoco.MjvScene(model, maxgeom=1000)
@@ -147,7 +147,9 @@ def test_the_bones_lie_on_the_skeleton_and_the_film_draws_the_posed_skin(
     option, camera = mujoco.MjvOption(), mujoco.MjvCamera()
     mujoco.mjv_updateScene(model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
     drawn = np.array(scene.skinvert).reshape(-1, 3)
-    np.testing.assert_allclose(drawn, posed_m(worn.skin, bones, frame), atol=3e-6)
+    np.testing.assert_allclose(
+        drawn, posed_m(spine_rig(worn.skin, bones.bone_m), bones, frame), atol=3e-6
+    )
 
 
 def test_rings_turn_green_when_the_mass_centre_is_there(traverse: SynthesisedWalk) -> None:
@@ -193,3 +195,41 @@ def test_a_motion_on_paper_is_refused_as_a_run() -> None:
     done = snakewalk("run", "jacksboro-traverse", "--motion", "kp")
     assert done.returncode == 2
     assert "kp is a motion on paper: snakewalk synthesise" in done.stderr
+
+
+def test_an_animal_with_legs_is_led_over_the_hills(tmp_path: Path) -> None:
+    out = tmp_path / "lizard"
+    run = ["synthesise", "jacksboro-traverse", "--animal", "lizard", "-o", str(out)]
+    done = snakewalk(*run, "--json")
+    assert done.returncode == 0
+    facts = json.loads(done.stdout)
+    assert facts["waypoints_reached"] == facts["waypoints"] == 4
+    assert facts["slip_most_m"] < 1e-9
+    assert facts["leg_short_most_m"] < 1e-3
+    assert facts["speed_m_s"] == pytest.approx(0.133 / 0.256, rel=1e-3)
+    assert facts["seconds"] == pytest.approx(facts["path_m"] / facts["speed_m_s"], rel=0.05)
+    with np.load(out.with_suffix(".npz")) as held:
+        assert held["foot_m"].shape == (facts["frames"], 4, 3)
+        assert held["on_ground"].mean() == pytest.approx(16 / 24, abs=0.01)  # 63 % of 24 frames
+    assert out.with_suffix(".png").stat().st_size > 10_000
+    track = load_track(str(out.with_suffix(".npz")))  # the spine is a recording as any other
+    assert track.frames == facts["frames"]
+    again = snakewalk(*run)
+    assert again.returncode == 2
+    assert "--force" in again.stderr
+
+
+def test_an_animal_of_ones_own_is_filmed_and_written_as_gltf(tmp_path: Path) -> None:
+    own = locate("animals", "goat").read_text().replace("length_m = 1.1", "length_m = 0.5")
+    (tmp_path / "kid.toml").write_text(own.replace('skin = "goat"', 'skin = "own.toml"'))
+    (tmp_path / "own.toml").write_text(locate("skins", "goat").read_text())
+    out = tmp_path / "kid"
+    done = snakewalk(
+        *("synthesise", "flat-square", "--animal", str(tmp_path / "kid.toml"), "-o", str(out)),
+        *("--frames", "12", "--glb", "--film", "--json"),
+    )
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["frames"] == 12
+    tree = pygltflib.GLTF2().load(str(out.with_suffix(".glb")))
+    assert len(tree.skins[0].joints) == 24 + 8 + 1  # spine, legs, and the beard that swings
+    assert out.with_suffix(".mp4").stat().st_size > 1000

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from snakewalk.config.animal import FinConfig, SkinConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load, locate, shipped
-from snakewalk.config.skin import FinConfig, SkinConfig
 from snakewalk.controller.capture.mesh.cross_sections import ellipses, skin_model
 from snakewalk.controller.capture.mesh.patches import Tube, fin, fins
 from snakewalk.controller.capture.mesh.pde_surface import TURN, PdeSurface

@@ -13,7 +13,8 @@ from snakewalk.controller.capture.mesh.cross_sections import AROUND, CrossSectio
 from snakewalk.controller.capture.mesh.mesh import Mesh
 from snakewalk.controller.capture.mesh.patches import Tube
 from snakewalk.controller.capture.mesh.pde_surface import TURN, PdeSurface, carry_over
-from snakewalk.controller.capture.mesh.skin import Skin, carried, pde_skin, posed_m, weights
+from snakewalk.controller.capture.mesh.rig import posed_m, spine_rig
+from snakewalk.controller.capture.mesh.skin import Skin, carried, pde_skin, weights
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.gaits.spine import SpineGait
 
@@ -58,7 +59,9 @@ def test_shares_sum_to_one_and_are_continuous(skin: Skin) -> None:
 
 def test_the_bind_pose_is_the_rest_pose(skin: Skin) -> None:
     placed = replace(skin, axis_m=0.05)
-    np.testing.assert_allclose(posed_m(placed, bent(0.3), 0), skin.mesh.vertices, atol=1e-14)
+    np.testing.assert_allclose(
+        posed_m(spine_rig(placed, bent(0.3).bone_m), bent(0.3), 0), skin.mesh.vertices, atol=1e-14
+    )
 
 
 def test_a_rigid_motion_of_the_bones_is_one_of_the_skin(skin: Skin) -> None:
@@ -69,8 +72,10 @@ def test_a_rigid_motion_of_the_bones_is_one_of_the_skin(skin: Skin) -> None:
         front_m=motion.front_m @ turn.T + [3.0, -1.0, 2.0],
         rotation=turn @ motion.rotation,
     )
-    expected = posed_m(skin, motion, 1) @ turn.T + [3.0, -1.0, 2.0]
-    np.testing.assert_allclose(posed_m(skin, moved, 1), expected, atol=1e-13)
+    expected = posed_m(spine_rig(skin, motion.bone_m), motion, 1) @ turn.T + [3.0, -1.0, 2.0]
+    np.testing.assert_allclose(
+        posed_m(spine_rig(skin, moved.bone_m), moved, 1), expected, atol=1e-13
+    )
 
 
 @pytest.mark.parametrize("bend", [0.1, 0.5, 1.0])
@@ -81,7 +86,7 @@ def test_the_spine_runs_through_every_joint_and_passes_links_on_the_outside(bend
     line = np.stack([-place * LENGTH_M, 0 * place, 0 * place + 0.05], axis=1)
     none = np.zeros((0, 3), np.int64)
     axis = Skin(Mesh(line, line, line[:, :2], none), place, LENGTH_M, 0.05)
-    found = posed_m(axis, motion, 1)
+    found = posed_m(spine_rig(axis, motion.bone_m), motion, 1)
     joints = motion.front_m[1, 1:]
     np.testing.assert_allclose(found[::2], joints[: len(found[::2])], atol=1e-14)
     for k, point in enumerate(found[1::2], start=1):
@@ -115,7 +120,7 @@ def test_a_radial_part_that_does_not_turn_flattens_the_body() -> None:
     points = surface.points_m(u, v).reshape(-1, 3)
     mesh = Mesh(points, points, points[:, :2], np.zeros((0, 3), np.int64))
     ours = Skin(mesh, np.repeat(u, 24) / motion.length_m, motion.length_m, 0.0)
-    turned = posed_m(ours, motion, 1).reshape(31, 24, 3)
+    turned = posed_m(spine_rig(ours, motion.bone_m), motion, 1).reshape(31, 24, 3)
     assert np.ptp(turned[-1] @ across) == pytest.approx(0.1, rel=0.01)
 
 
@@ -129,8 +134,10 @@ def test_a_mesh_off_the_surface_turns_with_it_and_as_printed_it_does_not(skin: S
     turn = Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi]).as_matrix()
     moved = replace(motion, front_m=motion.front_m @ turn.T, rotation=turn @ motion.rotation)
     level = [0.0, 0.0, 0.05 - skin.axis_m]
-    np.testing.assert_allclose(posed_m(hung, moved, 1), (off + level) @ turn.T, atol=1e-12)
-    surface = posed_m(skin, moved, 1)
+    np.testing.assert_allclose(
+        posed_m(spine_rig(hung, moved.bone_m), moved, 1), (off + level) @ turn.T, atol=1e-12
+    )
+    surface = posed_m(spine_rig(skin, moved.bone_m), moved, 1)
     printed = carry_over(off, skin.mesh.vertices, surface)
     wrong = np.linalg.norm(printed - (off + level) @ turn.T, axis=1)
     assert wrong.max() > 0.8 * 0.02 * np.sqrt(2.0)
@@ -138,7 +145,11 @@ def test_a_mesh_off_the_surface_turns_with_it_and_as_printed_it_does_not(skin: S
 
 def test_a_mesh_that_is_the_surface_moves_as_the_surface(skin: Skin) -> None:
     hung = carried(skin.mesh, skin)
-    np.testing.assert_allclose(posed_m(hung, bent(0.5), 1), posed_m(skin, bent(0.5), 1), atol=1e-12)
+    np.testing.assert_allclose(
+        posed_m(spine_rig(hung, bent(0.5).bone_m), bent(0.5), 1),
+        posed_m(spine_rig(skin, bent(0.5).bone_m), bent(0.5), 1),
+        atol=1e-12,
+    )
 
 
 def test_the_moved_skin_is_nearly_the_surface_solved_anew_from_moved_curves(skin: Skin) -> None:
@@ -149,10 +160,15 @@ def test_the_moved_skin_is_nearly_the_surface_solved_anew_from_moved_curves(skin
     curves = Mesh(rest, rest, rest[:, :2], np.zeros((0, 3), np.int64))
     hung = Skin(curves, np.repeat(found.stations, AROUND), LENGTH_M, found.axis_m)
     frame = 7
-    again = Tube.through(posed_m(hung, motion, frame).reshape(found.curves_m.shape), found.stations)
+    again = Tube.through(
+        posed_m(spine_rig(hung, motion.bone_m), motion, frame).reshape(found.curves_m.shape),
+        found.stations,
+    )
     solved = pde_skin(found, again).mesh.vertices
     thick = found.curves_m[..., 1].max()
-    assert np.abs(solved - posed_m(skin, motion, frame)).max() < 0.02 * thick
+    assert (
+        np.abs(solved - posed_m(spine_rig(skin, motion.bone_m), motion, frame)).max() < 0.02 * thick
+    )
 
 
 @pytest.mark.parametrize("name", [n for n, g in GAITS.items() if issubclass(g, SpineGait)])

@@ -15,7 +15,8 @@ from snakewalk.controller.capture.mesh.body_model import spindle
 from snakewalk.controller.capture.mesh.bone_motion import BoneMotion, from_points, from_track
 from snakewalk.controller.capture.mesh.cross_sections import ellipses
 from snakewalk.controller.capture.mesh.patches import Tube
-from snakewalk.controller.capture.mesh.skin import Skin, pde_skin, posed_m
+from snakewalk.controller.capture.mesh.rig import posed_m, spine_rig
+from snakewalk.controller.capture.mesh.skin import Skin, pde_skin
 from snakewalk.controller.capture.mesh.skin_file import Y_UP, write_skin
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.capture.track import Track
@@ -52,7 +53,9 @@ def test_every_frame_of_a_recording_is_read_back(track: Track, skin: Skin, tmp_p
     file = tmp_path / "snake.glb"
     length = float(track.length_m or 1.0)
     motion = from_track(track, 0.01)
-    write_skin(file, skin.sized(motion.length_m), motion, TEXTURE, "snake")
+    write_skin(
+        file, spine_rig(skin.sized(motion.length_m), motion.bone_m), motion, TEXTURE, "snake"
+    )
     player = GltfPlayer.read(file)
     np.testing.assert_allclose(player.time_s, track.time_s, atol=1e-6)
     for frame in range(0, track.frames, 40):
@@ -69,18 +72,24 @@ def test_every_frame_of_a_recording_is_read_back(track: Track, skin: Skin, tmp_p
 def test_the_played_skin_is_the_posed_skin_for_any_motion(skin: Skin, tmp_path: Path) -> None:
     motion = tumbling()
     sized = skin.sized(motion.length_m)
-    write_skin(tmp_path / "a.glb", sized, motion, None, "any", both_sides=True)
+    write_skin(
+        tmp_path / "a.glb", spine_rig(sized, motion.bone_m), motion, None, "any", both_sides=True
+    )
     player = GltfPlayer.read(tmp_path / "a.glb")
     for frame in (0, 7, 29):
         np.testing.assert_allclose(
-            player.corners(frame) @ Y_UP, posed_m(sized, motion, frame), atol=2e-5
+            player.corners(frame) @ Y_UP,
+            posed_m(spine_rig(sized, motion.bone_m), motion, frame),
+            atol=2e-5,
         )
 
 
 def test_weights_sum_to_one_as_written_and_quaternions_take_the_short_way(
     skin: Skin, tmp_path: Path
 ) -> None:
-    write_skin(tmp_path / "a.glb", skin.sized(1.0), tumbling(), None, "any")
+    write_skin(
+        tmp_path / "a.glb", spine_rig(skin.sized(1.0), tumbling().bone_m), tumbling(), None, "any"
+    )
     player = GltfPlayer.read(tmp_path / "a.glb")
     held = player.attribute("WEIGHTS_0")
     np.testing.assert_allclose(held.sum(axis=1), 1.0, atol=2e-7)
@@ -95,7 +104,7 @@ def test_weights_sum_to_one_as_written_and_quaternions_take_the_short_way(
 def test_links_of_one_length_need_no_translation(skin: Skin, tmp_path: Path) -> None:
     line = np.stack([-np.linspace(0, 1, 9), np.zeros(9), np.zeros(9)], axis=1)
     motion = from_points(np.array([line, line + np.array([1.0, 0.0, 0.0])]), np.array([0.0, 1.0]))
-    write_skin(tmp_path / "a.glb", skin.sized(1.0), motion, None, "any")
+    write_skin(tmp_path / "a.glb", spine_rig(skin.sized(1.0), motion.bone_m), motion, None, "any")
     channels = GltfPlayer.read(tmp_path / "a.glb").tree["animations"][0]["channels"]
     paths = [channel["target"]["path"] for channel in channels]
     assert paths.count("rotation") == 8
@@ -105,9 +114,15 @@ def test_links_of_one_length_need_no_translation(skin: Skin, tmp_path: Path) -> 
 def test_useless_motions_are_refused(skin: Skin, tmp_path: Path) -> None:
     motion = tumbling(1)
     with pytest.raises(InputError, match="two frames"):
-        write_skin(tmp_path / "a.glb", skin, motion, None, "any")
+        write_skin(tmp_path / "a.glb", spine_rig(skin, motion.bone_m), motion, None, "any")
     with pytest.raises(InputError, match="at most 256 bones, not 300"):
-        write_skin(tmp_path / "a.glb", skin, tumbling(2, 300), None, "any")
+        write_skin(
+            tmp_path / "a.glb",
+            spine_rig(skin, tumbling(2, 300).bone_m),
+            tumbling(2, 300),
+            None,
+            "any",
+        )
     same = np.zeros((2, 5, 3))
     with pytest.raises(InputError, match="frame 0: points 0 and 1"):
         from_points(same, np.array([0.0, 1.0]))
@@ -130,7 +145,13 @@ def validator() -> bool:
 def test_khronos_validator_finds_nothing(textured: bool, skin: Skin, tmp_path: Path) -> None:
     file = tmp_path / "a.glb"
     motion = tumbling()
-    write_skin(file, skin.sized(motion.length_m), motion, TEXTURE if textured else None, "any")
+    write_skin(
+        file,
+        spine_rig(skin.sized(motion.length_m), motion.bone_m),
+        motion,
+        TEXTURE if textured else None,
+        "any",
+    )
     script = (
         "require('gltf-validator').validateBytes(new Uint8Array(require('fs')"
         f".readFileSync('{file}'))).then(r => console.log(JSON.stringify(r.issues)))"

@@ -16,9 +16,10 @@ def schema(
     kind: Annotated[
         str,
         typer.Argument(
-            help="run, robot, world, synthesis, gait, recording, skin or faults",
+            help="run, robot, world, synthesis, gait, recording, skin, animal or faults",
             autocompletion=completion.words(
-                "run", "robot", "world", "synthesis", "gait", "recording", "skin", "faults"
+                *("run", "robot", "world", "synthesis", "gait", "recording", "skin", "animal"),
+                "faults",
             ),
         ),
     ],

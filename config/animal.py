@@ -1,0 +1,138 @@
+"""What an animal is: its skin, and of one with legs these and one cycle of its gait ([KP] 4)."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from snakewalk.config.base import Strict
+
+Point = tuple[float, float, float]
+Cycles = Annotated[float, Field(ge=0.0, lt=1.0)]
+Place = Annotated[float, Field(ge=0.0, le=1.0)]
+Channel = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class SectionConfig(Strict):
+    """An ellipse across the body; lengths over the body's."""
+
+    at: Place = Field(description="place along the body, 0 the head's tip")
+    half_width: float = Field(ge=0.0, le=0.5)
+    half_height: float = Field(ge=0.0, le=0.5)
+    lift: float = Field(0.0, ge=-0.5, le=0.5, description="of its middle above the body's axis")
+
+
+class FinConfig(Strict):
+    """A fin; lengths over the body's."""
+
+    at: Place = Field(description="middle of the root along the body")
+    chord: float = Field(gt=0.0, le=0.8, description="length of the root")
+    around_deg: float = Field(ge=-180.0, le=180.0, description="90 the back, 0 left, -90 the belly")
+    span: float = Field(gt=0.0, le=0.5, description="from root to tip")
+    sweep: float = Field(0.0, ge=-0.5, le=0.5, description="of the tip's middle, backwards")
+    tip_chord: float = Field(0.4, gt=0.0, le=2.0, description="the tip's length over the root's")
+    thickness: float = Field(0.004, gt=0.0, le=0.05, description="half of it, at the root")
+    paired: bool = Field(False, description="the same on the other side")
+
+
+class SkinConfig(Strict):
+    """A body to be covered by PDE patches."""
+
+    name: str
+    source: str = Field(description="where the figures come from")
+    sections: tuple[SectionConfig, ...] = Field(min_length=4, description="head to tail")
+    fins: tuple[FinConfig, ...] = ()
+    back_rgb: tuple[Channel, Channel, Channel] = (0.66, 0.48, 0.20)
+    band_rgb: tuple[Channel, Channel, Channel] = (0.36, 0.22, 0.11)
+    bands: int = Field(0, ge=0, le=60, description="dark bands across the back")
+    eye_at: Place = Field(0.05, description="place of the eyes along the body")
+    eye_radius: float = Field(0.006, gt=0.0, le=0.05)
+
+    @model_validator(mode="after")
+    def _from_tip_to_tip(self) -> Self:
+        places = [section.at for section in self.sections]
+        if places[0] != 0.0 or places[-1] != 1.0 or places != sorted(set(places)):
+            raise ValueError("sections must rise in `at`, from 0 to 1")
+        if any(min(s.half_width, s.half_height) == 0.0 for s in self.sections[1:-1]):
+            raise ValueError("a section between the tips must be wider and higher than 0")
+        return self
+
+    @property
+    def all_fins(self) -> tuple[FinConfig, ...]:
+        """Each fin, paired ones twice."""
+        mirrored = [
+            fin.model_copy(update={"around_deg": 180.0 - fin.around_deg})
+            for fin in self.fins
+            if fin.paired
+        ]
+        return (*self.fins, *mirrored)
+
+
+class LegPairConfig(Strict):
+    """A left and a right leg at one girdle; lengths over the body's."""
+
+    at: Place = Field(description="place of the girdle along the body, 0 the head's tip")
+    hip_side: float = Field(gt=0.0, le=0.3, description="of a hip from the middle of the body")
+    hip_drop: float = Field(0.0, ge=-0.2, le=0.5, description="of the hips below the body's axis")
+    foot_side: float = Field(gt=0.0, le=0.5, description="of a foot from the line of travel")
+    foot_ahead: float = Field(
+        0.0, ge=-0.5, le=0.5, description="middle of a step, ahead of the hips"
+    )
+    upper: float = Field(gt=0.0, le=0.5, description="length from hip to knee")
+    lower: float = Field(gt=0.0, le=0.5, description="length from knee to foot")
+    thick: float = Field(gt=0.0, le=0.1, description="radius at the hip; the foot has half of it")
+    knee: Literal["out", "ahead", "behind"] = Field(description="where the knee points")
+    duty: float = Field(gt=0.1, lt=0.95, description="share of the cycle on the ground")
+    left: Cycles = Field(description="when the left foot comes down, in cycles")
+    right: Cycles = Field(description="when the right foot comes down, in cycles")
+    lift: float = Field(ge=0.0, le=0.3, description="H of [GC] Eq. 10: height of a step")
+    turn_rad: float = Field(
+        0.0, ge=0.0, le=1.2, description="of the girdle to either side, with its legs"
+    )
+
+
+class OrnamentConfig(Strict):
+    """A horn, an ear or a beard: a cone on the body; lengths over the body's."""
+
+    at: Place = Field(description="place along the body that carries it")
+    root: Point = Field(description="ahead of that place, to the left and above the axis")
+    tip: Point
+    thick: float = Field(gt=0.0, le=0.1, description="radius at the root")
+    swing_rad: float = Field(0.0, ge=0.0, le=1.2, description="to and fro, once a step")
+    paired: bool = Field(False, description="the same on the other side")
+    dark: bool = Field(False, description="of the colour of the skin's bands")
+
+    @property
+    def mirrored(self) -> Self:
+        """The one on the other side."""
+        ends = {"root": self.root, "tip": self.tip}
+        return self.model_copy(update={name: (x, -y, z) for name, (x, y, z) in ends.items()})
+
+
+class AnimalConfig(Strict):
+    """An animal on four legs that goes straight: prototype of a motion along a path."""
+
+    name: str
+    source: str = Field(description="where the figures come from")
+    skin: str = Field(description="of the body: a shipped skin, or a .toml beside this file")
+    length_m: float = Field(gt=0.0, le=20.0, description="from the head's tip to the tail's")
+    height: float = Field(gt=0.0, le=1.5, description="of the body's axis, over its length")
+    stride: float = Field(gt=0.0, le=3.0, description="way of a cycle, body lengths")
+    cycle_s: float = Field(gt=0.02, le=20.0, description="duration of a cycle")
+    leg_pairs: tuple[LegPairConfig, LegPairConfig] = Field(description="front, then hind")
+    vault: float = Field(
+        0.0, ge=0.0, le=1.0, description="how far the body rides on legs as on pendulums"
+    )
+    tail_swing_rad: float = Field(0.0, ge=0.0, le=1.5, description="of the tail's tip")
+    ornaments: tuple[OrnamentConfig, ...] = ()
+
+    @model_validator(mode="after")
+    def _front_before_hind(self) -> Self:
+        front, hind = self.leg_pairs
+        if not front.at < hind.at:
+            raise ValueError("leg_pairs: the front pair comes first: its `at` is smaller")
+        return self
+
+    @property
+    def speed_m_s(self) -> float:
+        """Of the prototype."""
+        return self.stride * self.length_m / self.cycle_s

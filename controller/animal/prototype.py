@@ -1,0 +1,142 @@
+"""The prototype: an animal with legs that goes along a straight line on level ground ([KP] 4.2.2).
+
+The body bends in a standing wave with its nodes at the girdles, each turned furthest when its legs
+are; the head keeps its heading. A foot on the ground stays where it is; in the air it goes as [GC]
+Eq. 9-10, each foot with a phase of its own. How high the body rides follows from the legs.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.animal import AnimalConfig, LegPairConfig
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.gaits.footfall import lift, swing
+from snakewalk.controller.gaits.wave import TURN
+
+SEGMENTS = 24
+"""Of the spine."""
+LEGS = ("front left", "front right", "hind left", "hind right")
+_SIDES = np.array([1.0, -1.0])
+_STRAIGHTENS = 0.06
+"""Of the body's length: over so much the head's heading comes back to that of the body."""
+_TAIL_WAVES = 0.5
+"""On the tail, where it swings."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prototype:
+    """T frames; x along the line, y to its left, z above the ground, m."""
+
+    time_s: Floats
+    """(T,)"""
+    spine_m: Floats
+    """(T, SEGMENTS + 1, 3) head first."""
+    hip_m: Floats
+    """(T, 4, 3) in the order of ``LEGS``."""
+    foot_m: Floats
+    """(T, 4, 3)"""
+    on_ground: Bools
+    """(T, 4) the time chart of contacts ([KP] Fig. 13)."""
+
+
+def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
+    """Move an animal along a line; its head's tip is at x = 0 at t = 0.
+
+    Args:
+        animal: its figures.
+        time_s: (T,) of the frames.
+
+    """
+    length_m = animal.length_m
+    cycles = time_s / animal.cycle_s
+    along = np.linspace(0.0, 1.0, SEGMENTS + 1)
+    phase = [_since_down(pair, cycles) for pair in animal.leg_pairs]
+    step_m = animal.stride * length_m
+    foot, hip, contact, high = [], [], [], []
+    for pair, at in zip(animal.leg_pairs, phase, strict=True):
+        ahead = 0.5 * step_m * pair.duty * swing(at, pair.duty)
+        high.append(_ride(animal, pair, ahead, at))
+        place = length_m * (pair.foot_ahead - pair.at) + animal.speed_m_s * time_s
+        side = np.broadcast_to(_SIDES * pair.foot_side * length_m, at.shape)
+        rise = length_m * pair.lift * lift(at, pair.duty)
+        foot.append(np.stack([place[:, None] + ahead, side, rise], axis=-1))
+        contact.append(at < pair.duty)
+    spine = _spine_m(animal, time_s, np.stack(high, axis=1))
+    for pair in animal.leg_pairs:
+        turned = _spine_rad(animal, cycles, np.array([pair.at]))
+        left = np.stack([-np.sin(turned), np.cos(turned), np.zeros_like(turned)], axis=-1)
+        root = _between(spine, along, pair.at)[:, None] - [0.0, 0.0, pair.hip_drop * length_m]
+        hip.append(root + _SIDES[:, None] * pair.hip_side * length_m * left)
+    return Prototype(
+        time_s,
+        spine,
+        np.concatenate(hip, axis=1),
+        np.concatenate(foot, axis=1),
+        np.concatenate(contact, axis=1),
+    )
+
+
+def _spine_m(animal: AnimalConfig, time_s: Floats, high_m: Floats) -> Floats:
+    """(T, SEGMENTS + 1, 3) points whose girdles are (T, 2) high; segments keep their length."""
+    segment_m = animal.length_m / SEGMENTS
+    along = np.linspace(0.0, 1.0, SEGMENTS + 1)
+    front, hind = (pair.at for pair in animal.leg_pairs)
+    share = np.clip((along - front) / (hind - front), 0.0, 1.0)
+    z = high_m[:, :1] + (high_m[:, 1:] - high_m[:, :1]) * share
+    angle = _spine_rad(animal, time_s / animal.cycle_s, 0.5 * (along[1:] + along[:-1]))
+    level_m = np.sqrt(segment_m**2 - np.diff(z, axis=1) ** 2)
+    steps = level_m[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    plan = np.concatenate([np.zeros((len(time_s), 1, 2)), -np.cumsum(steps, axis=1)], axis=1)
+    plan -= 0.5 * (_between(plan, along, front) + _between(plan, along, hind))[:, None]
+    middle_m = animal.speed_m_s * time_s - 0.5 * animal.length_m * (front + hind)
+    plan[..., 0] += middle_m[:, None]
+    return np.concatenate([plan, z[..., None]], axis=-1)
+
+
+def _since_down(pair: LegPairConfig, cycles: Floats) -> Floats:
+    """(T, 2) cycles since the left and the right foot came down, 0 to 1."""
+    return (cycles[:, None] - [pair.left, pair.right]) % 1.0
+
+
+def _spine_rad(animal: AnimalConfig, cycles: Floats, along: Floats) -> Floats:
+    """(T, S) headings of the spine at places along it.
+
+    A girdle is turned to the right by all of its turn when its left foot comes down.
+    """
+    front, hind = animal.leg_pairs
+    turned = [
+        -pair.turn_rad * np.cos(TURN * (cycles - pair.left))[:, None] for pair in animal.leg_pairs
+    ]
+    share = np.clip((along - front.at) / (hind.at - front.at), 0.0, 1.0)
+    trunk = turned[0] + (turned[1] - turned[0]) * 0.5 * (1.0 - np.cos(np.pi * share))
+    ahead = np.maximum(front.at - along, 0.0) / _STRAIGHTENS
+    behind = np.maximum(along - hind.at, 0.0)
+    tail = behind / (1.0 - hind.at)
+    swung = (
+        animal.tail_swing_rad
+        * tail
+        * np.sin(TURN * (cycles[:, None] - hind.left - _TAIL_WAVES * tail))
+    )
+    return np.asarray(trunk * np.exp(-ahead - behind / _STRAIGHTENS) + swung)
+
+
+def _ride(animal: AnimalConfig, pair: LegPairConfig, ahead_m: Floats, at: Floats) -> Floats:
+    """(T,) height of the body over a pair: that of the feet's pendulums that bear it, by vault.
+
+    A foot that comes down or leaves bears little; where one takes over from the other, both stand
+    equally far from the hip, and the height has no step.
+    """
+    height_m = animal.height * animal.length_m
+    bears = np.where(at < pair.duty, np.sin(np.pi * np.clip(at / pair.duty, 0.0, 1.0)) + 1e-9, 0.0)
+    fall = np.sqrt(np.maximum(height_m**2 - ahead_m**2, 0.0)) - height_m
+    total = bears.sum(axis=1)
+    share = np.divide(bears, total[:, None], where=total[:, None] > 0.0, out=np.zeros_like(bears))
+    return np.asarray(height_m + animal.vault * (share * fall).sum(axis=1))
+
+
+def _between(points: Floats, along: Floats, at: float) -> Floats:
+    """(T, D) of points (T, S + 1, D) at a place along the body."""
+    k = min(int(np.searchsorted(along, at, side="right")) - 1, len(along) - 2)
+    share = (at - along[k]) / (along[k + 1] - along[k])
+    return np.asarray(points[:, k] + share * (points[:, k + 1] - points[:, k]))
