@@ -1,12 +1,16 @@
 """Servos of a chain, as named on a command line, on a bench behind one line."""
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.robot import ImuConfig
 from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.line import BAUD_CLOCK, Ax12Line
 from snakewalk.sim.ax12.table import MODEL
+from snakewalk.sim.imu import Imu
 from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.plant import LinkMotion
 from snakewalk.sim.serve.chain_spec import ChainSpec
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
@@ -14,21 +18,33 @@ from snakewalk.sim.servo.motor import GEARBOXES
 
 
 def bench_line(
-    chain: ChainSpec, baud: int = 1_000_000, start_rad: ArrayLike = 0.0
+    chain: ChainSpec,
+    baud: int = 1_000_000,
+    start_rad: ArrayLike = 0.0,
+    imu: ImuConfig | None = None,
 ) -> SimLine | Ax12Line:
     """Line of ``baud`` with the servos of ``chain``; shafts start at ``start_rad``, of all or each.
 
+    An ``imu`` lies level and still on the bench beside them.
+
     Raises:
-        InputError: a model is not known or lacks the baud rate, two servos share an ID, or servos
+        InputError: a model is not known or lacks the baud rate, two devices share an ID, or devices
             of the two protocols are on one bus.
 
     """
+    if imu is not None and imu.id in chain.ids:
+        raise InputError(f"--imu {imu.id}: a servo has this ID")
     if MODEL in chain.models:
+        if imu is not None:
+            raise InputError(f"{MODEL} speaks Protocol 1.0 and {imu.model} 2.0: not on one bus")
         return _ax12_line(chain, baud, start_rad)
     bank = ServoBank(chain.ids, chain.models, baud)
     gears = [GEARBOXES.get(model) for model in bank.models]
     plant = BenchPlant(len(bank), gear=gears, start_rad=start_rad)
-    return SimLine(bank, plant, baud=baud)
+    device = None
+    if imu is not None:
+        device = Imu(imu, lambda: LinkMotion(plant.time_s, np.zeros(3), np.eye(3)), baud)
+    return SimLine(bank, plant, baud=baud, imu=device)
 
 
 def _ax12_line(chain: ChainSpec, baud: int, start_rad: ArrayLike) -> Ax12Line:

@@ -6,9 +6,14 @@ A model holds for the IDs before it, back to the model before; IDs behind the la
 from dataclasses import dataclass
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.robot import ImuConfig
 from snakewalk.drivers.port.port_map import id_range
+from snakewalk.drivers.protocol.imu_table import IMU_TABLES
 
 DEFAULT_MODEL = "XM430-W350"
+IMU_EXAMPLE = "write 200, 200:imu_to_dxl or 200:FFW-G40-IMU"
+BENCH_RANGES = {"gyro_range_dps": 2000.0, "acceleration_range_g": 4.0}
+"""Of a bench IMU whose table leaves them open (ours): write them into the robot's file."""
 _EXAMPLE = "write 1-16, 1,2,5-8:XL330-M288 or 1-2:XL430-W250,3-6:XL330-M288"
 
 
@@ -51,3 +56,23 @@ def parse_chain(text: str) -> ChainSpec:
             models += [model.upper().replace("_", "-")] * (len(ids) - len(models))
     rest = models[-1] if models else DEFAULT_MODEL
     return ChainSpec(tuple(ids), (*models, *[rest] * (len(ids) - len(models))))
+
+
+def parse_imu(text: str) -> ImuConfig:
+    """Read ``ID[:MODEL]`` of an IMU beside the servos.
+
+    Raises:
+        InputError: no ID, or a model that is not known.
+
+    """
+    number, _, model = text.partition(":")
+    source = f"--imu {text}"
+    ids = id_range(number.strip(), source, IMU_EXAMPLE)
+    if len(ids) != 1:
+        raise InputError(f"{source}: one device has one ID; {IMU_EXAMPLE}")
+    known = {each.upper(): each for each in IMU_TABLES}
+    name = known.get((model.strip() or "imu_to_dxl").upper())
+    if name is None:
+        raise InputError(f"{source}: no such model; there are {', '.join(IMU_TABLES)}")
+    ranges = {} if name == "imu_to_dxl" else BENCH_RANGES
+    return ImuConfig.model_validate({"model": name, "id": ids[0], **ranges})

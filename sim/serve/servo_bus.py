@@ -11,7 +11,7 @@ from snakewalk.config.loader import load
 from snakewalk.drivers.clock import WallClock
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.serve.bench_line import bench_line
-from snakewalk.sim.serve.chain_spec import parse_chain
+from snakewalk.sim.serve.chain_spec import parse_chain, parse_imu
 from snakewalk.sim.serve.pty import PtyServer
 
 
@@ -25,8 +25,10 @@ class ServoBus:
         baud: int = 1_000_000,
         faults: str | Path | FaultPlan | None = None,
         start_rad: float = 0.0,
+        imu: str | None = None,
     ) -> None:
-        self.line = bench_line(parse_chain(servos), baud, start_rad)
+        device = None if imu is None else parse_imu(imu)
+        self.line = bench_line(parse_chain(servos), baud, start_rad, device)
         """The bus as a port in simulated time."""
         if faults is not None:
             plan = faults if isinstance(faults, FaultPlan) else load(Path(faults), FaultPlan)

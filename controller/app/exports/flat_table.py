@@ -33,9 +33,9 @@ class FlatTable:
 
 def flat_tables(record: RunRecord) -> list[FlatTable]:
     """Make a table of each channel that has rows; joints and links are counted from the head."""
-    cycle, slow, pose, walk, qpos = (
+    cycle, slow, pose, walk, qpos, imu = (
         *(record.cycle, record.slow, record.pose),
-        *(record.walk, record.qpos),
+        *(record.walk, record.qpos, record.imu),
     )
     tables = [
         FlatTable(
@@ -75,11 +75,7 @@ def flat_tables(record: RunRecord) -> list[FlatTable]:
             {
                 "time_s": pose.time_s,
                 **_vector("head", pose.head_m),
-                **{
-                    f"rotation_{row}{column}": pose.rotation[:, row, column]
-                    for row in range(3)
-                    for column in range(3)
-                },
+                **_rotation(pose.rotation),
                 **{
                     name: cells
                     for link in range(pose.links_m.shape[1])
@@ -110,6 +106,15 @@ def flat_tables(record: RunRecord) -> list[FlatTable]:
             {
                 "time_s": qpos.time_s,
                 **{f"qpos{k}": qpos.qpos[:, k] for k in range(qpos.qpos.shape[1])},
+            },
+        ),
+        FlatTable(
+            "imu",
+            {
+                "time_s": imu.time_s,
+                **_rotation(imu.rotation),
+                **{f"rate_{axis}_rad_s": imu.rate_rad_s[:, k] for k, axis in enumerate(_XYZ)},
+                "age_s": imu.age_s,
             },
         ),
         _paths(record),
@@ -160,6 +165,11 @@ def _per_joint(quantity: str, unit: str, values: NDArray[Any]) -> dict[str, Cell
 def _vector(name: str, values: NDArray[Any]) -> dict[str, Cells]:
     """Columns of positions (T, 3)."""
     return {f"{name}_{axis}_m": values[:, k] for k, axis in enumerate(_XYZ)}
+
+
+def _rotation(values: NDArray[Any]) -> dict[str, Cells]:
+    """Columns of matrices (T, 3, 3)."""
+    return {f"rotation_{k // 3}{k % 3}": values[:, k // 3, k % 3] for k in range(9)}
 
 
 def _paths(record: RunRecord) -> FlatTable:

@@ -17,6 +17,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.controller.app.exports.body_frames import WORLD, body_frames, joint_names
 from snakewalk.controller.app.exports.foxglove_schema import SCHEMAS
+from snakewalk.controller.app.exports.imu_readings import imu_readings
 from snakewalk.controller.runlog.encode import encode, floats, number
 from snakewalk.controller.runlog.record import RunRecord
 
@@ -29,6 +30,7 @@ _TOPICS: Final = {
     "/joint_states": "foxglove.JointStates",
     "/joint_goals": "foxglove.JointStates",
     "/head_pose": "foxglove.PoseInFrame",
+    "/imu": "foxglove.PoseInFrame",
     "/log": "foxglove.Log",
 }
 _LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
@@ -51,7 +53,9 @@ _PATH_HEIGHT_M: Final = 0.005
 
 def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:
     """Write the file; returns how many messages each topic has."""
-    counts = dict.fromkeys(_TOPICS, 0)
+    without = set() if len(record.imu.time_s) else {"/imu"}
+    topics = {name: kind for name, kind in _TOPICS.items() if name not in without}
+    counts = dict.fromkeys(topics, 0)
     with path.open("wb") as file:
         writer: Any = Writer(file)
         writer.start(profile="", library=f"snakewalk {record.header.software}")
@@ -61,7 +65,7 @@ def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:
         }
         channels = {
             topic: writer.register_channel(topic, "json", schemas[name])
-            for topic, name in _TOPICS.items()
+            for topic, name in topics.items()
         }
         for time_s, topic, message in sorted(_rows(record), key=itemgetter(0)):
             stamp_ns = round(time_s * 1e9)
@@ -78,6 +82,7 @@ def _rows(record: RunRecord) -> Iterator[Row]:
         yield time_s, "/scene", _scene([_path(record, time_s, points_m)])
     yield from _frames(record)
     yield from _joints(record)
+    yield from _imu(record)
     for event in record.events:
         message = {
             "timestamp": _time(event.time_s),
@@ -111,6 +116,20 @@ def _frames(record: RunRecord) -> Iterator[Row]:
         if len(record.pose.time_s):
             pose = _pose(ats[0], rotations[0])
             yield time_s, "/head_pose", {"timestamp": now, "frame_id": WORLD, "pose": pose}
+
+
+def _imu(record: RunRecord) -> Iterator[Row]:
+    """The link's axes as the device says them, where the link is: beside its frame, drift shows."""
+    readings = imu_readings(record)
+    rows = zip(
+        readings.time_s.tolist(),
+        floats(readings.link_m),
+        floats(readings.quaternion),
+        strict=True,
+    )
+    for time_s, at, turn in rows:
+        pose = _pose(at, turn)
+        yield time_s, "/imu", {"timestamp": _time(time_s), "frame_id": WORLD, "pose": pose}
 
 
 def _joints(record: RunRecord) -> Iterator[Row]:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.app.exports.body_frames import WORLD, body_frames, joint_names
+from snakewalk.controller.app.exports.imu_readings import imu_readings
 from snakewalk.controller.runlog.record import RunRecord
 
 _TOPICS: Final = {
@@ -22,6 +23,7 @@ _TOPICS: Final = {
     "/joint_goals": "sensor_msgs/msg/JointState",
     "/tf": "tf2_msgs/msg/TFMessage",
     "/head_pose": "geometry_msgs/msg/PoseStamped",
+    "/imu": "sensor_msgs/msg/Imu",
     "/path": "nav_msgs/msg/Path",
     "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
     "/rosout": "rcl_interfaces/msg/Log",
@@ -37,7 +39,8 @@ def write_ros_bag(record: RunRecord, path: Path) -> dict[str, int]:
     from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415  an extra
 
     store: Any = get_typestore(Stores.ROS2_JAZZY)
-    counts = dict.fromkeys(_TOPICS, 0)
+    topics = {name: kind for name, kind in _TOPICS.items() if name != "/imu" or _has_imu(record)}
+    counts = dict.fromkeys(topics, 0)
     with path.open("wb") as file:
         writer: Any = Writer(file)
         writer.start(profile="ros2", library=f"snakewalk {record.header.software}")
@@ -45,13 +48,13 @@ def write_ros_bag(record: RunRecord, path: Path) -> dict[str, int]:
             kind: writer.register_schema(
                 kind, "ros2msg", store.generate_msgdef(kind, ros_version=2)[0].encode()
             )
-            for kind in dict.fromkeys(_TOPICS.values())
+            for kind in dict.fromkeys(topics.values())
         }
         channels = {
             topic: writer.register_channel(
                 topic, "cdr", schemas[kind], {"offered_qos_profiles": ""}
             )
-            for topic, kind in _TOPICS.items()
+            for topic, kind in topics.items()
         }
         for time_s, topic, message in sorted(_Messages(store.types).rows(record), key=_BY_TIME):
             stamp_ns = round(time_s * 1e9)
@@ -60,6 +63,10 @@ def write_ros_bag(record: RunRecord, path: Path) -> dict[str, int]:
             counts[topic] += 1
         writer.finish()
     return counts
+
+
+def _has_imu(record: RunRecord) -> bool:
+    return bool(len(record.imu.time_s))
 
 
 _BY_TIME: Final = itemgetter(0)
@@ -75,6 +82,7 @@ class _Messages:
         """All messages, topic by topic."""
         yield from self._joints(record)
         yield from self._frames(record)
+        yield from self._imu(record)
         for time_s, points in record.paths:
             yield time_s, "/path", self._path(time_s, points)
         yield from self._diagnostics(record)
@@ -142,6 +150,28 @@ class _Messages:
             if len(record.pose.time_s):
                 at, turn = frames.translation_m[k, 0], frames.quaternion[k, 0]
                 yield time_s, "/head_pose", self._pose(time_s, at.tolist(), turn.tolist())
+
+    def _imu(self, record: RunRecord) -> Iterator[Row]:
+        readings = imu_readings(record)
+        unknown, absent = np.zeros(9), np.array([-1.0, *[0.0] * 8])  # as the message defines them
+        rows = zip(
+            readings.time_s.tolist(),
+            readings.quaternion.tolist(),
+            readings.rate_rad_s.tolist(),
+            strict=True,
+        )
+        for time_s, turn, rate in rows:
+            message = self._new(
+                "sensor_msgs/msg/Imu",
+                header=self._header(time_s, readings.frame),
+                orientation=self._quaternion(turn),
+                orientation_covariance=unknown,
+                angular_velocity=self._xyz("Vector3", rate),
+                angular_velocity_covariance=unknown,
+                linear_acceleration=self._xyz("Vector3", [0.0, 0.0, 0.0]),
+                linear_acceleration_covariance=absent,
+            )
+            yield time_s, "/imu", message
 
     def _path(self, time_s: float, points_m: Floats) -> Any:
         level = np.hstack([points_m, np.zeros((len(points_m), 3 - points_m.shape[1]))])

@@ -9,10 +9,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import dynamixel_sdk as sdk
+import numpy as np
 import pytest
 
+from snakewalk.config.robot import ImuConfig
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.serve import pty
+from snakewalk.sim.serve.chain_spec import BENCH_RANGES
 from snakewalk.sim.serve.pty import LATE_S, PtyServer
 from snakewalk.sim.serve.servo_bus import ServoBus
 from tests.helpers.bus import a_line, serve_for
@@ -73,6 +78,10 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
         (("serve", "--servos", "1:XL-9"), "XL-9: not simulated"),
         (("serve", "--pace", "0"), "pace 0: must be above 0"),
         (("serve", "--faults", "nowhere.toml"), "nowhere.toml: No such file"),
+        (("serve", "--servos", "1-4", "--imu", "4"), "--imu 4: a servo has this ID"),
+        (("serve", "--servos", "1-4", "--imu", "200:BNO"), "no such model; there are imu_to_dxl"),
+        (("serve", "--robot", "yaw16", "--imu", "200"), "its file says it: table [imu]"),
+        (("serve", "--servos", "1:AX-12A", "--imu", "9"), "Protocol 1.0 and imu_to_dxl 2.0"),
         (("sniff", "nowhere.jsonl"), "nowhere.jsonl: no such file"),
     ],
 )
@@ -152,6 +161,22 @@ def test_serve_speaks_protocol_1_for_an_ax12() -> None:
         process.send_signal(signal.SIGTERM)
         out, _ = process.communicate()
     assert json.loads(out)["answers"] == 2  # the SDK reads the model number, too
+
+
+def test_an_imu_lies_still_beside_the_servos(servo_bus: Callable[..., ServoBus]) -> None:
+    """The SDK finds it, and our reader its attitude: level, and turned by its bias alone."""
+    bus = servo_bus("1-2", imu="200:FFW-G40-IMU")
+    handler = sdk.PacketHandler(2.0)
+    assert sorted(handler.broadcastPing(bus.line)[0]) == [1, 2, 200]
+    config = ImuConfig(model="FFW-G40-IMU", id=200, **BENCH_RANGES)
+    reader = ImuReader(DynamixelBus(bus.line), config)
+    reader.find()
+    for _ in range(50):
+        bus.line.clock.advance(0.02)
+        state = reader.read(lambda line: None)
+    assert state is not None
+    np.testing.assert_allclose(state.rotation[2], [0.0, 0.0, 1.0], atol=0.02)
+    assert np.abs(state.rate_rad_s).max() < 0.01
 
 
 def test_the_fixture_takes_servos_of_protocol_1(

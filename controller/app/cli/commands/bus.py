@@ -50,6 +50,10 @@ def serve(
             autocompletion=completion.ROBOTS,
         ),
     ] = None,
+    imu: Annotated[
+        str | None,
+        typer.Option(help="ID[:MODEL] of an IMU beside --servos, level and still: 200:imu_to_dxl"),
+    ] = None,
     baud: Annotated[int | None, typer.Option(help="of the servos, bit/s")] = None,
     pace: Annotated[float, typer.Option(help="simulated seconds a second")] = 1.0,
     faults: Annotated[Path | None, typer.Option(help="TOML file of what goes wrong")] = None,
@@ -68,11 +72,13 @@ def serve(
 
     if servos is not None and robot is not None:
         raise InputError("give --servos or --robot, not both")
+    if imu is not None and robot is not None:
+        raise InputError("--imu: with --robot, its file says it: table [imu]")
     if latency < 0.0:
         raise InputError(f"--latency {latency:g}: must not be negative")
     refuse_to_overwrite([record], force)
     refuse_to_overwrite([link], force=True)
-    what, line, traffic, make_decoder = _simulated(servos, robot, baud, faults)
+    what, line, traffic, make_decoder = _simulated(servos, robot, imu, baud, faults)
     line.usb_latency_s = latency * 1e-3
     line.taps.append(traffic)
     clock = WallClock()
@@ -149,7 +155,11 @@ def sniff(
 
 
 def _simulated(
-    servos: str | None, robot: str | None, baud: int | None, faults: Path | None
+    servos: str | None,
+    robot: str | None,
+    imu: str | None,
+    baud: int | None,
+    faults: Path | None,
 ) -> tuple["ChainSpec", "Wire", "LiveTable", "MakeDecoder"]:
     """What is served, its line, who looks at it, and what puts its packets into words."""
     from snakewalk.config.faults import FaultPlan  # noqa: PLC0415
@@ -158,13 +168,13 @@ def _simulated(
     from snakewalk.sim.ax12.line import Ax12Line  # noqa: PLC0415
     from snakewalk.sim.faults.fault_player import FaultPlayer  # noqa: PLC0415
     from snakewalk.sim.serve.bench_line import bench_line  # noqa: PLC0415
-    from snakewalk.sim.serve.chain_spec import ChainSpec, parse_chain  # noqa: PLC0415
+    from snakewalk.sim.serve.chain_spec import ChainSpec, parse_chain, parse_imu  # noqa: PLC0415
     from snakewalk.sim.serve.live_table import LiveTable, ax12_rows, servo_rows  # noqa: PLC0415
     from snakewalk.sim.sniff.decode import Decoder  # noqa: PLC0415
 
     spec = parse_chain(servos or "1-4")
     if robot is None:
-        line = bench_line(spec, baud or 1_000_000)
+        line = bench_line(spec, baud or 1_000_000, imu=None if imu is None else parse_imu(imu))
     else:
         line = _robot_line(robot, baud)
         spec = ChainSpec(line.bank.ids, line.bank.models)

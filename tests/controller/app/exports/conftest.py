@@ -12,16 +12,26 @@ from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import PlanSummary, RunRecord
 from snakewalk.controller.runlog.writer import RunLog
-from snakewalk.drivers.types import BodyPose, JointState
+from snakewalk.drivers.types import BodyPose, ImuState, JointState
 
 ROWS = 20
+
+
+def an_attitude(row: int) -> ImuState | None:
+    """Not there at first, silent from row 10 to 12, 2 ms old else."""
+    if row < 3:
+        return None
+    measured = 10 if row in (11, 12) else row
+    turn = Rotation.random(random_state=100 + measured).as_matrix()
+    age_s = 0.002 + 0.02 * (row - measured)
+    return ImuState(turn, np.array([0.1, -0.2, 0.01 * measured]), age_s, row == measured)
 
 
 @pytest.fixture(scope="session")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("export") / "log.mcap"
     rng = np.random.default_rng(7)
-    run, robot, world = load_run("flat-square"), load_robot("alternating16"), load_world("flat")
+    run, robot, world = load_run("flat-square"), load_robot("alternating16-imu"), load_world("flat")
     joints = robot.joint_count
     plan = PlanSummary(np.array([[0.0, 0.0], [2.0, 1.0]]), np.array([[2.0, 1.0]]), 0.3)
     ground = HeightField(rng.normal(0.0, 0.1, (4, 5)), 0.7, -1.0, -1.0)
@@ -50,6 +60,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 np.zeros(joints),
                 np.ones(joints, dtype=bool),
                 np.zeros(joints),
+                an_attitude(k),
             )
             file.cycle(time_s, angles, angles / 3.0, state, deadline_s=time_s, lateness_s=0.0)
             turn = Rotation.random(random_state=k).as_matrix()

@@ -50,12 +50,15 @@ def test_parquet_gives_every_number_back(record: RunRecord, tmp_path: Path) -> N
 
 def test_units_stand_in_the_names(record: RunRecord) -> None:
     tables = {table.name: table for table in flat_tables(record)}
-    assert set(tables) == {"cycle", "slow", "pose", "path", "event"}
+    assert set(tables) == {"cycle", "slow", "pose", "imu", "path", "event"}
     columns = [name for table in tables.values() for name in table.columns]
     flags = [f"{of}_joint{k}" for of in ("valid", "error", "hardware_error") for k in range(16)]
     assert {c for c in columns if not c.endswith(UNITS)} == UNITLESS | set(flags)
     np.testing.assert_array_equal(
         tables["cycle"].columns["measured_joint2_rad"], record.cycle.measured_rad[:, 2]
+    )
+    np.testing.assert_array_equal(
+        tables["imu"].columns["rate_z_rad_s"], record.imu.rate_rad_s[:, 2]
     )
     path = tables["path"].columns
     np.testing.assert_array_equal(path["time_s"], [0.0, 0.0, 0.2, 0.2])

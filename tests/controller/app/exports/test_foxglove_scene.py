@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from scipy.spatial.transform import Rotation
 
 from snakewalk.controller.app.exports.body_frames import body_frames
 from snakewalk.controller.app.exports.foxglove_scene import write_foxglove_scene
@@ -131,3 +132,14 @@ def test_joints_path_and_events(messages: Messages, record: RunRecord) -> None:
         (2, 'start: torque on; "quoted", ünïcode'),
         (4, "trip: joint 7: current"),
     ]
+
+
+def test_the_attitude_stands_where_its_link_is(messages: Messages, record: RunRecord) -> None:
+    robot, last = record.header.robot, messages["/imu"][-1]
+    assert robot.imu is not None
+    assert len(messages["/imu"]) == 15
+    turn = Rotation.from_quat(list(last["pose"]["orientation"].values())).as_matrix()
+    np.testing.assert_allclose(turn, record.imu.rotation[-1], atol=2e-6)
+    places, at = record.pose.links_m[:, robot.imu.link], list(last["pose"]["position"].values())
+    np.testing.assert_allclose(at, places[-2] + 0.9 * (places[-1] - places[-2]), atol=1e-5)
+    assert last["frame_id"] == "world"

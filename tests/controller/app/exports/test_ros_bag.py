@@ -1,6 +1,7 @@
 """A bag read back by two readers of other people: every number, in ROS 2's own encoding."""
 
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.controller.app.exports.body_frames import body_frames, joint_names
 from snakewalk.controller.app.exports.ros_bag import write_ros_bag
-from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.record import ImuTable, RunRecord
 
 pytest.importorskip("rosbags")
 Messages = dict[str, list[tuple[int, Any]]]
@@ -98,3 +99,27 @@ def test_paths_diagnostics_and_events(bag: Messages) -> None:
         (20, 'start: torque on; "quoted", ünïcode'),
         (40, "trip: joint 7: current"),
     ]
+
+
+def test_attitude_is_told_once_a_reading(bag: Messages, record: RunRecord) -> None:
+    config = record.header.robot.imu
+    assert config is not None
+    rows = [3, 4, 5, 6, 7, 8, 9, 10, 13, 14, 15, 16, 17, 18, 19]  # silent at 11 and 12
+    assert len(bag["/imu"]) == len(rows)
+    for (time_ns, message), row in zip(bag["/imu"], rows, strict=True):
+        assert time_ns == stamp_ns(message.header.stamp) == 20_000_000 * row - 2_000_000
+        assert message.header.frame_id == f"link{config.link}"
+        turn = message.orientation
+        matrix = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
+        np.testing.assert_allclose(matrix, record.imu.rotation[row - 3], atol=2e-6)
+        rate = message.angular_velocity
+        np.testing.assert_allclose([rate.x, rate.y, rate.z], [0.1, -0.2, 0.01 * row])
+        assert message.linear_acceleration_covariance[0] == -1.0  # not in the log
+
+
+def test_a_log_without_attitude_has_no_such_topic(record: RunRecord, tmp_path: Path) -> None:
+    table = record.imu
+    none = ImuTable(*(getattr(table, name)[:0] for name in table.__dataclass_fields__))
+    counts = write_ros_bag(replace(record, imu=none), tmp_path / "bag.mcap")
+    assert "/imu" not in counts
+    assert "/imu" not in by_rosbags(tmp_path / "bag.mcap")
