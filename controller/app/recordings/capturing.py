@@ -3,7 +3,7 @@
 A track that was captured before is corrected by what a person has saved from its review page.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -158,6 +158,8 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
                 f"{options.recording}: --roi and --mask need images of one size; these differ"
             )
         region = region_of(options.roi, options.mask, whole[0].shape)
+        if head_px is not None:
+            _refuse_outside(head_px, region, whole, str(options.head))
         in_colour = any(frame.ndim == 3 for frame in whole)
         some = [region.cut(_of_kind(frame, in_colour)) for frame in whole]
         background = (
@@ -291,6 +293,20 @@ def _place(text: str) -> tuple[float, float]:
     if not np.isfinite([x, y]).all():
         raise InputError(f"--head {text}: expected X,Y in pixels")
     return x, y
+
+
+def _refuse_outside(
+    head_px: tuple[float, float], region: Region, frames: Sequence[DeepImage], text: str
+) -> None:
+    """Refuse a place that no frame shows, or that is not looked at."""
+    high, wide = (max(frame.shape[side] for frame in frames) for side in (0, 1))
+    x, y = head_px
+    if not (0.0 <= x < wide and 0.0 <= y < high):
+        raise InputError(f"--head {text}: outside the images, which have {wide} x {high} pixels")
+    high, wide = region.cut(frames[0]).shape[:2]
+    x, y = region.place(x, y)
+    if region is not WHOLE and not (0.0 <= x < wide and 0.0 <= y < high):
+        raise InputError(f"--head {text}: outside --roi and --mask, which say where to look")
 
 
 def _threshold(options: CaptureOptions, footage: Footage) -> float | None:

@@ -291,6 +291,8 @@ pre { overflow-x: auto; font-size: 12.5px; }
   .facts span { white-space: normal; }
   .wide { overflow-x: auto; }
   .wide img { width: 860px; max-width: none; }
+  .wide::before { content: "it goes on to the right →"; display: block; position: sticky;
+    left: 0; color: var(--grey); font-size: 13px; }
   td { padding-right: 8px; }
   td:last-child { overflow-wrap: anywhere; }
 }

@@ -73,11 +73,17 @@ def contact_sheet(
 def _tile(image: DeepImage, points_px: Floats, status: FrameStatus) -> Image:
     """The animal and a little around it; all of a frame in which it was not found."""
     if status.has_points:
-        reach = 0.12 * float(np.hypot(*np.diff(points_px, axis=0).T).sum()) + 6.0
-        left, top = np.maximum(points_px.min(axis=0) - reach, 0.0).astype(int)
-        right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int)
-        image, points_px = image[top:bottom, left:right], points_px - [left, top]
+        rows, columns, points_px = _around(points_px)
+        image = image[rows, columns]
     return drawn(image, points_px, status, _TILE_PX, _TILE_PX)
+
+
+def _around(points_px: Floats) -> tuple[slice, slice, Floats]:
+    """Rows and columns of the animal and a little around it; its points (n, 2) within them."""
+    reach = 0.12 * float(np.hypot(*np.diff(points_px, axis=0).T).sum()) + 6.0
+    left, top = np.maximum(points_px.min(axis=0) - reach, 0.0).astype(int)
+    right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int)
+    return slice(top, bottom), slice(left, right), points_px - [left, top]
 
 
 def _written(path: Path, image: Image) -> bool:
@@ -88,7 +94,7 @@ def _written(path: Path, image: Image) -> bool:
 
 
 def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px: Floats) -> None:
-    """One frame through all steps: image, silhouette, medial axis, equal chords, head.
+    """The animal of one frame through all steps: image, silhouette, axis, equal chords, head.
 
     Raises:
         InputError: not a picture's ending.
@@ -99,17 +105,21 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
     x, y = (int(v) for v in body.origin_px)
     high, wide = body.mask.shape
     mask[y : y + high, x : x + wide] = body.mask * np.uint8(200)
+    rows, columns, points_px = _around(points_px)
+    image, mask = image[rows, columns], mask[rows, columns]
+    high, wide = image.shape[:2]
+    factor = _STEP_PX / max(high, wide)
+    tile_px = max(round(wide * factor), 120), round(high * factor) + 18
     nothing = np.empty((0, 2))
-    bare = drawn(image, nothing, FrameStatus.NOTHING, _STEP_PX, _STEP_PX)
-    shape = drawn(mask, nothing, FrameStatus.NOTHING, _STEP_PX, _STEP_PX)
-    factor = min(_STEP_PX / image.shape[1], (_STEP_PX - 18) / image.shape[0])
+    bare = drawn(image, nothing, FrameStatus.NOTHING, *tile_px)
+    shape = drawn(mask, nothing, FrameStatus.NOTHING, *tile_px)
     line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
     axis, chords = shape.copy(), shape.copy()
     cv2.polylines(axis, [line], False, _BODY, 2, cv2.LINE_AA, 4)
     for number, (u, v) in enumerate(line.tolist()):
         size = 4 if number % 10 == 0 else 2
         cv2.circle(chords, (u, v), size * 16, _BAD, -1, cv2.LINE_AA, 4)
-    whole = drawn(image, points_px, FrameStatus.GOOD, _STEP_PX, _STEP_PX)
+    whole = drawn(image, points_px, FrameStatus.GOOD, *tile_px)
     named = {
         "image": bare,
         "silhouette": shape,
@@ -119,8 +129,8 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
     }
     for name, tile in named.items():
         _words(tile, name, good=True)
-    wide = round(image.shape[1] * factor) + 8
-    sheet = np.hstack([tile[:, : max(wide, 120)] for tile in named.values()])
+    gap = np.full((tile_px[1], 8, 3), _BACK, dtype=np.uint8)
+    sheet = np.hstack([part for tile in named.values() for part in (tile, gap)][:-1])
     with atomic_write(path) as part:
         if not _written(part, sheet):
             raise InputError(f"{path}: a picture is a .png or .jpg")

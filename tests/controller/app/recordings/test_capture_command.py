@@ -154,6 +154,22 @@ def test_markers_give_the_scale(tmp_path: Path) -> None:
         scale_of_marker("0.05", image[:, 150:])
 
 
+def test_the_steps_show_the_animal_as_large_as_the_panel(tmp_path: Path) -> None:
+    """It was 64 of 300 pixels wide in a film of the whole arena, under its own dots."""
+    arena = tmp_path / "arena"
+    arena.mkdir()
+    for number, frame in enumerate(film(replace(SCENE, rows=240, columns=480, frames=4))):
+        cv2.imwrite(str(arena / f"{number}.png"), frame)
+    steps = tmp_path / "steps.png"
+    capture_recording(CaptureOptions(arena, tmp_path / "t.npz", rate_hz=30.0, steps=steps))
+    sheet = cv2.imread(str(steps), cv2.IMREAD_GRAYSCALE)
+    assert sheet is not None
+    high, wide = sheet.shape
+    panel = sheet[: high - 18, 308:608]
+    assert wide == 5 * 300 + 4 * 8
+    assert panel.any(axis=0).sum() > 0.6 * panel.shape[1]
+
+
 def test_help_has_an_example() -> None:
     done = snakewalk("capture", "--help")
     assert done.returncode == 0
@@ -184,6 +200,9 @@ def test_bad_files_end_with_exit_code_2_and_one_line(tmp_path: Path) -> None:
         ({"length_m": 0.2, "marker": "0.05"}, "say one of them"),
         ({"rate_hz": 0.0}, "frame rate must be above 0"),
         ({"head": "left"}, "expected X,Y"),
+        ({"head": "200,10"}, "outside the images, which have 200 x 160 pixels"),
+        ({"head": "10,-1"}, "outside the images"),
+        ({"head": "5,5", "roi": "40,30,120,100"}, "outside --roi and --mask"),
         ({"background": "junk.png"}, "is no image"),
     ],
 )

@@ -4,6 +4,7 @@ import base64
 import gzip
 import json
 import re
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -26,6 +27,7 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import Event, RunRecord
 
 Make = Callable[..., Path]
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 
 class Sources(HTMLParser):
@@ -52,10 +54,17 @@ def parsed(html: str) -> Sources:
     return reader
 
 
-def test_the_page_stands_alone(make: Make, tmp_path: Path) -> None:
-    log = make(tmp_path / "run.mcap", seconds=12.0, ground="hills")
-    first = build_report(read_log(log), tmp_path / "a")
-    log.rename(tmp_path / "b.mcap")
+@pytest.fixture(scope="module")
+def hills(make: Make, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Log and page of a run over hills, in folders of their own."""
+    folder = tmp_path_factory.mktemp("hills")
+    log = make(folder / "run.mcap", seconds=12.0, ground="hills")
+    return log, build_report(read_log(log), folder / "a")
+
+
+def test_the_page_stands_alone(hills: tuple[Path, Path], tmp_path: Path) -> None:
+    log, first = hills
+    renamed = shutil.copy(log, tmp_path / "b.mcap")
     html = first.read_text(encoding="utf-8")
     *sources, link = parsed(html).sources
     assert link == "summary.json", "no log stands beside this page"
@@ -66,8 +75,8 @@ def test_the_page_stands_alone(make: Make, tmp_path: Path) -> None:
         assert svg.tag.endswith("svg")
     assert not re.search(r"<script[^>]*src", html), "nothing is loaded"
     assert "waypoint 1 reached" in html
-    assert (tmp_path / "a" / "summary.json").is_file()
-    again = build_report(read_log(tmp_path / "b.mcap"), tmp_path / "c")
+    assert (first.parent / "summary.json").is_file()
+    again = build_report(read_log(renamed), tmp_path / "c")
     assert again.read_bytes() == first.read_bytes(), "no date, no path, no chance in it"
 
 
@@ -137,6 +146,54 @@ def test_the_curves_are_the_logs_and_their_library_is_on_the_page(record: RunRec
     assert np.nanmean(numbers_of(off["y"])) == pytest.approx(
         summary(record).path_error_mean_m, rel=1e-4
     )
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page with")
+def test_in_a_browser_curves_are_read_off_and_zoomed_and_a_telephone_holds_the_page(
+    hills: tuple[Path, Path],
+) -> None:
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1000, "height": 800})
+        page.set_default_timeout(120_000.0)
+        faults: list[str] = []
+        page.on("pageerror", lambda fault: faults.append(str(fault)))
+        page.goto(hills[1].as_uri())
+        page.wait_for_selector(".js-plotly-plot .nsewdrag")
+        curves = page.locator(".js-plotly-plot")
+        curves.scroll_into_view_if_needed()
+        curves.evaluate("plot => plot.on('plotly_hover', told => window.seen = told.points[0])")
+        panel = page.locator(".js-plotly-plot .nsewdrag").first.bounding_box()
+        assert panel is not None
+        x, y = panel["x"] + 0.5 * panel["width"], panel["y"] + 0.5 * panel["height"]
+        page.mouse.move(x, y)
+        shown = page.locator(".hoverlayer .hovertext").first.text_content()
+        name, value = page.evaluate("[seen.data.name, seen.y]")
+        text, _, number = shown.rpartition(" ")
+        assert text == name
+        assert float(number) == pytest.approx(value, rel=1e-3)
+
+        axis = "plot => plot.layout.xaxis.range.map(Number)"
+        whole = curves.evaluate(axis)
+        page.mouse.down()
+        page.mouse.move(x + 0.25 * panel["width"], y, steps=4)
+        page.mouse.up()
+        page.wait_for_function(
+            f"before => ({axis})(document.querySelector('.js-plotly-plot'))[0] > before",
+            arg=whole[0],
+        )
+        first, last = curves.evaluate(axis)
+        span = whole[1] - whole[0]
+        assert first == pytest.approx(whole[0] + 0.5 * span, abs=0.02 * span)
+        assert last == pytest.approx(whole[0] + 0.75 * span, abs=0.02 * span)
+
+        page.set_viewport_size({"width": 400, "height": 800})
+        page.wait_for_function("document.documentElement.scrollWidth <= 400")
+        hint = "box => getComputedStyle(box, '::before').content"
+        assert "to the right" in page.locator(".wide").first.evaluate(hint)
+        browser.close()
+    assert faults == []
 
 
 def test_a_supply_that_never_changes_is_told_and_not_drawn(record: RunRecord) -> None:
