@@ -31,6 +31,7 @@ MODULES = tuple(
         "camera_run",
         "repertoire",
         "support",
+        "gym_steps",
     )
     if find_spec(f"benchmarks.{name}") is not None
 )

@@ -5,7 +5,6 @@ chain turns them into packets, simulated servos answer on a simulated line. A po
 here has met clamps, wire time, quantised readings and servo lag.
 """
 
-import math
 from typing import Any, Final
 
 import gymnasium
@@ -22,11 +21,13 @@ from snakewalk.config.run import RunConfig
 from snakewalk.controller.app.runs.backend import Backend, simulated
 from snakewalk.controller.app.runs.prepared_run import PathlessRun, pose_with
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
+from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.errors import SafetyTrippedError
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.types import JointCommand, JointState
 
+_FLOATS: Final = readonly_array()
 _SPEED_RAD_S: Final = 20.0
 _SPEED_M_S: Final = 3.0
 _CURRENT_A: Final = 10.0
@@ -184,18 +185,11 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         view = body_in_world(self._prepared.robot, pose, state.position_rad)
         moved_m = np.zeros(2) if self._view is None else (view.centre_m - self._view.centre_m)[:2]
         self._view = view
-        heading_rad = view.headings_rad.mean()
-        count = len(self._sent_rad)
         values = np.empty_like(self._end)
-        values[:count] = state.position_rad
-        values[count : 2 * count] = state.velocity_rad_s
-        values[2 * count : 3 * count] = state.current_a
-        values[3 * count : 4 * count] = self._sent_rad
-        values[-7:-4] = pose.rotation[2]
-        values[-4], values[-3] = math.cos(heading_rad), math.sin(heading_rad)
-        values[-2:] = moved_m * self._prepared.run.cycle_hz
-        np.minimum(values, self._end, out=values)
-        np.maximum(values, -self._end, out=values)
+        _fill(
+            *(values, self._end, state.position_rad, state.velocity_rad_s, state.current_a),
+            *(self._sent_rad, view.rotation, moved_m * self._prepared.run.cycle_hz),
+        )
         return values, float(moved_m[0])
 
     def _info(self, link: SafeLink) -> dict[str, Any]:
@@ -208,6 +202,55 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "clamped": [] if verdict is None else verdict.clamped.nonzero()[0].tolist(),
             "tripped": link.tripped,
         }
+
+
+@compiled(
+    f"void(float32[::1], float32[::1], {_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS},"
+    " float64[:, :, ::1], float64[::1])"
+)
+def _fill(
+    values: NDArray[np.float32],
+    end: NDArray[np.float32],
+    position_rad: Floats,
+    velocity_rad_s: Floats,
+    current_a: Floats,
+    sent_rad: Floats,
+    rotation: Floats,
+    velocity_m_s: Floats,
+) -> None:
+    """Fill an observation (4 J + 7,), cut at its ends.
+
+    Args:
+        values: to be filled.
+        end: greatest values.
+        position_rad: (J,)
+        velocity_rad_s: (J,)
+        current_a: (J,)
+        sent_rad: (J,)
+        rotation: (L, 3, 3) axes of the links as columns; the mean heading is of their directions,
+            each followed from the one before without a jump by a turn.
+        velocity_m_s: (2,) of the centre of mass.
+
+    """
+    joints = len(position_rad)
+    for k in range(joints):
+        values[k] = position_rad[k]
+        values[joints + k] = velocity_rad_s[k]
+        values[2 * joints + k] = current_a[k]
+        values[3 * joints + k] = sent_rad[k]
+    at = 4 * joints
+    for axis in range(3):
+        values[at + axis] = rotation[0, 2, axis]
+    before = total = np.arctan2(rotation[0, 1, 0], rotation[0, 0, 0])
+    for link in range(1, len(rotation)):
+        heading = np.arctan2(rotation[link, 1, 0], rotation[link, 0, 0])
+        before = heading - 2.0 * np.pi * np.rint((heading - before) / (2.0 * np.pi))
+        total += before
+    mean = total / len(rotation)
+    values[at + 3], values[at + 4] = np.cos(mean), np.sin(mean)
+    values[at + 5], values[at + 6] = velocity_m_s[0], velocity_m_s[1]
+    for k in range(len(values)):
+        values[k] = min(max(values[k], -end[k]), end[k])
 
 
 def _names(robot: RobotConfig) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 gymnasium = pytest.importorskip("gymnasium")
 
@@ -13,7 +14,7 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 import snakewalk.gym  # noqa: E402
 from snakewalk.config.errors import InputError  # noqa: E402
 from snakewalk.config.loader import load_robot  # noqa: E402
-from snakewalk.controller.app.learning.environment import SnakeEnvironment  # noqa: E402
+from snakewalk.controller.app.learning.environment import SnakeEnvironment, _fill  # noqa: E402
 
 SHIPPED = Path(__file__).resolve().parents[4] / "config" / "robots"
 JOINTS, LIMIT_RAD = 16, np.array(load_robot("yaw16").limit_rad)
@@ -102,3 +103,23 @@ def test_what_cannot_be_is_told() -> None:
         SnakeEnvironment(physics_step_s=0.5)
     with pytest.raises(InputError, match="no options"):
         SnakeEnvironment().reset(options={"heading": 1.0})
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_an_observation_has_its_numbers_in_their_places(compiled: bool) -> None:
+    rng = np.random.default_rng(5)
+    fill = _fill if compiled else _fill.py_func  # type: ignore[attr-defined]
+    end = np.concatenate([np.full(16, 3.0), np.ones(5), np.full(2, 3.0)]).astype("f4")
+    for _ in range(20):
+        position, velocity, current, sent = rng.normal(0.0, 2.0, (4, 4))
+        # a body that winds up by more than a turn
+        bend_rad = rng.uniform(-3.0, 3.0) + np.cumsum(rng.uniform(0.0, 3.0, 5))
+        turns = Rotation.from_euler("z", bend_rad[:, None])
+        rotation = (turns * Rotation.from_euler("y", 0.3)).as_matrix()
+        values = np.empty_like(end)
+        speed_m_s = rng.normal(0.0, 3.0, 2)
+        fill(values, end, position, velocity, current, sent, rotation, speed_m_s)
+        heading_rad = np.unwrap(np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])).mean()
+        told = [np.cos(heading_rad), np.sin(heading_rad), *speed_m_s]
+        whole = np.concatenate([position, velocity, current, sent, rotation[0, 2], told])
+        np.testing.assert_allclose(values, np.clip(whole, -end, end), atol=1e-6)
