@@ -99,26 +99,43 @@ def _since_down(pair: LegPairConfig, cycles: Floats) -> Floats:
     return (cycles[:, None] - [pair.left, pair.right]) % 1.0
 
 
+def spine_shares(at: tuple[float, float], along: Floats) -> Floats:
+    """(S, 2) of the front and the hind girdle's turn in the headings of segments between places.
+
+    Args:
+        at: places of the girdles along the body.
+        along: (S + 1,) of the segments' ends.
+
+    """
+    fine = along[:-1, None] + np.diff(along)[:, None] * (np.arange(8) + 0.5) / 8.0
+    return np.asarray(_girdle_shares(at, fine).mean(axis=1))
+
+
+def _girdle_shares(at: tuple[float, float], along: Floats) -> Floats:
+    """(..., 2) of the girdles' turns in the heading of the spine at places (...)."""
+    front, hind = at
+    share = 0.5 * (1.0 - np.cos(np.pi * np.clip((along - front) / (hind - front), 0.0, 1.0)))
+    beyond = np.maximum(front - along, 0.0) + np.maximum(along - hind, 0.0)
+    fades = np.exp(-beyond / _STRAIGHTENS)
+    return np.stack([(1.0 - share) * fades, share * fades], axis=-1)
+
+
 def _spine_rad(animal: AnimalConfig, cycles: Floats, along: Floats) -> Floats:
     """(T, S) headings of the spine at places along it.
 
     A girdle is turned to the right by all of its turn when its left foot comes down.
     """
     front, hind = animal.leg_pairs
-    turned = [
-        -pair.turn_rad * np.cos(TURN * (cycles - pair.left))[:, None] for pair in animal.leg_pairs
-    ]
-    share = np.clip((along - front.at) / (hind.at - front.at), 0.0, 1.0)
-    trunk = turned[0] + (turned[1] - turned[0]) * 0.5 * (1.0 - np.cos(np.pi * share))
-    ahead = np.maximum(front.at - along, 0.0) / _STRAIGHTENS
-    behind = np.maximum(along - hind.at, 0.0)
-    tail = behind / (1.0 - hind.at)
+    turned = np.stack(
+        [-pair.turn_rad * np.cos(TURN * (cycles - pair.left)) for pair in animal.leg_pairs], axis=-1
+    )
+    tail = np.maximum(along - hind.at, 0.0) / (1.0 - hind.at)
     swung = (
         animal.tail_swing_rad
         * tail
         * np.sin(TURN * (cycles[:, None] - hind.left - _TAIL_WAVES * tail))
     )
-    return np.asarray(trunk * np.exp(-ahead - behind / _STRAIGHTENS) + swung)
+    return np.asarray(turned @ _girdle_shares((front.at, hind.at), along).T + swung)
 
 
 def _ride(animal: AnimalConfig, pair: LegPairConfig, ahead_m: Floats, at: Floats) -> Floats:

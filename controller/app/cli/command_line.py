@@ -35,6 +35,7 @@ from snakewalk.controller.app.cli.commands.files.elevation import elevation
 from snakewalk.controller.app.cli.commands.files.init import init
 from snakewalk.controller.app.cli.commands.files.schema import schema
 from snakewalk.controller.app.cli.commands.files.stereo import stereo
+from snakewalk.controller.app.cli.commands.files.stride import stride
 from snakewalk.controller.app.cli.commands.fish import film, match, synthesise
 from snakewalk.controller.app.cli.commands.gait import list_gaits, show_gait
 from snakewalk.controller.app.cli.commands.gait_fit import fit_gait
@@ -325,6 +326,15 @@ app.command(
     ),
     rich_help_panel=_MOTION,
 )(synthesise_walk)
+
+app.command(
+    epilog=_examples(
+        "stride TRACKED.h5 --spine nose,neck,hip,tail --girdles neck,hip "
+        "--feet FL,FR,HL,HR -o mine.toml --picture stride.png",
+        "synthesise jacksboro-traverse --animal mine.toml --film",
+    ),
+    rich_help_panel=_RECORDINGS,
+)(stride)
 
 app.command(
     epilog=_examples("track", "track MIDLINES.csv --rate 60 --picture track.png"),

@@ -15,8 +15,8 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.readers.keypoints import Choice, track_from_keypoints
-from snakewalk.controller.capture.track import Track, frame_numbers
+from snakewalk.controller.capture.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.capture.track import frame_numbers
 
 PCUTOFF = 0.6
 """DeepLabCut's own default: below this likelihood it does not draw a point."""
@@ -37,7 +37,7 @@ def load_rows(
     rate_hz: float | None,
     least_score: float | None,
     choice: Choice,
-) -> Track:
+) -> Keypoints:
     """Load the rows of a CSV; see ``load.load_file``."""
     depth = 4 if rows[3][0] == "coords" else 3
     level = {row[0]: row for row in rows[:depth]}
@@ -70,7 +70,7 @@ def load_rows(
 
 def load_group(
     file: Path, group: Any, rate_hz: float | None, least_score: float | None, choice: Choice
-) -> Track:
+) -> Keypoints:
     """Load the open HDF5 group that holds ``table``; see ``load.load_file``."""
     table = group["table"]
     blocks = [name for name in table.dtype.names or () if name.startswith("values_block_")]
@@ -116,7 +116,7 @@ def _track(
     rate_hz: float | None,
     least_score: float | None,
     choice: Choice,
-) -> Track:
+) -> Keypoints:
     at = {column: k for k, column in enumerate(columns)}
     names = list(dict.fromkeys(who for who, _, _ in columns))
     animals = [who for who in names if who != _OF_NONE] or names
@@ -132,12 +132,11 @@ def _track(
     sure = [at[whose, p, "likelihood"] for p in parts if (whose, p, "likelihood") in at]
     scores = values[:, sure] if len(sure) == len(parts) else None
     default = 0.0 if scores is None else PCUTOFF
-    return track_from_keypoints(
+    return Keypoints(
         file,
         parts,
         pixels * [1.0, -1.0],
         scores,
-        choice,
         rate_hz=rate_hz,
         least_score=default if least_score is None else least_score,
         frame=frame,

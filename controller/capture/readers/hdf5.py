@@ -11,14 +11,14 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.arrays import track_from_arrays
 from snakewalk.controller.capture.readers.deeplabcut import load_group
 from snakewalk.controller.capture.readers.formats import KNOWN
-from snakewalk.controller.capture.readers.keypoints import Choice
+from snakewalk.controller.capture.readers.keypoints import Choice, Keypoints
 from snakewalk.controller.capture.readers.sleap import load_analysis, load_project
 from snakewalk.controller.capture.track import Track
 
 
 def load_hdf5(
     file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
-) -> Track:
+) -> Track | Keypoints:
     """Load an HDF5 file of any of these kinds; see ``load.load_file``."""
     try:
         with h5py.File(file, "r") as held:

@@ -113,66 +113,77 @@ def choice_of(individual: str | None, keypoints: str | None, plane: str | None) 
     return Choice(individual, names, plane)
 
 
-def track_from_keypoints(
-    file: Path,
-    nodes: Sequence[str],
-    places: Floats,
-    scores: Floats | None,
-    choice: Choice,
-    *,
-    rate_hz: float | None,
-    least_score: float = 0.0,
-    frame: Ints | None = None,
-    scale_m: float | None = None,
-) -> Track:
-    """Make a track of the keypoints of one animal.
+@dataclass(frozen=True, slots=True)
+class Keypoints:
+    """The keypoints of one animal."""
 
-    Args:
-        file: for faults and the name.
-        nodes: names of the K keypoints.
-        places: (T, K, 2), to the right and upwards; NaN where nothing was seen.
-        scores: (T, K) how sure the tracker was, 0..1; None where the file holds no scores.
-        choice: the order of the midline.
-        rate_hz: frames a second; None takes ``KEYPOINT_RATE_HZ`` and marks the rate as assumed.
-        least_score: keypoints below it count as missing.
-        frame: (T,) frame numbers; default 0, 1, 2...
-        scale_m: metres in a unit of the places; None: not known.
+    file: Path
+    """For faults and the name."""
+    nodes: Sequence[str]
+    """Names of the K keypoints."""
+    places: Floats
+    """(T, K, 2) to the right and upwards; NaN where nothing was seen."""
+    scores: Floats | None
+    """(T, K) how sure the tracker was, 0..1; None where the file holds no scores."""
+    rate_hz: float | None
+    """Frames a second; None where the file does not say."""
+    least_score: float = 0.0
+    """Keypoints below it count as missing."""
+    frame: Ints | None = None
+    """(T,) frame numbers; None: 0, 1, 2..."""
+    scale_m: float | None = None
+    """Metres in a unit of the places; None: not known."""
 
-    Raises:
-        InputError: no scores to compare with, no such keypoint, or too little is left.
+    def sure(self, order: Sequence[int]) -> Floats:
+        """(T, N, 2) keypoints by index, NaN where they are missing or not sure.
 
-    """
-    order = choice.order(file, nodes)
-    places = places[:, order]
-    if scores is None and least_score > 0.0:
-        raise InputError(f"{file}: holds no scores to compare with a least score of {least_score}")
-    if scores is not None:
-        scores = scores[:, order]
-        unsure = scores < least_score  # NaN is no score: points set by hand have none
-        if least_score > 0.0 and unsure.any(axis=1).sum() > len(unsure) - 2:
-            worst = np.nanmedian(scores, axis=0)
+        Raises:
+            InputError: no scores to compare with, or too little is left.
+
+        """
+        file, least = self.file, self.least_score
+        places = self.places[:, order]
+        if self.scores is None and least > 0.0:
+            raise InputError(f"{file}: holds no scores to compare with a least score of {least}")
+        if self.scores is not None:
+            scores = self.scores[:, order]
+            unsure = scores < least  # NaN is no score: points set by hand have none
+            bad = int(unsure.any(axis=1).sum())
+            if least > 0.0 and bad > len(unsure) - 2:
+                worst = np.nanmedian(scores, axis=0)
+                raise InputError(
+                    f"{file}: in {bad} of {len(unsure)} frames a keypoint scores less than "
+                    f"{least:g} (keypoint {int(np.argmin(worst)) + 1}, the least sure, "
+                    f"{worst.min():.2f} in the median); lower the least score, or leave it out "
+                    "with --keypoints"
+                )
+            places = np.where(unsure[..., None], np.nan, places)
+        seen = np.asarray(np.isfinite(places).any(axis=(0, 2)))
+        never = [self.nodes[k] for k, there in zip(order, seen, strict=True) if not there]
+        if never and len(never) < len(order):
             raise InputError(
-                f"{file}: in {int(unsure.any(axis=1).sum())} of {len(unsure)} frames a keypoint "
-                f"scores less than {least_score:g} (keypoint {int(np.argmin(worst)) + 1}, the "
-                f"least sure, {worst.min():.2f} in the median); lower the least score, or leave "
-                "it out with --keypoints"
+                f"{file}: {', '.join(never)} is never seen: say --keypoints without it"
             )
-        places = np.where(unsure[..., None], np.nan, places)
-    seen = np.asarray(np.isfinite(places).any(axis=(0, 2)))
-    never = [nodes[k] for k, there in zip(order, seen, strict=True) if not there]
-    if never and len(never) < len(order):
-        raise InputError(f"{file}: {', '.join(never)} is never seen: say --keypoints without it")
-    bridged, which = bridge(places)
-    status = [FrameStatus.BRIDGED if one else FrameStatus.GOOD for one in which]
-    return track_from_points(
-        file.stem,
-        bridged,
-        KEYPOINT_RATE_HZ if rate_hz is None else rate_hz,
-        frame=frame,
-        scale_m=scale_m,
-        rate_assumed=rate_hz is None,
-        status=status,
-    )
+        return np.asarray(places)
+
+    def track(self, choice: Choice) -> Track:
+        """Make a track of those along the midline; an unknown rate is assumed, and marked as such.
+
+        Raises:
+            InputError: as of ``sure``, or no such keypoint.
+
+        """
+        bridged, which = bridge(self.sure(choice.order(self.file, self.nodes)))
+        status = [FrameStatus.BRIDGED if one else FrameStatus.GOOD for one in which]
+        return track_from_points(
+            self.file.stem,
+            bridged,
+            KEYPOINT_RATE_HZ if self.rate_hz is None else self.rate_hz,
+            frame=self.frame,
+            scale_m=self.scale_m,
+            rate_assumed=self.rate_hz is None,
+            status=status,
+        )
 
 
 def bridge(places: Floats) -> tuple[Floats, Bools]:

@@ -11,7 +11,7 @@ from snakewalk.config.recording import RecordingConfig
 from snakewalk.controller.capture.readers.arrays import load_mat, load_npy, load_npz
 from snakewalk.controller.capture.readers.formats import HEAD_BYTES, KNOWN, format_of
 from snakewalk.controller.capture.readers.generated import EMBEDDED, embedded, generate
-from snakewalk.controller.capture.readers.keypoints import ALL, Choice
+from snakewalk.controller.capture.readers.keypoints import ALL, Choice, Keypoints
 from snakewalk.controller.capture.readers.markers import load_c3d, load_qtm
 from snakewalk.controller.capture.readers.tables import load_csv
 from snakewalk.controller.capture.readers.wcon import load_wcon, zipped_text
@@ -93,7 +93,33 @@ def load_file(
         InputError: no such file, none of the known formats, or a fault inside it.
 
     """
-    file = Path(path)
+    found = _loaded(Path(path), rate_hz, least_score, choice)
+    return found.track(choice) if isinstance(found, Keypoints) else found
+
+
+def load_keypoints(
+    path: str | Path,
+    rate_hz: float | None = None,
+    least_score: float | None = None,
+    choice: Choice = ALL,
+) -> Keypoints:
+    """Load all keypoints of one animal, those beside its midline as well; see ``load_file``.
+
+    Raises:
+        InputError: as of ``load_file``, or the file holds midlines.
+
+    """
+    found = _loaded(Path(path), rate_hz, least_score, choice)
+    if not isinstance(found, Keypoints):
+        raise InputError(
+            f"{path}: holds midlines; expected named keypoints: SLEAP, DeepLabCut, QTM or C3D"
+        )
+    return found
+
+
+def _loaded(
+    file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
+) -> Track | Keypoints:
     if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
         raise InputError(f"{file}: the frame rate must be above 0 Hz, not {rate_hz}")
     if least_score is not None and not 0.0 <= least_score <= 1.0:

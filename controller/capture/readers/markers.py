@@ -14,8 +14,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.capture.readers.keypoints import PLANES, Choice, track_from_keypoints
-from snakewalk.controller.capture.track import Track
+from snakewalk.controller.capture.readers.keypoints import PLANES, Choice, Keypoints
 
 _UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _FIRST_WORDS = {"NO_OF_FRAMES", "NO_OF_MARKERS", "FREQUENCY", "MARKER_NAMES", "DATA_INCLUDED"}
@@ -26,7 +25,7 @@ def is_qtm(head: bytes) -> bool:
     return head.removeprefix(b"\xef\xbb\xbf").split(b"\t", 1)[0].decode("latin-1") in _FIRST_WORDS
 
 
-def load_qtm(file: Path, rate_hz: float | None, choice: Choice) -> Track:
+def load_qtm(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     """Load QTM's TSV of marker trajectories; see ``load.load_file``."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
@@ -59,7 +58,7 @@ def load_qtm(file: Path, rate_hz: float | None, choice: Choice) -> Track:
     return _projected(file, names, places, 1e-3, stated if rate_hz is None else rate_hz, choice)
 
 
-def load_c3d(file: Path, rate_hz: float | None, choice: Choice) -> Track:
+def load_c3d(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     """Load the markers of a C3D; see ``load.load_file``."""
     require_extra(f"{file}: C3D needs", "ezc3d")
     import ezc3d  # noqa: PLC0415  an extra
@@ -88,18 +87,17 @@ def _projected(
     scale_m: float,
     rate_hz: float | None,
     choice: Choice,
-) -> Track:
+) -> Keypoints:
     """Markers (T, K, 3) seen at right angles to a plane."""
     plane = choice.plane or "xy"
     if plane not in PLANES:
         raise InputError(f"{file}: --plane {plane}: expected one of {', '.join(PLANES)}")
     places = np.where((places == 0.0).all(axis=2)[..., None], np.nan, places)
-    return track_from_keypoints(
+    return Keypoints(
         file,
         names,
         places[..., list(PLANES[plane])],
         None,
-        choice,
         rate_hz=rate_hz,
         scale_m=scale_m,
     )

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.readers.keypoints import Choice, track_from_keypoints
-from snakewalk.controller.capture.track import MOST_FRAMES, Track, frame_numbers
+from snakewalk.controller.capture.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.capture.track import MOST_FRAMES, frame_numbers
 
 _DOWNWARDS = np.array([1.0, -1.0])
 _CENTRED = 1.1  # format from which a pixel's centre, not its corner, is whole
@@ -34,7 +34,7 @@ def load_table(
     rate_hz: float | None,
     least_score: float | None,
     choice: Choice,
-) -> Track:
+) -> Keypoints:
     """Load the CSV's columns.
 
     Args:
@@ -57,12 +57,11 @@ def load_table(
     if len(np.unique(frame)) < len(frame):
         raise InputError(f"{file}: more than one animal of one name in a frame; export one track")
     order = np.argsort(frame, kind="stable")
-    return track_from_keypoints(
+    return Keypoints(
         file,
         nodes,
         xy[order] * _DOWNWARDS,
         None if scores is None else scores[order],
-        choice,
         rate_hz=rate_hz,
         least_score=0.0 if least_score is None else least_score,
         frame=frame_numbers(str(file), frame[order]),
@@ -75,7 +74,7 @@ def load_analysis(
     rate_hz: float | None,
     least_score: float | None,
     choice: Choice,
-) -> Track:
+) -> Keypoints:
     """Load the open analysis HDF5 ``held``; see ``load.load_file``."""
     tracks = np.asarray(held["tracks"][:], dtype=float)
     nodes = _names(held, "node_names")
@@ -97,12 +96,11 @@ def load_analysis(
                 f"{file}: point_scores: expected (tracks, nodes, frames), not {stored.shape}"
             )
         scores = stored[one].T
-    return track_from_keypoints(
+    return Keypoints(
         file,
         nodes or [f"node_{k}" for k in range(tracks.shape[2])],
         tracks[one].transpose(2, 1, 0) * _DOWNWARDS,
         scores,
-        choice,
         rate_hz=rate_hz,
         least_score=0.0 if least_score is None else least_score,
     )
@@ -114,7 +112,7 @@ def load_project(
     rate_hz: float | None,
     least_score: float | None,
     choice: Choice,
-) -> Track:
+) -> Keypoints:
     """Load the open project ``held`` (.slp); see ``load.load_file``."""
     try:
         about = json.loads(_text(held["metadata"].attrs["json"]))
@@ -168,12 +166,11 @@ def load_project(
         places[at] = np.column_stack([rows["x"], rows["y"]]) + shift
         places[at, hidden] = np.nan
         scores[at] = rows["score"] if predicted else np.nan
-    return track_from_keypoints(
+    return Keypoints(
         file,
         nodes,
         places * _DOWNWARDS,
         scores,
-        choice,
         rate_hz=stated if rate_hz is None else rate_hz,
         least_score=0.0 if least_score is None else least_score,
     )

@@ -9,14 +9,16 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.deeplabcut import is_deeplabcut, load_rows
 from snakewalk.controller.capture.readers.formats import KNOWN
-from snakewalk.controller.capture.readers.keypoints import Choice
+from snakewalk.controller.capture.readers.keypoints import Choice, Keypoints
 from snakewalk.controller.capture.readers.sleap import load_table
 from snakewalk.controller.capture.track import Track, frame_numbers, track_from_points
 
 _MIDLINE = {("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0}
 
 
-def load_csv(file: Path, rate_hz: float | None, least_score: float | None, choice: Choice) -> Track:
+def load_csv(
+    file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
+) -> Track | Keypoints:
     """Load a CSV of any of these kinds; see ``load.load_file``."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
@@ -109,7 +111,7 @@ def _sleap(
     rate_hz: float | None,
     least_score: float | None,
     choice: Choice,
-) -> Track:
+) -> Keypoints:
     """One row an animal and frame, keypoints in the table's order, head first, in pixels."""
     columns = [column["frame_idx"], *(column[f"{k}.{axis}"] for k in keypoints for axis in "xy")]
     table = _numbers(file, rows, columns)

@@ -31,12 +31,14 @@ import pytest
 import rasterio
 from rasterio.transform import from_origin
 
+from snakewalk.controller.app.recordings.animal_synthesis import read_animal
 from snakewalk.controller.capture.capture import load_capture
 from snakewalk.controller.capture.corrections import Corrections
 from tests.controller.app.test_robot_import import SWIMMER
 from tests.docs.test_commands_in_pages import PAGES, ROOT, printed
 from tests.helpers.in_process import snakewalk, work_in_this_process
 from tests.oracles.rendered_snake import SnakeScene, film
+from tests.oracles.tracked_animal import table
 
 MOTION_S = 0.2
 LOOKS = 5
@@ -300,6 +302,7 @@ STAND_INS: dict[str, Callable[[Path], object]] = {
     "frames/": _frames,
     "frame.png": _frame,
     "midlines.csv": _midlines,
+    "tracked.csv": lambda to: table(to, read_animal("lizard")),
     "track.npz": _captured,
     "worm.npz": _captured,
     "NAME.npz": lambda to: _ran("synthesise -o")(to.with_suffix("")),
