@@ -114,13 +114,24 @@ def _picture(values: Floats, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
     """The picture (h, w) of a line of spots, and its slopes (h w, values)."""
     x, y = _ALONG @ values[:_CONTROLS], _ALONG @ values[_CONTROLS : 2 * _CONTROLS]
     weights, spot = _HATS @ values[2 * _CONTROLS : -1], float(values[-1])
-    away_x, away_y = np.arange(shape[1])[:, None] - x, np.arange(shape[0])[:, None] - y
+    high, wide = shape
+    away_x, away_y = np.arange(wide)[:, None] - x, np.arange(high)[:, None] - y
     across = np.exp(-0.5 * (away_x / spot) ** 2)
     down = np.exp(-0.5 * (away_y / spot) ** 2) / (2.0 * np.pi * spot * spot)
-    each = down[:, None, :] * across[None, :, :]  # (h, w, spots)
-    heavy = each * weights
-    by_x = (heavy * (away_x / spot**2)[None]) @ _ALONG
-    by_y = (heavy * (away_y / spot**2)[:, None]) @ _ALONG
-    wide = ((away_x[None] ** 2 + away_y[:, None] ** 2) / spot**3 - 2.0 / spot) * heavy
-    slopes = np.concatenate([by_x, by_y, each @ _HATS, wide.sum(axis=2)[..., None]], axis=2)
-    return heavy.sum(axis=2), slopes.reshape(-1, len(values))
+    # a spot is a product of its row and its column: no array has rows, columns and spots
+    heavy = down * weights
+    shown = heavy @ across.T
+    moved_x, moved_y = across * away_x / spot**2, heavy * away_y / spot**2
+    by_x, by_y, by_weight = (
+        (rows @ (columns.T[:, :, None] * shares[:, None, :]).reshape(len(shares), -1)).reshape(
+            high * wide, -1
+        )
+        for rows, columns, shares in (
+            (heavy, moved_x, _ALONG),
+            (moved_y, across, _ALONG),
+            (down, across, _HATS),
+        )
+    )
+    spread = heavy @ (across * away_x**2).T + (heavy * away_y**2) @ across.T
+    by_spot = spread / spot**3 - 2.0 / spot * shown
+    return shown, np.concatenate([by_x, by_y, by_weight, by_spot.reshape(-1, 1)], axis=1)
