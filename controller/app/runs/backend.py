@@ -18,13 +18,15 @@ from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.shadow.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
+from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.clock import Clock, WallClock
 from snakewalk.drivers.port.byte_port import BytePort
-from snakewalk.drivers.port.network_port import open_port
+from snakewalk.drivers.port.network_port import NetworkPort, open_port
 from snakewalk.drivers.port.port_map import is_port_map, parse_port_map, port_map_text
+from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.drivers.types import BodyPose, JointState
 
 FILE_PORTS: Final = "robot"
@@ -138,7 +140,10 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
         PortError: a port is not there, is taken, or may not be opened.
 
     """
-    bus = _bus_on_ports(robot, WallClock()) if robot.ports else _bus_on(robot, port)
+    if robot.ports:
+        bus: ChainBus = _bus_on_ports(robot, WallClock())
+    else:
+        bus = _bus_on(robot, open_port(port, robot.servo.baud))
     chain = ServoChain(bus, robot, watchdog_s=run.safety.watchdog_s, rate_hz=run.cycle_hz)
     name = port_map_text((each.port, each.ids) for each in robot.ports) or port
     return Backend(name, chain, chain.clock, None, None, lambda: float("nan"))
@@ -217,8 +222,7 @@ def real_ports(robot: RobotConfig) -> list[str]:
     return [each.port for each in robot.ports if each.port != SIMULATED]
 
 
-def _bus_on(robot: RobotConfig, port: str, clock: Clock | None = None) -> DynamixelBus:
-    line = open_port(port, robot.servo.baud, clock)
+def _bus_on(robot: RobotConfig, line: SerialPort | NetworkPort) -> DynamixelBus:
     return DynamixelBus(line, robot.models_by_id, latency_s=line.latency_s)
 
 
@@ -232,7 +236,7 @@ def _bus_on_ports(
             if each.port == SIMULATED and simulated_line is not None:
                 bus = DynamixelBus(simulated_line, robot.models_by_id)
             else:
-                bus = _bus_on(robot, each.port, clock)
+                bus = _bus_on(robot, open_port(each.port, robot.servo.baud, clock))
             opened.callback(bus.port.closePort)
             parts.append((bus, each.ids))
         opened.pop_all()
