@@ -53,6 +53,11 @@ class CameraConfig(Strict):
     device: str | None = Field(
         None, description="of a real camera: a number, a device or an address that OpenCV opens"
     )
+    latency_s: float = Field(
+        0.0, ge=0.0, le=1.0,
+        description="how long after it was taken a real camera's frame is handed over, as "
+        "`snakewalk camera check` measures it",
+    )  # fmt: skip
     background: str | None = Field(
         None, description="image of the empty floor, needed with a real camera"
     )

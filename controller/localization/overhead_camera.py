@@ -19,7 +19,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.capture.body_detector import BodyDetector, Detection
 from snakewalk.controller.capture.frame_status import FrameStatus
-from snakewalk.controller.capture.image.silhouette import Polarity
+from snakewalk.controller.capture.image.medial_axis import no_skeleton, skeleton_of
+from snakewalk.controller.capture.image.silhouette import Polarity, silhouette_of
 from snakewalk.controller.localization.floor_light import lit_floor, unexplained
 from snakewalk.controller.localization.floor_markers import (
     Bump,
@@ -370,11 +371,30 @@ class OverheadDetector:
             InputError: the frame is not as large as the background.
 
         """
+        apart = self._apart(image)
+        return BodyDetector(np.zeros_like(apart), Polarity.BOTH, "given").detect(apart)
+
+    def outline(self, image: Image, time_s: float) -> LineDetection:
+        """Find the body in one frame (H, W[, 3]) by its outline alone: a tenth of the time.
+
+        Raises:
+            InputError: the frame is not as large as the background.
+
+        """
+        apart = self._apart(image)
+        body = silhouette_of(apart, np.zeros_like(apart), Polarity.BOTH)
+        good = body.status is FrameStatus.GOOD
+        skeleton = skeleton_of(body.mask) if good else no_skeleton(body.status)
+        points = skeleton.points_px + body.origin_px
+        line = self.model.on_plane(points, self.axis_height_m)
+        return LineDetection(time_s, line, skeleton.status)
+
+    def _apart(self, image: Image) -> Image:
+        """(H, W) grey levels by which a frame is off its floor."""
         self._check_size(image)
         floor = self.background
         lit = lit_floor(image, floor, 0.5 * (_SURROUNDINGS * image.shape[1]) ** 2)
-        apart = np.minimum(unexplained(image, lit, self.shade), 255.0).astype(np.uint8)
-        return BodyDetector(np.zeros_like(apart), Polarity.BOTH, "given").detect(apart)
+        return np.minimum(unexplained(image, lit, self.shade), 255.0).astype(np.uint8)
 
 
 def _projected(matrix: NDArray[Any], points: Floats) -> Floats:

@@ -28,6 +28,7 @@ from snakewalk.controller.app.cli.commands.bus import (
     sniff,
 )
 from snakewalk.controller.app.cli.commands.camera.board import board
+from snakewalk.controller.app.cli.commands.camera.check import check
 from snakewalk.controller.app.cli.commands.camera.lens import calibrate_camera
 from snakewalk.controller.app.cli.commands.camera.markers import markers
 from snakewalk.controller.app.cli.commands.capture import capture
@@ -489,7 +490,7 @@ terrain_app.command(
     ),
 )(stereo)
 
-camera_app = _App(no_args_is_help=True, help="The camera above the robot: its lens, its markers.")
+camera_app = _App(no_args_is_help=True, help="The camera above the robot: lens, markers, check.")
 
 app.add_typer(camera_app, name="camera", rich_help_panel=_JOB)
 
@@ -511,6 +512,12 @@ camera_app.command(
         "camera markers -o markers.pdf", "camera markers -o a3.pdf --side 250 --count 4"
     )
 )(markers)
+
+camera_app.command(
+    epilog=_examples(
+        "camera check flat-square", "camera check my-run.toml --port /dev/ttyUSB0 --view"
+    )
+)(check)
 
 fish_app = _App(no_args_is_help=True, help="Fish from video: match, synthesise, film.")
 

@@ -41,7 +41,7 @@ ANSWER_S = 0.1
 class DeviceCamera:
     """What OpenCV opens under ``camera.device``; ``close`` it.
 
-    A frame is dated when it has been handed over: the camera's own delay is not known.
+    A frame is dated ``latency_s`` before it has been handed over.
 
     Raises:
         InputError: no such camera, no background, another size, no frame, or no robot in it.
@@ -52,7 +52,7 @@ class DeviceCamera:
         camera = run.camera
         self._clock = clock
         self.detector = overhead_detector(run, robot)
-        self._name = f"camera {camera.device}"
+        self._name, self._latency_s = f"camera {camera.device}", camera.latency_s
         self._device = open_device(camera)
         self._robot = robot
         self._found: queue.SimpleQueue[LineDetection | TrackedPose | InputError] = (
@@ -137,7 +137,7 @@ class DeviceCamera:
                 return
             taken += 1
             try:
-                picture, time_s = in_colour(frame), self._clock.now_s()
+                picture, time_s = in_colour(frame), self._clock.now_s() - self._latency_s
                 if taken % CHECK_FRAMES == 0:
                     self.detector = self.detector.registered(picture)
                 self._found.put(self._look(picture, time_s))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
@@ -64,6 +64,22 @@ def floor_prints(camera: CameraConfig) -> "list[FloorPrint]":
     return found
 
 
+def rendered_detector(run: RunConfig, robot: RobotConfig, ground: Image) -> OverheadDetector:
+    """Build the detector of the simulator's camera from its picture (H, W, 3) of the empty floor.
+
+    Raises:
+        InputError: its markers fix no floor.
+
+    """
+    camera, centre_m = run.camera, centre_of(run)
+    model = (
+        CameraModel.straight_down(camera, centre_m)
+        if camera.markers_m is None
+        else CameraModel.from_markers(camera, centre_m, None, ground)
+    )
+    return OverheadDetector(model, ground, robot.body_radius_m, camera.shade)
+
+
 class RenderedCamera:
     """The simulated robot from above; each frame arrives one period after it was taken.
 
@@ -86,13 +102,7 @@ class RenderedCamera:
 
         centre_m = centre_of(run)
         self._view = TopView(robot, world, run.camera, centre_m, run.seed, floor_prints(run.camera))
-        ground = self._view.empty_floor()
-        model = (
-            CameraModel.straight_down(run.camera, centre_m)
-            if run.camera.markers_m is None
-            else CameraModel.from_markers(run.camera, centre_m, None, ground)
-        )
-        self.detector = OverheadDetector(model, ground, robot.body_radius_m, run.camera.shade)
+        self.detector = rendered_detector(run, robot, self._view.empty_floor())
         self._qpos, self._clock = qpos, clock
         self._period_s = 1.0 / run.camera.rate_hz
         self._next_s = clock.now_s()

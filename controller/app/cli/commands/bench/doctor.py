@@ -1,17 +1,13 @@
 """``snakewalk doctor``: is this bus fit for a run, and what is to be done if not."""
 
-import json
 from typing import Annotated
 
 import typer
-from rich.table import Table
-from rich.text import Text
 
 from snakewalk.controller.app.cli import completion
-from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, Port, Robot, console
+from snakewalk.controller.app.cli.findings_table import show_findings
+from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, Port, Robot
 from snakewalk.controller.app.messages import stderr_console
-
-_COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 
 
 def doctor(
@@ -33,7 +29,6 @@ def doctor(
     from snakewalk.config.loader import load_robot, load_run  # noqa: PLC0415  --help stays quick
     from snakewalk.controller.app.service.adapter import permission  # noqa: PLC0415
     from snakewalk.controller.app.service.doctor import examine  # noqa: PLC0415
-    from snakewalk.controller.app.service.finding import worst  # noqa: PLC0415
     from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
     from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
 
@@ -56,19 +51,4 @@ def doctor(
                 wiggle=wiggle,
                 on_progress=lambda step: status.update(f"{device}: {step}"),
             )
-    grade = worst(findings)
-    if as_json:
-        shown = [finding.to_dict() for finding in findings]
-        print(
-            json.dumps({"port": device, "robot": described.name, "worst": grade, "findings": shown})
-        )
-    else:
-        table = Table(box=None, show_header=False)
-        for finding in findings:
-            mark = Text(finding.grade, style=_COLOURS[finding.grade])
-            table.add_row(mark, finding.check, finding.found)
-            if finding.remedy:
-                table.add_row("", "", Text(f"-> {finding.remedy}", style="bold"))
-        console.print(table)
-    if grade == "fail":
-        raise SystemExit(1)
+    show_findings(findings, {"port": device, "robot": described.name}, as_json)
