@@ -131,15 +131,21 @@ def merge(segments: list[MotionSegment], merge_rad: float) -> list[MotionSegment
 
 
 def speeds(postures: Postures) -> Floats:
-    """(T,) speed of the base of the head, by a straight line through a sixth of a second."""
+    """(T,) speed of the base of the head, by a straight line through a sixth of a second.
+
+    In space, where a side view tells the height of the base.
+    """
     half = max(1, round(postures.rate_hz / 12.0))
+    base = postures.base
+    if postures.height is not None:
+        base = np.column_stack([base, postures.height])
     out = np.full(postures.frames, np.nan)
     for k in range(postures.frames):
         at = np.arange(max(0, k - half), min(postures.frames, k + half + 1))
-        at = at[np.isfinite(postures.base[at, 0])]
+        at = at[np.isfinite(base[at]).all(axis=1)]
         if len(at) > 1:
             time = (at - at.mean()) / postures.rate_hz
-            out[k] = float(np.hypot(*(time @ postures.base[at] / (time @ time))))
+            out[k] = float(np.linalg.norm(time @ base[at] / (time @ time)))
     return out
 
 

@@ -19,6 +19,7 @@ from snakewalk.controller.capture.fish.segments import (
     commonest_posture,
     merge,
     segment_motion,
+    speeds,
     turned,
 )
 from snakewalk.controller.capture.fish.swimmer import Stroke, swim
@@ -48,6 +49,22 @@ def beat(turn_deg: float, start: int, stop: int) -> MotionSegment:
 def printed_merge(a: MotionSegment, b: MotionSegment) -> bool:
     """[TH] 4.1.3: only the first and the last direction are compared."""
     return abs(a.turn_rad + b.turn_rad) < LIMIT
+
+
+def test_a_climb_counts_in_the_speed_where_it_was_seen() -> None:
+    """3 m/s along, 4 m/s up: 5 m/s; from above alone it looked like 3."""
+    time_s = np.arange(30) / 25.0
+    level = Postures(
+        base=np.stack([3.0 * time_s, np.zeros(30)], axis=1),
+        head_rad=np.zeros(30),
+        angles_rad=np.zeros((30, 2)),
+        joints_at=(0.3, 0.6),
+        rate_hz=25.0,
+    )
+    np.testing.assert_allclose(speeds(level), 3.0)
+    np.testing.assert_allclose(speeds(replace(level, height=4.0 * time_s)), 5.0)
+    lost = np.where(np.arange(30) == 10, np.nan, 4.0 * time_s)
+    np.testing.assert_allclose(speeds(replace(level, height=lost)), 5.0)
 
 
 def test_a_script_is_cut_into_its_strokes() -> None:
