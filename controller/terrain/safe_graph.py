@@ -110,8 +110,10 @@ class SafeGraph:
         """Weights of straight pieces (k, 2) to (k, 2), of them back, and whether they are safe."""
         length = np.hypot(*(to_m - from_m).T)
         count = max(2, int(np.ceil(length.max(initial=0.0) / _SAMPLE_M)) + 1)
-        part = np.linspace(0.0, 1.0, count)[:, None]
-        at = from_m[:, None] + part * (to_m - from_m)[:, None]
+        part, at = np.linspace(0.0, 1.0, count), np.empty((len(from_m), count, 2))
+        for axis in range(2):  # numpy is slow where the innermost axis has two values
+            step = np.multiply.outer(to_m[:, axis] - from_m[:, axis], part)
+            np.add(from_m[:, axis, None], step, out=at[..., axis])
         direction = (to_m - from_m) / np.maximum(length, 1e-12)[:, None]
         there, back, risk = self._cost_per_m(at, np.repeat(direction[:, None], count, axis=1))
         safe = (risk <= RISK_LIMIT).all(axis=-1)
