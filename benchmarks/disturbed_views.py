@@ -247,11 +247,7 @@ def measure(
 ) -> Found:
     """Track each pose from a belief that is off by up to 40 mm each way and 0.1 rad."""
     robot, ground = load_robot("yaw16"), _bent(floor, lens)
-    model = (
-        CameraModel.straight_down(camera, (0.0, 0.0), lens)
-        if camera.markers_m is None
-        else CameraModel.from_markers(camera, (0.0, 0.0), lens, ground)
-    )
+    model = CameraModel.of_floor(camera, (0.0, 0.0), lens, ground)
     detector = OverheadDetector(model, ground, robot.body_radius_m, camera.shade)
     off_m, noticed = [], 0
     for k, scene in enumerate(drawn):

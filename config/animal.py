@@ -33,6 +33,11 @@ class FinConfig(Strict):
     thickness: float = Field(0.004, gt=0.0, le=0.05, description="half of it, at the root")
     paired: bool = Field(False, description="the same on the other side")
 
+    @property
+    def mirrored(self) -> Self:
+        """The one on the other side."""
+        return self.model_copy(update={"around_deg": 180.0 - self.around_deg})
+
 
 class SkinConfig(Strict):
     """A body to be covered by PDE patches."""
@@ -59,12 +64,7 @@ class SkinConfig(Strict):
     @property
     def all_fins(self) -> tuple[FinConfig, ...]:
         """Each fin, paired ones twice."""
-        mirrored = [
-            fin.model_copy(update={"around_deg": 180.0 - fin.around_deg})
-            for fin in self.fins
-            if fin.paired
-        ]
-        return (*self.fins, *mirrored)
+        return (*self.fins, *(fin.mirrored for fin in self.fins if fin.paired))
 
 
 class LegPairConfig(Strict):
@@ -131,6 +131,11 @@ class AnimalConfig(Strict):
         if not front.at < hind.at:
             raise ValueError("leg_pairs: the front pair comes first: its `at` is smaller")
         return self
+
+    @property
+    def all_ornaments(self) -> tuple[OrnamentConfig, ...]:
+        """Each ornament, paired ones twice."""
+        return (*self.ornaments, *(one.mirrored for one in self.ornaments if one.paired))
 
     @property
     def speed_m_s(self) -> float:

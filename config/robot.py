@@ -49,7 +49,7 @@ STALL_CURRENT_A: Mapping[str, float] = {
 model of the X series, "Specifications"; XD models as their XH twins."""
 _LIMIT_SHARE = 2.0 / 2.3
 """Of the stall current, up to which a run goes on (ours): 2 A of an XM430."""
-_LAST_ID = 252
+LAST_ID = 252
 SIMULATED = "sim"
 """The port of servos that are simulated while the others of the chain are real."""
 _PROTOCOL_1 = ("AX-", "RX-", "EX-", "DX-")
@@ -59,7 +59,7 @@ class ServoConfig(Strict):
     """One servo type, the same along the chain."""
 
     model: str = Field("XM430-W350", description="name as printed on the servo")
-    first_id: int = Field(1, ge=0, le=252, description="ID of the joint next to the head")
+    first_id: int = Field(1, ge=0, le=LAST_ID, description="ID of the joint next to the head")
     baud: Baud = 1_000_000
     supply_v: float = Field(12.0, ge=3.0, le=26.0)
     supply_min_v: float | None = Field(
@@ -166,7 +166,7 @@ class JointConfig(Strict):
         None, description="y = yaw, p = pitch; in every joint, unless joint_axes says it"
     )
     id: int | None = Field(
-        None, ge=0, le=252, description="of its servo; default: counted from servo.first_id"
+        None, ge=0, le=LAST_ID, description="of its servo; default: counted from servo.first_id"
     )
     model: str | None = Field(None, description="default: servo.model")
     sign: Literal[1, -1] = Field(
@@ -213,7 +213,7 @@ class ImuConfig(Strict):
     """
 
     model: ImuModel = Field("imu_to_dxl", description="which of the two public tables it has")
-    id: int = Field(200, ge=0, le=252, description="its ID on the bus")
+    id: int = Field(200, ge=0, le=LAST_ID, description="its ID on the bus")
     link: int = Field(0, ge=0, description="of the spine, in which it sits; 0 is the head")
     mounting_deg: Degrees3 = Field(
         (0.0, 0.0, 0.0),
@@ -448,8 +448,8 @@ class RobotConfig(Strict):
     @model_validator(mode="after")
     def _ids_fit_the_bus(self) -> Self:
         ids = self.servo_ids
-        if max(ids) > _LAST_ID:
-            raise ValueError(f"servo IDs would run to {max(ids)}; the bus has 0 to {_LAST_ID}")
+        if max(ids) > LAST_ID:
+            raise ValueError(f"servo IDs would run to {max(ids)}; the bus has 0 to {LAST_ID}")
         twice = sorted(each for each, count in Counter(ids).items() if count > 1)
         if twice:
             raise ValueError(f"joints: ID {', '.join(map(str, twice))} is of more than one joint")

@@ -53,7 +53,7 @@ def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
             hang(_tube(upper, hip_m, knee_m), _carrier(pair.at), _PLAIN_UV)
             hang(_tube(lower, knee_m, foot_m), len(rest) - 1, _PLAIN_UV)
     dark = (1.0 / bands if bands else 0.5), _DARK_V
-    for one in ornaments(animal):
+    for one in animal.all_ornaments:
         thick_m = length_m * one.thick
         cone = _tube(_length_m(one, length_m), thick_m, _POINT * thick_m)
         uv = dark if one.dark else _PLAIN_UV
@@ -81,7 +81,7 @@ def animal_bones(animal: AnimalConfig, motion: AnimalMotion) -> BoneMotion:
         turns += [_facing(hip - knee, ahead), _facing(knee - end, ahead)]
         long_m += [length_m * pair.upper, length_m * pair.lower]
     steps = 2.0 * TURN * motion.time_s / animal.cycle_s
-    for one in ornaments(animal):
+    for one in animal.all_ornaments:
         if one.swing_rad > 0.0:
             k = _carrier(one.at)
             x, y, z = one.root
@@ -93,11 +93,6 @@ def animal_bones(animal: AnimalConfig, motion: AnimalMotion) -> BoneMotion:
     return BoneMotion(
         motion.time_s, np.stack(front, axis=1), np.stack(turns, axis=1), np.array(long_m)
     )
-
-
-def ornaments(animal: AnimalConfig) -> tuple[OrnamentConfig, ...]:
-    """Each ornament, paired ones twice."""
-    return (*animal.ornaments, *(one.mirrored for one in animal.ornaments if one.paired))
 
 
 def _length_m(one: OrnamentConfig, body_m: float) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
-from snakewalk.controller.localization.lens import Lens
+from snakewalk.controller.localization.lens import Lens, projected
 
 DICTIONARY: Final = "DICT_4X4_50"
 COUNT: Final = 50
@@ -163,7 +163,7 @@ def _aligned(grey: NDArray[Any], number: int, corners: Floats) -> Floats:
     except cv2.error:  # does not converge: half covered, or blurred
         return corners
     turned = ends @ np.asarray(move[:, :2], dtype=float).T + move[:, 2]
-    better = _projected(np.asarray(there, dtype=float), turned)
+    better = projected(np.asarray(there, dtype=float), turned)
     return better if np.abs(better - corners).max() < _FURTHEST * cells_px else corners
 
 
@@ -204,10 +204,10 @@ def fit_floor(
         homography, lens_m = homography / homography[2, 2], -rotation.T @ shift
     if homography is None or not np.isfinite(homography).all():
         raise InputError("the markers fix no floor: three of four lie on a line")
-    away = _projected(homography, middles) - floor
+    away = projected(homography, middles) - floor
     sides = {}
     for name in used:
-        corners = _projected(homography, px[name])
+        corners = projected(homography, px[name])
         sides[name] = float(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T).mean())
     return FloorFit(
         np.asarray(homography, dtype=float),
@@ -275,7 +275,7 @@ def _carried(
 ) -> Floats:
     """(3, 3) of a camera that was turned and carried: its poses over the floor, then and now."""
     before, after = (np.concatenate([seen[name] for name in names]) for seen in (one, two))
-    floor = _projected(floor_from_px, before)
+    floor = projected(floor_from_px, before)
     then, now = (_pose(floor, px, matrix) for px in (before, after))
     move = _over_floor(now, matrix) @ np.linalg.inv(_over_floor(then, matrix))
     return np.asarray(move / move[2, 2])
@@ -290,13 +290,13 @@ def _without(name: int, matrix: Floats, one: Markers, two: Markers, names: Seque
 def _residual_px(move: Floats, one: Markers, two: Markers, names: Sequence[int]) -> float:
     """Of the marker that is furthest off."""
     return max(
-        float(np.hypot(*(_projected(move, one[name]) - two[name]).mean(axis=0))) for name in names
+        float(np.hypot(*(projected(move, one[name]) - two[name]).mean(axis=0))) for name in names
     )
 
 
 def _bump(move: Floats, matrix: Floats, left_out: tuple[int, ...]) -> Bump:
     middle = matrix[:2, 2]
-    there = _projected(move, middle + np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]]))
+    there = projected(move, middle + np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]]))
     shift = there[0] - middle
     right, down = (there[1:] - there[0]) / 10.0
     turn = float(np.arctan2(right[1] - down[0], right[0] + down[1]))
@@ -327,11 +327,6 @@ def _middle(corners: Floats) -> Floats:
 
 def _plain(px: Floats, lens: Lens | None) -> Floats:
     return px if lens is None else lens.undistorted(px)
-
-
-def _projected(matrix: NDArray[Any], points: Floats) -> Floats:
-    flat = np.ascontiguousarray(points).reshape(-1, 1, 2)
-    return np.asarray(cv2.perspectiveTransform(flat, matrix), dtype=float).reshape(points.shape)
 
 
 def _dictionary() -> Any:

@@ -6,10 +6,11 @@ The file is one of OpenCV's FileStorage with the names of its calibration sample
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Self
+from typing import Any, Final, Self
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -18,6 +19,13 @@ _MOST_BYTES: Final = 1_000_000
 _ENDINGS: Final = (".yml", ".yaml", ".xml", ".json")
 _COEFFICIENTS: Final = (4, 5, 8, 12, 14)
 _STEPS: Final = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-9)
+
+
+def projected(homography: NDArray[Any], points: Floats) -> Floats:
+    """(..., 2) where a homography (3, 3) puts points (..., 2)."""
+    x, y = points[..., 0], points[..., 1]
+    moved = [row[0] * x + row[1] * y + row[2] for row in homography]
+    return np.stack([moved[0] / moved[2], moved[1] / moved[2]], axis=-1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ covers the floor further out, at ``g = f + (p - f) h / (h - z)``, and that is un
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Self
 
 import cv2
 import numpy as np
@@ -30,7 +30,7 @@ from snakewalk.controller.localization.floor_markers import (
     fit_floor,
     picture_move,
 )
-from snakewalk.controller.localization.lens import Lens
+from snakewalk.controller.localization.lens import Lens, projected
 from snakewalk.controller.localization.pose_tracking import (
     REACH_M,
     BodyPrior,
@@ -68,6 +68,24 @@ class CameraModel:
     """x, y by which the picture has moved since the homography was measured."""
     markers: Markers = field(default_factory=dict)
     """Printed markers in the picture in which the homography was measured."""
+
+    @classmethod
+    def of_floor(
+        cls,
+        camera: CameraConfig,
+        centre_m: tuple[float, float],
+        lens: Lens | None,
+        background: Image,
+    ) -> Self:
+        """Build the model by the floor's printed markers, or without any that of a straight look.
+
+        Raises:
+            InputError: the markers fix no floor, as ``from_markers`` says.
+
+        """
+        if camera.markers_m is not None:
+            return cls.from_markers(camera, centre_m, lens, background)
+        return cls.straight_down(camera, centre_m, lens)
 
     @classmethod
     def straight_down(
@@ -145,7 +163,7 @@ class CameraModel:
         if self.lens is not None:
             return self.lens.matrix
         middle = 0.5 * (np.array(size_px, dtype=float) - 1.0)
-        places = _projected(
+        places = projected(
             self.floor_from_px, middle + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
         )
         across, down = places[1:] - places[0]
@@ -158,7 +176,7 @@ class CameraModel:
         plain = points_px - self.moved_px
         if self.lens is not None:
             plain = self.lens.undistorted(plain)
-        floor = _projected(self.floor_from_px, plain)
+        floor = projected(self.floor_from_px, plain)
         return np.asarray(self.foot_m + (floor - self.foot_m) * (1.0 - z_m / self.height_m))
 
     def in_image(self, points_m: Floats, z_m: float) -> Floats:
@@ -174,7 +192,7 @@ class CameraModel:
         lens, moved_px = self.lens, np.array(self.moved_px)
 
         def project(points_m: Floats) -> Floats:
-            plain = _projected(back, points_m)
+            plain = projected(back, points_m)
             return np.asarray((plain if lens is None else lens.distorted(plain)) + moved_px)
 
         return project
@@ -248,7 +266,7 @@ class OverheadDetector:
         )
         floor_from_px = first.model.floor_from_px @ np.linalg.inv(move.now_from_then)
         back = np.linalg.inv(self.model.floor_from_px) @ floor_from_px
-        off = np.hypot(*(_projected(back, corners) - corners + self.model.moved_px).T)
+        off = np.hypot(*(projected(back, corners) - corners + self.model.moved_px).T)
         same = known.left_out == now.left_out and known.undone == now.undone
         if same and off.max() < (_MOVED_PX if now.undone else np.inf):
             return self
@@ -258,7 +276,7 @@ class OverheadDetector:
         columns, rows = size_px
         grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).astype(float)
         lens = first.model.lens
-        then = _projected(
+        then = projected(
             np.linalg.inv(move.now_from_then), grid if lens is None else lens.undistorted(grid)
         )
         at = (then if lens is None else lens.distorted(then)).astype(np.float32)
@@ -395,12 +413,6 @@ class OverheadDetector:
         floor = self.background
         lit = lit_floor(image, floor, 0.5 * (_SURROUNDINGS * image.shape[1]) ** 2)
         return np.minimum(unexplained(image, lit, self.shade), 255.0).astype(np.uint8)
-
-
-def _projected(matrix: NDArray[Any], points: Floats) -> Floats:
-    x, y = points[..., 0], points[..., 1]
-    moved = [row[0] * x + row[1] * y + row[2] for row in matrix]
-    return np.stack([moved[0] / moved[2], moved[1] / moved[2]], axis=-1)
 
 
 def _texture(image: Image) -> NDArray[np.float32]:

@@ -39,7 +39,7 @@ class SegmentedBus:
         if len(self._bus_of) != sum(len(ids) for _, ids in parts):
             raise ValueError("an ID is on one port")
         self._parts = tuple(bus for bus, _ in parts)
-        self._lost: list[DynamixelBus] = []
+        self._lost: dict[DynamixelBus, None] = {}  # in the order in which they went
 
     @property
     def parts(self) -> Sequence[DynamixelBus]:
@@ -59,7 +59,7 @@ class SegmentedBus:
         """
         for bus in tuple(self._lost):
             bus.reopen()
-            self._lost.remove(bus)
+            del self._lost[bus]
 
     def table_of(self, servo_id: int) -> ControlTable:
         """Control table of one servo's model."""
@@ -159,8 +159,7 @@ class SegmentedBus:
             try:
                 do(bus, at)
             except PortError as error:
-                if bus not in self._lost:
-                    self._lost.append(bus)
+                self._lost[bus] = None
                 gone.append(error)
         if len(gone) > 1:
             raise PortError("; ".join(map(str, gone))) from gone[0]
@@ -174,8 +173,7 @@ class SegmentedBus:
         try:
             yield bus
         except PortError:
-            if bus not in self._lost:
-                self._lost.append(bus)
+            self._lost[bus] = None
             raise
         except BusError as error:
             error.args = (f"{bus.port.name}: {error}",)

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.robot import LAST_ID
 
-_LAST: Final = 252
 _SEGMENT: Final = re.compile(r"\s*(?P<ids>\d[\d\s,-]*)=(?P<port>[^,]+)(?:,|$)")
 _EXAMPLE: Final = "write 1-8=/dev/ttyUSB0,9-16=/dev/ttyUSB1"
 
@@ -65,9 +65,9 @@ def id_range(piece: str, source: str, example: str) -> range:
         raise InputError(f"{source}: {piece!r} is no ID; {example}") from None
     if high < low:
         raise InputError(f"{source}: {piece} runs backwards")
-    wrong = [each for each in (low, high) if not 0 <= each <= _LAST]
+    wrong = [each for each in (low, high) if not 0 <= each <= LAST_ID]
     if wrong:
-        raise InputError(f"{source}: ID {wrong[0]}: a servo has 0 to {_LAST}")
+        raise InputError(f"{source}: ID {wrong[0]}: a servo has 0 to {LAST_ID}")
     return range(low, high + 1)
 
 

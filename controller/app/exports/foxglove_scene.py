@@ -17,7 +17,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.controller.app.exports.body_frames import WORLD, body_frames, joint_names
 from snakewalk.controller.app.exports.foxglove_schema import SCHEMAS
-from snakewalk.controller.app.exports.imu_readings import imu_readings
+from snakewalk.controller.app.exports.imu_readings import IMU_TOPIC, imu_readings, recorded_topics
 from snakewalk.controller.runlog.encode import encode, floats, number
 from snakewalk.controller.runlog.record import RunRecord
 
@@ -30,7 +30,7 @@ _TOPICS: Final = {
     "/joint_states": "foxglove.JointStates",
     "/joint_goals": "foxglove.JointStates",
     "/head_pose": "foxglove.PoseInFrame",
-    "/imu": "foxglove.PoseInFrame",
+    IMU_TOPIC: "foxglove.PoseInFrame",
     "/log": "foxglove.Log",
 }
 _LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
@@ -53,8 +53,7 @@ _PATH_HEIGHT_M: Final = 0.005
 
 def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:
     """Write the file; returns how many messages each topic has."""
-    without = set() if len(record.imu.time_s) else {"/imu"}
-    topics = {name: kind for name, kind in _TOPICS.items() if name not in without}
+    topics = recorded_topics(_TOPICS, record)
     counts = dict.fromkeys(topics, 0)
     with path.open("wb") as file:
         writer: Any = Writer(file)
@@ -129,7 +128,7 @@ def _imu(record: RunRecord) -> Iterator[Row]:
     )
     for time_s, at, turn in rows:
         pose = _pose(at, turn)
-        yield time_s, "/imu", {"timestamp": _time(time_s), "frame_id": WORLD, "pose": pose}
+        yield time_s, IMU_TOPIC, {"timestamp": _time(time_s), "frame_id": WORLD, "pose": pose}
 
 
 def _joints(record: RunRecord) -> Iterator[Row]:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.app.exports.body_frames import WORLD, body_frames, joint_names
-from snakewalk.controller.app.exports.imu_readings import imu_readings
+from snakewalk.controller.app.exports.imu_readings import IMU_TOPIC, imu_readings, recorded_topics
 from snakewalk.controller.runlog.record import RunRecord
 
 _TOPICS: Final = {
@@ -23,7 +23,7 @@ _TOPICS: Final = {
     "/joint_goals": "sensor_msgs/msg/JointState",
     "/tf": "tf2_msgs/msg/TFMessage",
     "/head_pose": "geometry_msgs/msg/PoseStamped",
-    "/imu": "sensor_msgs/msg/Imu",
+    IMU_TOPIC: "sensor_msgs/msg/Imu",
     "/path": "nav_msgs/msg/Path",
     "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
     "/rosout": "rcl_interfaces/msg/Log",
@@ -39,7 +39,7 @@ def write_ros_bag(record: RunRecord, path: Path) -> dict[str, int]:
     from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415  an extra
 
     store: Any = get_typestore(Stores.ROS2_JAZZY)
-    topics = {name: kind for name, kind in _TOPICS.items() if name != "/imu" or _has_imu(record)}
+    topics = recorded_topics(_TOPICS, record)
     counts = dict.fromkeys(topics, 0)
     with path.open("wb") as file:
         writer: Any = Writer(file)
@@ -63,10 +63,6 @@ def write_ros_bag(record: RunRecord, path: Path) -> dict[str, int]:
             counts[topic] += 1
         writer.finish()
     return counts
-
-
-def _has_imu(record: RunRecord) -> bool:
-    return bool(len(record.imu.time_s))
 
 
 _BY_TIME: Final = itemgetter(0)
@@ -171,7 +167,7 @@ class _Messages:
                 linear_acceleration=self._xyz("Vector3", [0.0, 0.0, 0.0]),
                 linear_acceleration_covariance=absent,
             )
-            yield time_s, "/imu", message
+            yield time_s, IMU_TOPIC, message
 
     def _path(self, time_s: float, points_m: Floats) -> Any:
         level = np.hstack([points_m, np.zeros((len(points_m), 3 - points_m.shape[1]))])

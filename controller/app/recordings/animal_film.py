@@ -10,11 +10,10 @@ from snakewalk.config.arrays import Image
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load, locate
 from snakewalk.controller.animal.animal_rig import animal_bones, animal_rig
-from snakewalk.controller.app.progress import ProgressBar
 from snakewalk.controller.app.recordings.animal_synthesis import SynthesisedAnimal, as_long_robot
 from snakewalk.controller.app.recordings.body_look import rig_look
-from snakewalk.controller.app.recordings.body_skin import body_skin
-from snakewalk.controller.app.report.film import film_motion
+from snakewalk.controller.app.recordings.body_skin import Cut, shipped_skin
+from snakewalk.controller.app.recordings.synthesis_skin import film_over
 from snakewalk.controller.app.result_files import atomic_write
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.capture.mesh.rig import Rig
@@ -36,9 +35,10 @@ class AnimalBody:
 
         """
         require_extra("a skin needs", "trimesh", "pygltflib")
-        dressed = body_skin(animal.skin)
-        bands = load(locate("skins", animal.skin), SkinConfig).bands
-        return cls(animal_rig(animal, dressed.skin.sized(animal.length_m), bands), dressed.texture)
+        config = load(locate("skins", animal.skin), SkinConfig)
+        worn = shipped_skin(config, Cut())
+        rig = animal_rig(animal, worn.skin.sized(animal.length_m), config.bands)
+        return cls(rig, worn.texture)
 
     def write(self, made: SynthesisedAnimal, file: Path) -> None:
         """Write the animated glTF, ``file`` ends in .glb."""
@@ -55,20 +55,15 @@ class AnimalBody:
             InputError: the simulator or PyAV is not installed, or nothing draws here.
 
         """
-        run, way = prepared.run, made.path
+        way = made.path
         dots = way.position(np.linspace(0.0, way.length_m, max(2, round(way.length_m / 0.05))))
-        with atomic_write(file) as part, ProgressBar("film", transient=True) as bar:
-            return film_motion(
-                animal_bones(made.animal, made.motion),
-                part,
-                look=rig_look(self.rig, self.texture),
-                robot=as_long_robot(prepared.robot, made.animal.length_m),
-                world=prepared.world,
-                ground=prepared.ground,
-                waypoints_m=run.waypoints_m,
-                waypoint_radius_m=run.waypoint_radius_m,
-                reached_s=made.reached_s(),
-                paths=[(0.0, dots)],
-                title=f"{made.animal.name}, {run.name}",
-                on_progress=bar.update,
-            )
+        return film_over(
+            prepared,
+            file,
+            animal_bones(made.animal, made.motion),
+            rig_look(self.rig, self.texture),
+            robot=as_long_robot(prepared.robot, made.animal.length_m),
+            reached_s=made.reached_s(),
+            paths=[(0.0, dots)],
+            title=f"{made.animal.name}, {prepared.run.name}",
+        )

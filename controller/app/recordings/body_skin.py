@@ -76,7 +76,7 @@ def body_skin(name: str, how: Cut | None = None) -> BodySkin:
     if Path(name).suffix.lower() in MESH_ENDINGS:
         return _given(Path(name), how)
     if is_skin(name):
-        return _shipped(name, how)
+        return shipped_skin(load(locate("skins", name), SkinConfig), how)
     if name in EMBEDDED:
         return model_skin(spindle(embedded(name).length_m), None, name, how)
     if Path(name).suffix != ".npz":
@@ -95,8 +95,8 @@ def model_skin(model: BodyModel, texture: Image | None, name: str, how: Cut) -> 
     return BodySkin(name, _covered(sections, how.order)[1], worn, False, {"curves": how.curves})
 
 
-def _shipped(name: str, how: Cut) -> BodySkin:
-    config = load(locate("skins", name), SkinConfig)
+def shipped_skin(config: SkinConfig, how: Cut) -> BodySkin:
+    """Cover the sections of a skin's file, with its fins."""
     model, lift = skin_model(config)
     sections = ellipses(model, lift, how.curves)
     tube, _ = _covered(sections, how.order)

@@ -1,8 +1,11 @@
 """The skin of a synthesised motion: as an animated glTF, and in a film on the world's ground."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from snakewalk.config.arrays import Floats
 from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.app.progress import ProgressBar
@@ -13,8 +16,12 @@ from snakewalk.controller.app.recordings.snake_synthesis import SynthesisedWalk
 from snakewalk.controller.app.report.film import film_motion
 from snakewalk.controller.app.result_files import atomic_write
 from snakewalk.controller.app.runs.walk_run import WalkRun
+from snakewalk.controller.capture.mesh.bone_motion import BoneMotion
 from snakewalk.controller.capture.mesh.rig import spine_rig
 from snakewalk.controller.capture.mesh.skin import Skin
+
+if TYPE_CHECKING:
+    from snakewalk.sim.rendering.looks import SkinLook
 
 FILM_SEGMENTS = 5
 """Segments of the skeleton that are one bone in the film; the file has a bone a segment."""
@@ -56,19 +63,61 @@ class SynthesisSkin:
 
         """
         bones = made.bones(FILM_SEGMENTS)
-        run = prepared.run
-        with atomic_write(file) as part, ProgressBar("film", transient=True) as bar:
-            return film_motion(
-                bones,
-                part,
-                look=rig_look(spine_rig(self.skin, bones.bone_m), self.dressed.texture),
-                robot=prepared.robot,
-                world=prepared.world,
-                ground=prepared.ground,
-                waypoints_m=run.waypoints_m,
-                waypoint_radius_m=run.waypoint_radius_m,
-                reached_s=made.reached_s(),
-                paths=made.targets.paths(made.rate_hz),
-                title=run.name,
-                on_progress=bar.update,
-            )
+        return film_over(
+            prepared,
+            file,
+            bones,
+            rig_look(spine_rig(self.skin, bones.bone_m), self.dressed.texture),
+            robot=prepared.robot,
+            reached_s=made.reached_s(),
+            paths=made.targets.paths(made.rate_hz),
+            title=prepared.run.name,
+        )
+
+
+def film_over(
+    prepared: WalkRun,
+    file: Path,
+    bones: BoneMotion,
+    look: "SkinLook",
+    *,
+    robot: RobotConfig,
+    reached_s: Sequence[float],
+    paths: Sequence[tuple[float, Floats]],
+    title: str,
+) -> int:
+    """Draw a skin that moves over a run's world; shows progress on standard error.
+
+    Args:
+        prepared: the run: its ground and waypoints.
+        file: the film, ends in .mp4.
+        bones: the motion.
+        look: the skin.
+        robot: what the camera frames: a body of the skin's length.
+        reached_s: when each waypoint was reached.
+        paths: paths (P, 2) from a time on.
+        title: in the picture.
+
+    Returns:
+        How many frames were drawn.
+
+    Raises:
+        InputError: the simulator or PyAV is not installed, or nothing draws here.
+
+    """
+    run = prepared.run
+    with atomic_write(file) as part, ProgressBar("film", transient=True) as bar:
+        return film_motion(
+            bones,
+            part,
+            look=look,
+            robot=robot,
+            world=prepared.world,
+            ground=prepared.ground,
+            waypoints_m=run.waypoints_m,
+            waypoint_radius_m=run.waypoint_radius_m,
+            reached_s=reached_s,
+            paths=paths,
+            title=title,
+            on_progress=bar.update,
+        )

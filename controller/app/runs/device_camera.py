@@ -167,13 +167,10 @@ def overhead_detector(run: RunConfig, robot: RobotConfig) -> OverheadDetector:
             f"{camera.lens}: is of pictures of {lens.size_px[0]} x {lens.size_px[1]} pixels, the "
             f"camera has {camera.width_px} x {camera.height_px}: calibrate in the size of the run"
         )
-    centre_m = centre_of(run)
-    if camera.markers_m is not None:
-        model = CameraModel.from_markers(camera, centre_m, lens, ground)
-    elif camera.corners_px is not None:
-        model = CameraModel.from_corners(camera, centre_m, lens)
+    if camera.corners_px is not None:
+        model = CameraModel.from_corners(camera, centre_of(run), lens)
     else:
-        model = CameraModel.straight_down(camera, centre_m, lens)
+        model = CameraModel.of_floor(camera, centre_of(run), lens, ground)
     return OverheadDetector(model, ground, robot.body_radius_m, camera.shade)
 
 

@@ -71,12 +71,8 @@ def rendered_detector(run: RunConfig, robot: RobotConfig, ground: Image) -> Over
         InputError: its markers fix no floor.
 
     """
-    camera, centre_m = run.camera, centre_of(run)
-    model = (
-        CameraModel.straight_down(camera, centre_m)
-        if camera.markers_m is None
-        else CameraModel.from_markers(camera, centre_m, None, ground)
-    )
+    camera = run.camera
+    model = CameraModel.of_floor(camera, centre_of(run), None, ground)
     return OverheadDetector(model, ground, robot.body_radius_m, camera.shade)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from snakewalk.controller.animal.animal_rig import animal_bones, ornaments
+from snakewalk.controller.animal.animal_rig import animal_bones
 from snakewalk.controller.animal.motion_transformation import AnimalMotion, transformed
 from snakewalk.controller.animal.prototype import SEGMENTS, prototype
 from snakewalk.controller.app.recordings.animal_film import AnimalBody
@@ -45,7 +45,7 @@ def test_legs_of_the_mesh_end_at_the_feet(name: str) -> None:
 def test_a_goat_has_the_papers_eleven_parts() -> None:
     goat = read_animal("goat")
     # body and tail are one skin here; two horns, two ears, a beard, four legs
-    assert len(ornaments(goat)) + 2 * len(goat.leg_pairs) + 2 == 11
+    assert len(goat.all_ornaments) + 2 * len(goat.leg_pairs) + 2 == 11
 
 
 @pytest.mark.parametrize("name", ANIMALS)

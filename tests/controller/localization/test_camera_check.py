@@ -6,21 +6,14 @@ import numpy as np
 import pytest
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
-from snakewalk.config.loader import load_robot
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.localization.camera_check import CameraCheck
 from snakewalk.controller.localization.camera_latency import LatencyFit, fit_latency
-from snakewalk.controller.localization.overhead_camera import (
-    CameraModel,
-    LineDetection,
-    OverheadDetector,
-)
-from tests.oracles.overhead_scene import DrawnView
+from snakewalk.controller.localization.overhead_camera import LineDetection, OverheadDetector
+from tests.oracles.marked_floor import CAMERA, DETECTOR, FLOOR, ROBOT, TRUE, VIEW
 
-ROBOT = load_robot("yaw16")
 JOINT_S = np.arange(0.0, 8.0, 0.02)
 
 
@@ -67,19 +60,6 @@ def test_what_tells_no_latency_is_told() -> None:
     assert "does not move as the joints do" in fitted(0.1, other).fault
     late = fitted(0.1, np.full((len(JOINT_S), ROBOT.joint_count), np.nan))
     assert "read 0 times" in late.fault
-
-
-PLACES = {0: (-1.3, -0.95), 3: (1.3, -0.95), 7: (1.3, 0.95), 12: (-1.3, 0.9), 20: (0.0, 0.95)}
-CAMERA = CameraConfig(
-    width_px=320, height_px=240, field_width_m=3.0, height_m=3.0,
-    markers_m={str(number): place for number, place in PLACES.items()},
-)  # fmt: skip
-TRUE = CameraModel.straight_down(CAMERA, (0.0, 0.0))
-VIEW = DrawnView(ROBOT, TRUE, (320, 240), markers_m=PLACES)
-FLOOR = VIEW.empty_floor()
-DETECTOR = OverheadDetector(
-    CameraModel.from_markers(CAMERA, (0.0, 0.0), None, FLOOR), FLOOR, ROBOT.body_radius_m, 0.5
-)
 
 
 def test_frames_markers_light_and_a_bump_are_reported() -> None:

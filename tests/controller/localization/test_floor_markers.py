@@ -9,7 +9,7 @@ import pytest
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
-from snakewalk.config.loader import load_robot, load_world
+from snakewalk.config.loader import load_world
 from snakewalk.controller.app.runs.rendered_camera import floor_prints
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.localization.camera_pose import CameraPose
@@ -24,30 +24,27 @@ from snakewalk.controller.localization.lens import Lens
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
     LineDetection,
-    OverheadDetector,
 )
 from snakewalk.controller.localization.pose_tracking import BodyPrior, TrackedPose
 from snakewalk.drivers.types import JointState
 from snakewalk.sim.rendering.offscreen import OffscreenError
 from snakewalk.sim.rendering.top_view import TopView
+from tests.oracles.marked_floor import (
+    CAMERA,
+    DETECTOR,
+    FLOOR,
+    PLACES,
+    ROBOT,
+    TRUE,
+    VIEW,
+)
 from tests.oracles.overhead_scene import DrawnView
 
-ROBOT = load_robot("yaw16")
-PLACES = {0: (-1.3, -0.95), 3: (1.3, -0.95), 7: (1.3, 0.95), 12: (-1.3, 0.9), 20: (0.0, 0.95)}
-CAMERA = CameraConfig(
-    width_px=320, height_px=240, field_width_m=3.0, height_m=3.0,
-    markers_m={str(number): place for number, place in PLACES.items()},
-)  # fmt: skip
-TRUE = CameraModel.straight_down(CAMERA, (0.0, 0.0))
-VIEW = DrawnView(ROBOT, TRUE, (320, 240), markers_m=PLACES)
-FLOOR = VIEW.empty_floor()
-MODEL = CameraModel.from_markers(CAMERA, (0.0, 0.0), None, FLOOR)
-DETECTOR = OverheadDetector(MODEL, FLOOR, ROBOT.body_radius_m, CAMERA.shade)
+MODEL = DETECTOR.model
 BEND = 0.4 * np.sin(0.3 + 0.6 * np.arange(ROBOT.joint_count))
 HEAD = np.array([0.5, 0.15])
 PICTURE = VIEW.picture(pose_at(HEAD, 0.4), BEND)
 MATRIX = TRUE.matrix((320, 240))
-"""320 px at 3 m: a pixel is 9.4 mm, a marker 16 px wide."""
 
 
 def corners(places: dict[int, tuple[float, float]], side_m: float = 0.15) -> dict[int, Floats]:

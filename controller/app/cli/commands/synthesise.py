@@ -1,5 +1,6 @@
 """``snakewalk synthesise``: a motion without a robot."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from snakewalk.controller.app.runs.walk_run import WalkRun
 
 _SYNTHESISED = ("walk", "walk-printed", "kp")
+_ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
+"""Of the files, by what is in them."""
 
 
 def synthesise(
@@ -66,8 +69,6 @@ def synthesise(
     as_json: Json = False,
 ) -> None:
     """Make an animal's motion over a world: a snake's by states ([PT]), or that of legs ([KP])."""
-    from snakewalk.controller.app.recordings.snake_synthesis import SnakeSynthesis  # noqa: PLC0415  heavy
-    from snakewalk.controller.app.report.plots.snake_synthesis import draw_walk  # noqa: PLC0415
     from snakewalk.controller.app.runs.factory import prepare_walk  # noqa: PLC0415
 
     prepared = prepare_walk(
@@ -77,72 +78,79 @@ def synthesise(
     if prepared.run.motion not in _SYNTHESISED:
         raise InputError(f"--motion {prepared.run.motion}: {', '.join(_SYNTHESISED)}")
     name = Path(prepared.run.name) if output is None else output
-    recording, picture, moving, solid = (
-        name.with_name(f"{name.name}{end}") for end in (".npz", ".png", ".mp4", ".glb")
-    )
-    more = [file for file, wanted in ((moving, film), (solid, glb)) if wanted]
-    refuse_to_overwrite([recording, picture, *more], force)
-    check_picture(picture)
-    files = {"film": str(moving) if film else None, "skin": str(solid) if glb else None}
-    if animal is not None:
+    left_out = {"film": not film, "skin": not glb}
+    files = {
+        what: name.with_name(f"{name.name}{ending}")
+        for what, ending in _ENDINGS.items()
+        if not left_out.get(what)
+    }
+    refuse_to_overwrite(list(files.values()), force)
+    check_picture(files["picture"])
+    if animal is None:
+        facts, complete = _snake(prepared, frames, look, files)
+    else:
         kept = {"--motion": motion, "--track": track, "--look": None if look == "animal" else look}
-        _with_legs(animal, prepared, frames, (recording, picture), more, kept, files, as_json)
-        return
-    worn = None
-    if more:
-        from snakewalk.controller.app.recordings.synthesis_skin import SynthesisSkin  # noqa: PLC0415
-
-        worn = SynthesisSkin.of(look, prepared.run.track, prepared.robot)
-    elif look != "animal":
-        raise InputError(f"--look {look}: is for --film and --glb")
-    made = SnakeSynthesis(prepared).synthesise(frames)
-    with atomic_write(recording) as part:
-        made.save(part, name.name, f"snakewalk synthesise of {prepared.run.track}")
-    draw_walk(made, prepared.ground, picture, f"{prepared.run.name}: {prepared.world.name}")
-    if worn is not None and glb:
-        worn.write(made, solid)
-    if worn is not None and film:
-        worn.film(made, prepared, moving)
-    show(made.facts() | {"track": str(recording), "picture": str(picture)} | files, as_json)
-    if frames is None and not made.complete:
+        wrong = [option for option, value in kept.items() if value is not None]
+        if wrong:
+            raise InputError(
+                f"{wrong[0]}: is for snakes; --animal {animal} has its own motion and skin"
+            )
+        facts, complete = _with_legs(prepared, frames, animal, files)
+    show(facts | {what: str(files[what]) if what in files else None for what in _ENDINGS}, as_json)
+    if frames is None and not complete:
         raise SystemExit(1)
 
 
+def _snake(
+    prepared: "WalkRun", frames: int | None, look: str, files: Mapping[str, Path]
+) -> tuple[dict[str, object], bool]:
+    """Synthesise a snake by states; facts of it, and whether it reached its last waypoint."""
+    from snakewalk.controller.app.recordings.body_look import ANIMAL  # noqa: PLC0415  heavy
+    from snakewalk.controller.app.recordings.snake_synthesis import SnakeSynthesis  # noqa: PLC0415
+    from snakewalk.controller.app.report.plots.snake_synthesis import draw_walk  # noqa: PLC0415
+
+    worn = None
+    if "skin" in files or "film" in files:
+        from snakewalk.controller.app.recordings.synthesis_skin import SynthesisSkin  # noqa: PLC0415
+
+        worn = SynthesisSkin.of(look, prepared.run.track, prepared.robot)
+    elif look != ANIMAL:
+        raise InputError(f"--look {look}: is for --film and --glb")
+    made = SnakeSynthesis(prepared).synthesise(frames)
+    with atomic_write(files["track"]) as part:
+        made.save(part, files["track"].stem, f"snakewalk synthesise of {prepared.run.track}")
+    draw_walk(
+        made, prepared.ground, files["picture"], f"{prepared.run.name}: {prepared.world.name}"
+    )
+    if worn is not None and "skin" in files:
+        worn.write(made, files["skin"])
+    if worn is not None and "film" in files:
+        worn.film(made, prepared, files["film"])
+    return made.facts(), made.complete
+
+
 def _with_legs(
-    name: str,
-    prepared: "WalkRun",
-    frames: int | None,
-    written: tuple[Path, Path],
-    more: list[Path],
-    kept: dict[str, str | None],
-    files: dict[str, str | None],
-    as_json: bool,
-) -> None:
-    """Synthesise an animal with legs."""
+    prepared: "WalkRun", frames: int | None, name: str, files: Mapping[str, Path]
+) -> tuple[dict[str, object], bool]:
+    """Synthesise an animal with legs; facts of it, and whether it reached its last waypoint."""
     from snakewalk.controller.app.recordings.animal_synthesis import (  # noqa: PLC0415  heavy
         read_animal,
         synthesise_animal,
     )
     from snakewalk.controller.app.report.plots.animal_synthesis import draw_animal  # noqa: PLC0415
 
-    wrong = [option for option, value in kept.items() if value is not None]
-    if wrong:
-        raise InputError(f"{wrong[0]}: is for snakes; --animal {name} has its own motion and skin")
-    recording, picture = written
     config = read_animal(name)
     body = None
-    if more:
+    if "skin" in files or "film" in files:
         from snakewalk.controller.app.recordings.animal_film import AnimalBody  # noqa: PLC0415
 
         body = AnimalBody.of(config)
     made = synthesise_animal(prepared, config, frames)
-    with atomic_write(recording) as part:
-        made.save(part, recording.stem)
-    draw_animal(made, picture, f"{config.name} on {prepared.world.name}")
-    if body is not None and files["skin"] is not None:
-        body.write(made, Path(files["skin"]))
-    if body is not None and files["film"] is not None:
-        body.film(made, prepared, Path(files["film"]))
-    show(made.facts() | {"track": str(recording), "picture": str(picture)} | files, as_json)
-    if frames is None and not made.complete:
-        raise SystemExit(1)
+    with atomic_write(files["track"]) as part:
+        made.save(part, files["track"].stem)
+    draw_animal(made, files["picture"], f"{config.name} on {prepared.world.name}")
+    if body is not None and "skin" in files:
+        body.write(made, files["skin"])
+    if body is not None and "film" in files:
+        body.film(made, prepared, files["film"])
+    return made.facts(), made.complete

@@ -92,14 +92,15 @@ def draw_skin(file: Path, skin: Skin, motion: BoneMotion | None, texture: Image 
     """
     check_picture(file)
     shown = [0] if motion is None else np.linspace(0, len(motion.time_s) - 1, 5).astype(int)[:4]
+    rig = None if motion is None else spine_rig(skin, motion.bone_m)
     with style():
         figure = Figure(figsize=(9.0, 5.6), layout="constrained", dpi=88)
         panels: Any = figure.subfigures(1 if motion is None else 2, len(shown) // 2 or 1)
         for frame, panel in zip(shown, np.ravel(panels), strict=True):
             corners = (
                 skin.mesh.vertices
-                if motion is None
-                else posed_m(spine_rig(skin, motion.bone_m), motion, int(frame))
+                if motion is None or rig is None
+                else posed_m(rig, motion, int(frame))
             )
             _solid(panel, replace(skin.mesh, vertices=corners), texture)
             if motion is not None:
