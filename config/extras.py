@@ -27,6 +27,8 @@ EXTRAS: Final = {
     "pyarrow": ("pyarrow", "export"),
 }
 """Module to (name of the package, extra of ``pyproject.toml`` that brings it)."""
+BASE: Final = frozenset({"numba", "scipy", "networkx", "typer", "rich", "mcap"})
+"""Modules of the base that a light install of the test fixture does without (docs/start/ci.md)."""
 
 
 def require_extra(purpose: str, *modules: str) -> None:
@@ -48,6 +50,9 @@ def require_extra(purpose: str, *modules: str) -> None:
 
 
 def missing_extra(error: ModuleNotFoundError) -> str | None:
-    """Return what to install after a failed import; None if no extra brings the module."""
-    name, extra = EXTRAS.get((error.name or "").partition(".")[0], ("", ""))
+    """Return what to install after a failed import; None if we do not bring the module."""
+    module = (error.name or "").partition(".")[0]
+    if module in BASE:
+        return f"this needs {module}, which a light install leaves out: pip install snakewalk"
+    name, extra = EXTRAS.get(module, ("", ""))
     return f"this needs {name}: pip install 'snakewalk[{extra}]'" if extra else None

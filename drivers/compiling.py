@@ -2,6 +2,9 @@
 
 Never at the first call: a bus that stops for a second to compile has missed fifty cycles. Later
 imports take the machine code from numba's cache.
+
+A package of the base install that may be absent all the same: a light install of the test fixture
+has no numba (docs/start/ci.md), and runs the loops as they are written.
 """
 
 from collections.abc import Callable
@@ -18,6 +21,9 @@ def readonly_array(number: str = "float64", dimensions: int = 1, layout: str = "
 def compiled(signature: Any, *, nogil: bool = False) -> Callable[[F], F]:
     """Compile a function for ``signature``; the function as written is its ``py_func``.
 
+    Without numba the function itself is given back: what drives servos names numba's types for its
+    signatures, and is not imported then.
+
     Args:
         signature: a numba type, or its name, for modules that do not import numba themselves.
         nogil: release Python's lock meanwhile; worth its cost for a loop that waits.
@@ -25,8 +31,12 @@ def compiled(signature: Any, *, nogil: bool = False) -> Callable[[F], F]:
     """
 
     def decorate(function: F) -> F:
-        from numba import njit  # noqa: PLC0415  slow to import
-
+        try:
+            from numba import njit  # noqa: PLC0415  slow to import
+        except ModuleNotFoundError as error:
+            if error.name != "numba":
+                raise
+            return function
         made: F = njit(signature, nogil=nogil, cache=True)(function)
         return made
 

@@ -8,7 +8,6 @@ device's own filter, where it has one, finds its attitude, so that heading drift
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.robot import ImuConfig
@@ -33,8 +32,10 @@ class Imu:
         baud: int = 1_000_000,
         seed: int = 0,
     ) -> None:
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415  only an IMU needs it
+
         self.config, self.baud = config, baud
-        self._motion = motion
+        self._motion, self._turn = motion, Rotation
         self._in_link = Rotation.from_euler("xyz", config.mounting_deg, degrees=True).as_matrix()
         self._random = np.random.default_rng(seed)
         self._bias_rad_s = np.deg2rad(config.gyro_bias_dps) * self._random.standard_normal(3)
@@ -71,7 +72,7 @@ class Imu:
         acceleration = np.zeros(3)
         if last is not None:
             before = last.rotation @ self._in_link
-            rate = Rotation.from_matrix(before.T @ rotation).as_rotvec() / step_s
+            rate = self._turn.from_matrix(before.T @ rotation).as_rotvec() / step_s
             velocity = (now.centre_m - last.centre_m) / step_s
             acceleration = (velocity - self._velocity_m_s) / step_s
         self._last, self._velocity_m_s = now, velocity

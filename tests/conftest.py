@@ -1,5 +1,6 @@
 """Fixtures shared by all tests."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,17 @@ from hypothesis import settings
 # no test asserts wall-clock times: hypothesis would, at 200 ms an example
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_stop_buttons(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Runs of tests cannot be stopped by, nor be listed for, anybody else on this machine.
+
+    The programs that a test starts inherit it.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("runtime")))
+        yield
 
 
 @pytest.fixture(scope="session")

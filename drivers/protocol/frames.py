@@ -5,11 +5,10 @@ exactly as expected is refused here and left to ``drivers.bus.group_read``.
 """
 
 import numpy as np
-from numba import boolean, int32, int64, types, uint8
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bytes
-from snakewalk.drivers.compiling import compiled
+from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.protocol.crc import TABLE
 
 IRREGULAR, FLAWLESS, WITH_ERRORS = 0, 1, 2
@@ -22,11 +21,11 @@ ENTRY_BYTES = 5
 """Entry of one servo: ID and value."""
 
 
-_RAW = types.Array(uint8, 1, "C", readonly=True)
-_ROW, _ROWS = uint8[::1], uint8[:, ::1]
+_RAW = readonly_array("uint8", layout="C")
+_ROW, _ROWS = "uint8[::1]", "uint8[:, ::1]"
 
 
-@compiled(int64(_RAW, int64, int64, int64))
+@compiled(f"int64({_RAW}, int64, int64, int64)")
 def crc_of(data: Bytes, start: int, stop: int, crc: int) -> int:
     """CRC of a part of ``data``, continued from ``crc``."""
     for k in range(start, stop):
@@ -34,7 +33,7 @@ def crc_of(data: Bytes, start: int, stop: int, crc: int) -> int:
     return crc
 
 
-@compiled(boolean(_RAW, int64, int64))
+@compiled(f"boolean({_RAW}, int64, int64)")
 def _header_in(data: Bytes, start: int, stop: int) -> bool:
     """Whether ``FF FF FD`` lies within ``start`` to ``stop``."""
     for k in range(start + 2, stop):
@@ -43,7 +42,7 @@ def _header_in(data: Bytes, start: int, stop: int) -> bool:
     return False
 
 
-@compiled(int64(_RAW, _ROWS, _ROWS, _ROW))
+@compiled(f"int64({_RAW}, {_ROWS}, {_ROWS}, {_ROW})")
 def read_plain(raw: Bytes, heads: Bytes, data: Bytes, error: Bytes) -> int:
     """Decode N status packets, none of them stuffed.
 
@@ -77,7 +76,7 @@ def read_plain(raw: Bytes, heads: Bytes, data: Bytes, error: Bytes) -> int:
     return found
 
 
-@compiled(int64(_RAW, _ROW, _ROW, _ROWS, _ROW))
+@compiled(f"int64({_RAW}, {_ROW}, {_ROW}, {_ROWS}, {_ROW})")
 def read_fast(raw: Bytes, head: Bytes, ids: Bytes, data: Bytes, error: Bytes) -> int:
     """Decode the reply to a fast read: ``head`` (8,), then the parts of ``ids`` (N,)."""
     count, length = data.shape
@@ -102,7 +101,7 @@ def read_fast(raw: Bytes, head: Bytes, ids: Bytes, data: Bytes, error: Bytes) ->
     return found
 
 
-@compiled(boolean(_ROW, int32[::1]))
+@compiled(f"boolean({_ROW}, int32[::1])")
 def fill(frame: Bytes, values: NDArray[np.int32]) -> bool:
     """Write ``values`` (N,) and the CRC into a sync write; False if it must be stuffed first."""
     for servo in range(len(values)):

@@ -15,7 +15,6 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
@@ -120,6 +119,8 @@ def decode(imu: ImuConfig, block: bytes) -> ImuSample:
 
 def _rotation(halves: bytes) -> Floats | None:
     """Axes of a quaternion whose vector stands in three half floats; None where there is none."""
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415  only an IMU needs it
+
     vector = np.frombuffer(halves, "<f2").astype(float)
     square = float(vector @ vector)
     if not any(halves) or not square <= QUATERNION_NORM_MAX:  # NaN is none, too
@@ -138,6 +139,8 @@ def encode(imu: ImuConfig, rate_rad_s: Floats, force_m_s2: Floats, rotation: Flo
         rotation: (3, 3) its axes in the world.
 
     """
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415  only an IMU needs it
+
     if imu.gyro_range_dps is None or imu.acceleration_range_g is None:
         vector = Rotation.from_matrix(rotation).as_quat(canonical=True)[:3].astype("<f2")
         vector[vector == 0.0] = -0.0  # not all bytes 0: those mean that there is none yet

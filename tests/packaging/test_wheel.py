@@ -4,6 +4,7 @@ The user's project has packages ``config``, ``drivers``, ``sim`` and ``controlle
 many projects do. They stay the user's, and the pytest plugin loads beside them.
 """
 
+import re
 import shutil
 import site
 import subprocess
@@ -12,9 +13,11 @@ import tarfile
 import venv
 import zipfile
 from dataclasses import dataclass
+from importlib.metadata import distribution
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("config", "drivers", "sim", "controller")
@@ -34,6 +37,49 @@ def test_the_bus_answers(servo_bus):
     packets = dynamixel_sdk.PacketHandler(2.0)
     model, result, error = packets.ping(bus.line, 2)
     assert (model, result, error) == (1200, 0, 0)
+"""
+
+LIGHT_TEST = """
+from pathlib import Path
+
+import dynamixel_sdk
+import pytest
+
+
+def test_a_device_in_real_time(servo_bus, monkeypatch):
+    real_ms = dynamixel_sdk.PortHandler.getCurrentTime  # the SDK waits 34 ms: a busy machine more
+    monkeypatch.setattr(dynamixel_sdk.PortHandler, "getCurrentTime", lambda p: real_ms(p) / 50)
+    bus = servo_bus("1-2:XL330-M288")
+    port = dynamixel_sdk.PortHandler(bus.path)
+    assert port.openPort()
+    assert dynamixel_sdk.PacketHandler(2.0).write1ByteTxRx(port, 1, 64, 1) == (0, 0)
+    assert bus["Torque Enable"].tolist() == [1, 0]
+    port.closePort()
+
+
+def test_motion_and_a_fault_in_simulated_time(servo_bus):
+    packets = dynamixel_sdk.PacketHandler(2.0)
+    Path("faults.toml").write_text('[[fault]]\\nkind = "mute"\\nids = [2]\\nat_s = 0.1\\n')
+    bus = servo_bus("1-2", faults="faults.toml")
+    assert packets.ping(bus.line, 2)[1] == 0
+    packets.write1ByteTxRx(bus.line, 1, 64, 1)
+    packets.write4ByteTxRx(bus.line, 1, 116, 2500)
+    group = dynamixel_sdk.GroupSyncRead(bus.line, packets, 132, 4)
+    group.addParam(1)
+    while abs(group.getData(1, 132, 4) - 2500) > 20:
+        assert group.txRxPacket() == 0
+    assert packets.ping(bus.line, 2)[1] == dynamixel_sdk.COMM_RX_TIMEOUT
+
+
+def test_protocol_1(servo_bus):
+    bus = servo_bus("3:AX-12A")
+    assert dynamixel_sdk.PacketHandler(1.0).ping(bus.line, 3) == (12, 0, 0)
+
+
+@pytest.mark.parametrize("module", ["numba", "scipy", "networkx", "typer", "rich", "mcap"])
+def test_what_is_left_out_is_not_there(module):
+    with pytest.raises(ModuleNotFoundError):
+        __import__(module)
 """
 
 
@@ -162,3 +208,65 @@ def test_a_users_suite_keeps_its_packages_and_has_the_fixture(installed: Install
     found = installed.run("python", "-c", "import snakewalk; print(snakewalk.__file__)")
     assert Path(found.strip()).is_relative_to(installed.packages)
     assert "2 passed" in installed.run("python", "-m", "pytest", "-q", "-p", "no:cacheprovider")
+
+
+def distributions_of(names: list[str]) -> set[str]:
+    """Those that pip installs for ``names``, as this environment has them."""
+    found: set[str] = set()
+    while names:
+        name = names.pop()
+        if name not in found:
+            found.add(name)
+            wanted = map(Requirement, distribution(name).requires or [])
+            names += [one.name for one in wanted if not one.marker or one.marker.evaluate()]
+    return found
+
+
+@pytest.fixture(scope="module")
+def light(installed: Installed, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of packages: this one, and what the page tells people to install beside it."""
+    page = (ROOT / "docs" / "start" / "ci.md").read_text(encoding="utf-8")
+    ((ours, theirs),) = re.findall(
+        r"^    pip install --no-deps (\S+) *#?.*\n    pip install (.+?) *(?:#.*)?$", page, re.M
+    )
+    assert ours == "snakewalk"
+    folder = tmp_path_factory.mktemp("light")
+    for place in installed.packages.glob("snakewalk*"):
+        (folder / place.name).symlink_to(place)
+    for name in distributions_of(theirs.split()):
+        known = distribution(name)
+        for top in {file.parts[0] for file in known.files or [] if ".." not in file.parts}:
+            if top != "__pycache__":
+                (folder / top).symlink_to(Path(str(known.locate_file(top))))
+    return folder
+
+
+def test_the_fixture_needs_no_more_than_the_page_says(light: Path, tmp_path: Path) -> None:
+    (tmp_path / "test_light.py").write_text(LIGHT_TEST)
+    done = subprocess.run(
+        # without the environment's own packages
+        [sys.executable, "-S", "-m", "pytest", "-q", "-p", "no:cacheprovider"],
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(light), "PATH": ""},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert "9 passed" in done.stdout, done.stdout + done.stderr
+
+
+def test_what_needs_more_says_what_to_install(light: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", "from snakewalk.controller.app.cli.main import main; main()"],
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(light), "PATH": ""},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr == (
+        "snakewalk: this needs typer, which a light install leaves out: pip install snakewalk\n"
+    )

@@ -124,7 +124,8 @@ def test_a_pressed_button_latches_within_two_cycles_and_nothing_is_sent_after(
                 sent.append("goals" if address == 116 else "torque off")
 
     servos.line.taps.append(tap)
-    (button,) = (each for each in stoppable_runs() if each.run.process == servos.child.pid)
+    (button,) = stoppable_runs()  # nobody else's
+    assert button.run.process == servos.child.pid
     with button:
         assert button.run.ports == (servos.server.path,)
         servos.serve_until(lambda: len(sent) >= 5)
@@ -138,4 +139,4 @@ def test_a_pressed_button_latches_within_two_cycles_and_nothing_is_sent_after(
     assert "goals" not in sent[sent.index("torque off") :]
     assert servos.torque() == [0] * 3
     assert servos.child.returncode == 1
-    assert all(each.run.process != servos.child.pid for each in stoppable_runs())
+    assert list(stoppable_runs()) == []
