@@ -1,9 +1,11 @@
 """A live operator as a motion source: keys change a gait's parameters, the gait itself, its rate.
 
-Keys come as names from a keyboard, a gamepad or a test; what they do goes through the same joins as
-any other change of motion, so nothing that an operator presses can make a step.
+Keys come as names from a keyboard, a gamepad, the page or a test, values as ``PARAMETER=VALUE``;
+what they do goes through the same joins as any other change of motion, so nothing that an operator
+does can make a step.
 """
 
+import math
 from collections.abc import Callable, Iterable
 
 from snakewalk.config.arrays import Floats
@@ -47,8 +49,8 @@ class Operator:
         Args:
             motion: the gait to begin with.
             robot: for the gaits to change to.
-            keys: names of ``KEYS`` pressed since the last call; others, and ``t``, which is for
-                whoever owns the torque, are ignored.
+            keys: names of ``KEYS`` pressed since the last call, ``PARAMETER=VALUE`` and
+                ``gait=NAME``; others, and ``t``, which is for whoever owns the torque, are ignored.
             on_event: takes ("operator", text) of what was done or refused.
             held: whether the dead man's button is held; while it is not, the body stands in its
                 shape, whatever else was pressed.
@@ -104,7 +106,10 @@ class Operator:
         return self.motion.step(0.5 * (before + self._rate) * dt_s, view)
 
     def _press(self, key: str) -> None:
-        if key in {"up", "down"}:
+        name, equals, value = key.partition("=")
+        if equals:
+            self._assign(name, value)
+        elif key in {"up", "down"}:
             self._chosen = (self._chosen + (1 if key == "down" else -1)) % len(self._ranges())
             self._report(f"{self.selected} = {getattr(self.motion.gait.params, self.selected)}")
         elif key in {"left", "right"}:
@@ -122,9 +127,27 @@ class Operator:
             self.motion.stop()
             self._report("stop")
 
+    def _assign(self, name: str, text: str) -> None:
+        """Carry out ``NAME=TEXT``."""
+        if name == "gait":
+            self._become(text)
+            return
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if name in self._ranges() and math.isfinite(value):
+            self._set(name, value)
+        else:
+            self._report(f"refused: {name}={text}: no number for a parameter of this gait")
+
     def _nudge(self, name: str, sign: float) -> None:
+        step = sign * self._ranges()[name].step
+        self._set(name, getattr(self.motion.gait.params, name) + step)
+
+    def _set(self, name: str, value: float) -> None:
+        """Change a parameter, to the end of its range at most."""
         span = self._ranges()[name]
-        value = getattr(self.motion.gait.params, name) + sign * span.step
         value = min(max(value, span.low), span.high)
         self._change(**{name: span.kind(round(value, 6))})
 

@@ -41,7 +41,7 @@ class Dashboard:
         self._state = gui.add_html("")
         self.follow = gui.add_checkbox("follow the body", not header.run.waypoints_m)
         self.goals = gui.add_checkbox("show goals", True, hint="yellow, where joints should be")
-        tabs = gui.add_tab_group()
+        self.tabs = tabs = gui.add_tab_group()
         with tabs.add_tab("servos"):
             self._bars = gui.add_html("")
         with tabs.add_tab("curves"):

@@ -13,6 +13,7 @@ from typing import Any, Final
 import viser
 
 from snakewalk.controller.app.view.dashboard import SPAN_S, Dashboard
+from snakewalk.controller.app.view.gait_panel import GaitPanel
 from snakewalk.controller.app.view.page_server import StopPanel, open_page
 from snakewalk.controller.app.view.row_line import PageEnd
 from snakewalk.controller.app.view.scene import BodyScene
@@ -61,6 +62,8 @@ class _LivePage:
         self._header: Header | None = None
         self._scene: BodyScene | None = None
         self._dashboard: Dashboard | None = None
+        self._gait_panel: GaitPanel | None = None
+        self._gait: dict[str, Any] | None = None
         self._over = False
         self._asked_s = self._told_s = self._servos_s = self._curves_s = -1.0
 
@@ -71,6 +74,9 @@ class _LivePage:
             self._clock.sleep_until_s(self._asked_s + _PERIOD_S)
             self._asked_s = self._clock.now_s()
             self._end.ask()
+            if self._gait_panel is not None:
+                for command in self._gait_panel.commands(self._asked_s):
+                    self._end.command(command)
         for topic, row in self._end.rows(_PERIOD_S):
             self._take(topic, row)
             if topic == "/pose":
@@ -95,6 +101,11 @@ class _LivePage:
                 self._scene = BodyScene(self._server, self._header)
                 self._scene.first_camera(self._server)
                 self._dashboard = Dashboard(self._server, self._header)
+            self._show_gait()
+            return
+        if topic == "/gait":
+            self._gait = row
+            self._show_gait()
             return
         self._rows[topic].append(row)
         if topic == "/event":
@@ -103,6 +114,14 @@ class _LivePage:
                 self._stop.ended(row["text"])
             if self._dashboard is not None:
                 self._dashboard.show_events(self._record(events=True).events)
+
+    def _show_gait(self) -> None:
+        """Show what an operator runs, once the page knows the robot; a run without one has none."""
+        if self._gait is None or self._header is None or self._dashboard is None:
+            return
+        if self._gait_panel is None:
+            self._gait_panel = GaitPanel(self._server, self._dashboard.tabs, self._header.robot)
+        self._gait_panel.show(self._gait["name"], self._gait["parameters"])
 
     def _draw(self) -> None:
         scene, dashboard, now_s = self._scene, self._dashboard, self._told_s

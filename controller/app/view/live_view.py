@@ -66,6 +66,18 @@ class LiveView:
         if self._process.is_alive():
             self._process.kill()
 
+    held = True
+    """The page has no dead man's button."""
+
+    def pressed(self) -> list[str]:
+        """What was set in the page since the last call, as an ``Operator`` takes it."""
+        return self._end.commands()
+
+    def on_gait(self, name: str, parameters: dict[str, float]) -> None:
+        """Take the gait that an operator runs: the page then has its sliders."""
+        row = {"name": name, "parameters": parameters}
+        self._end.add("/gait", json.dumps(row).encode())
+
     def on_row(self, topic: str, row: bytes) -> None:
         """Take a row of the log; returns at once."""
         self._end.add(topic, row)

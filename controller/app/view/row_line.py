@@ -1,8 +1,9 @@
-"""The line between a run and its page: rows of the log one way, requests of them the other.
+"""The line between a run and its page: rows of the log one way, requests the other.
 
 The run never waits: what does not fit the socket stays here, of each kind of measurement only the
 newest row, and it is sent when the page asks for it. A page that is slow, stopped or dead is simply
-not sent anything.
+not sent anything. A request is a line of text: an empty one asks for the newest rows, any other is
+a command of whoever holds the page, such as ``frequency_hz=0.4``.
 """
 
 import json
@@ -12,13 +13,15 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any, Final
 
-KEPT: Final = frozenset({"/config", "/path", "/event", "/button"})
+KEPT: Final = frozenset({"/config", "/path", "/event", "/button", "/gait"})
 """Topics of which every row is sent, in order; of others the newest."""
 SENT: Final = KEPT | {"/cycle", "/shadow", "/pose", "/slow"}
 _KEPT_MAX: Final = 1000
+_COMMANDS_MAX: Final = 100
+"""Commands that wait for the run; of more the oldest are dropped."""
+_LINE_BYTES: Final = 4096
 _HEAD: Final = 4
-READY: Final = b"\n"
-"""The page's request of the newest rows."""
+_END: Final = b"\n"
 
 
 class RunEnd:
@@ -31,6 +34,8 @@ class RunEnd:
         self._newest: dict[str, bytes] = {}
         self._out = memoryview(b"")
         self._ready = False
+        self._in = b""
+        self._commands: deque[str] = deque(maxlen=_COMMANDS_MAX)
 
     def add(self, topic: str, row: bytes) -> None:
         """Take a row; a cycle is complete with its pose."""
@@ -55,6 +60,14 @@ class RunEnd:
             self._kept.clear()
             self._newest.clear()
             self._out = memoryview(b"")
+
+    def commands(self) -> list[str]:
+        """Commands that have come since the last call; never waits."""
+        with suppress(OSError):
+            self._receive()
+        taken = list(self._commands)
+        self._commands.clear()
+        return taken
 
     def close(self, patience_s: float) -> None:
         """Send the last rows, waiting for a slow page no longer than ``patience_s``; then close."""
@@ -82,7 +95,13 @@ class RunEnd:
 
     def _receive(self) -> None:
         with suppress(BlockingIOError):
-            self._ready |= READY in self._line.recv(4096)
+            *lines, self._in = (self._in + self._line.recv(_LINE_BYTES)).split(_END)
+            self._in = self._in[-_LINE_BYTES:]
+            for line in lines:
+                if line:
+                    self._commands.append(line.decode(errors="replace"))
+                else:
+                    self._ready = True
 
 
 class PageEnd:
@@ -94,7 +113,11 @@ class PageEnd:
 
     def ask(self) -> None:
         """Ask for the newest rows."""
-        self._line.sendall(READY)
+        self._line.sendall(_END)
+
+    def command(self, text: str) -> None:
+        """Send a command, of one line."""
+        self._line.sendall(text.replace("\n", " ").encode() + _END)
 
     def rows(self, wait_s: float) -> Iterator[tuple[str, dict[str, Any]]]:
         """Topics and rows that have come, waiting at most ``wait_s`` for the first.

@@ -45,6 +45,21 @@ class Hands:
             self.seen.append(self.operator.step(0.02, VIEW))
 
 
+def test_a_value_is_put_within_its_range_and_what_is_none_is_refused() -> None:
+    hands = Hands()
+    hands.press("winding_rad=0.5", "waves=99", "mirror=1")
+    params = hands.operator.motion.gait.params
+    assert (params.winding_rad, params.waves, params.mirror) == (0.5, 3.0, True)
+    for wrong in ("winding_rad=nan", "winding_rad=", "nothing=1", "gait=nothing", "=", "="):
+        hands.press(wrong, seconds=0.02)
+        assert hands.said[-1].startswith("refused"), wrong
+    assert hands.operator.motion.gait.params == params
+    hands.press("gait=rolling", seconds=2.0)
+    assert hands.operator.motion.gait.name == "rolling"
+    speeds = np.abs(np.diff(hands.seen, axis=0)).max() / 0.02
+    assert speeds <= hands.robot.joint_speed_limit_rad_s + 1e-6
+
+
 def test_arrows_choose_a_parameter_and_change_it_within_its_range() -> None:
     hands = Hands()
     assert hands.operator.selected == "frequency_hz"

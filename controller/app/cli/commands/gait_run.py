@@ -1,6 +1,7 @@
 """``snakewalk gait run``: a gait on servos or in the simulator."""
 
 import math
+import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from snakewalk.controller.app.cli.gamepad import Gamepad
     from snakewalk.controller.app.cli.keyboard import Keyboard
     from snakewalk.controller.app.runs.gait_run import GaitRun
+    from snakewalk.controller.app.view.live_view import LiveView
     from snakewalk.controller.motion.gait_motion import GaitMotion
     from snakewalk.controller.motion.operator import Operator
     from snakewalk.controller.runtime.drive import OnEvent
@@ -66,7 +68,10 @@ def run_gait(
     look_at: Annotated[
         str | None, typer.Option(help="X,Y in metres: point that the head looks at")
     ] = None,
-    live: Annotated[bool, typer.Option("--live", help="change it by keys while it runs")] = False,
+    live: Annotated[
+        bool,
+        typer.Option("--live", help="change it as it runs: by keys, with --view in the page"),
+    ] = False,
     gamepad: Annotated[
         Path | None, typer.Option(help="the same from a gamepad, e.g. /dev/input/js0")
     ] = None,
@@ -92,7 +97,7 @@ def run_gait(
         raise InputError(f"--by {by}: expected blend or cpg")
     with ExitStack() as stack:
         page = stack.enter_context(open_view(view, view_at))
-        hands = _hands(stack, live, gamepad)
+        hands = _hands(stack, live, gamepad, page)
         prepared = prepare_gait(
             name,
             robot=robot,
@@ -162,10 +167,13 @@ def run_gait(
 
 
 class _Hands:
-    """An operator's keyboard and gamepad."""
+    """What an operator has in hand: keyboard, gamepad, page."""
 
-    def __init__(self, devices: "list[Keyboard | Gamepad]") -> None:
+    def __init__(
+        self, devices: "list[Keyboard | Gamepad | LiveView]", page: "LiveView | None"
+    ) -> None:
         self._devices = devices
+        self._page = page
         self._waiting: list[str] = []
         self._off = False
         self._motion: GaitMotion | None = None
@@ -188,8 +196,17 @@ class _Hands:
         """Put the keys that were pressed in charge of a motion."""
         from snakewalk.controller.motion.operator import Operator  # noqa: PLC0415
 
+        def on_change(kind: str, text: str) -> None:
+            on_event(kind, text)
+            tell_page()
+
+        def tell_page() -> None:
+            if self._page is not None:
+                self._page.on_gait(motion.gait.name, motion.gait.params.model_dump())
+
         self._motion = motion
-        return Operator(motion, robot, self._take, on_event, self._held)
+        tell_page()
+        return Operator(motion, robot, self._take, on_change, self._held)
 
     def _take(self) -> list[str]:
         taken, self._waiting = self._waiting, []
@@ -200,8 +217,10 @@ class _Hands:
         return all(device.held for device in self._devices)
 
 
-def _hands(stack: ExitStack, live: bool, gamepad: Path | None) -> _Hands | None:
-    """Open the keyboard or gamepad of an operator, and say what they do; None without one."""
+def _hands(
+    stack: ExitStack, live: bool, gamepad: Path | None, page: "LiveView | None"
+) -> _Hands | None:
+    """Open what an operator has in hand, and say what it does; None without an operator."""
     if not live and gamepad is None:
         return None
     from rich.columns import Columns  # noqa: PLC0415
@@ -211,16 +230,18 @@ def _hands(stack: ExitStack, live: bool, gamepad: Path | None) -> _Hands | None:
     from snakewalk.controller.app.cli.keyboard import Keyboard  # noqa: PLC0415
     from snakewalk.controller.motion.operator import KEYS  # noqa: PLC0415
 
-    devices: list[Keyboard | Gamepad] = []
+    devices: list[Keyboard | Gamepad | LiveView] = []
     keys: list[str] = []
-    if live:
+    if page is not None:
+        devices.append(page)
+    if live and (page is None or sys.stdin.isatty()):
         devices.append(stack.enter_context(Keyboard()))
         keys += [f"{key}: {what}" for key, what in KEYS.items()]
     if gamepad is not None:
         devices.append(stack.enter_context(Gamepad(gamepad)))
         keys += ["hold LB or RB: it moves", "right stick pressed: torque off"]
     Console(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
-    return _Hands(devices)
+    return _Hands(devices, page)
 
 
 def _names(prepared: "GaitRun", hands: _Hands | None) -> Callable[[float], str]:

@@ -8,18 +8,23 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 pytest.importorskip("viser")
 
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.app.cli.commands.gait_run import _Hands
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait
+from snakewalk.controller.app.view.gait_panel import GaitPanel
 from snakewalk.controller.app.view.live_page import _LivePage
 from snakewalk.controller.app.view.live_view import LiveView
 from snakewalk.controller.app.view.page_server import open_page
 from snakewalk.controller.app.view.row_line import PageEnd, RunEnd
+from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.sim.serve.servo_bus import ServoBus
@@ -40,10 +45,12 @@ def run(
     (tmp_path / "quartet.toml").write_text(ROBOT)
     words = ["gait", "run", "lateral-undulation", "--robot", "quartet.toml", "--seconds", "100"]
     words += [word for key in PATIENT for word in ("--set", f"run.safety.{key}")]
-    words += ["--port", bus.path, "--view", "--view-at", "127.0.0.1:0", "--no-film", "--out", "run"]
+    words += ["--port", bus.path, "--live", "--no-film", "--out", "run"]
+    words += ["--view", "--view-at", "127.0.0.1:0"]
     with subprocess.Popen(
         [sys.executable, "-c", COMMAND, *words],
         cwd=tmp_path,
+        stdin=subprocess.DEVNULL,
         env=os.environ
         | {"XDG_RUNTIME_DIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)},
         stdout=subprocess.DEVNULL,
@@ -67,6 +74,11 @@ class View:
     def on_button(self, path: Path) -> None:
         LiveView.on_button(self, path)  # type: ignore[arg-type]
 
+    def on_gait(self, name: str, parameters: dict[str, float]) -> None:
+        LiveView.on_gait(self, name, parameters)  # type: ignore[arg-type]
+
+    held = True
+    pressed = property(lambda self: self.end.commands)
     _end = property(lambda self: self.end)
 
     def shown(self, what: str) -> str:
@@ -106,6 +118,64 @@ def test_a_page_shows_a_run_and_its_e_stop_latches_it(
     assert "trip: stop requested" in view.shown("_events")
 
 
+def test_what_is_set_in_the_page_changes_the_gait(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    view = View()
+    hands = _Hands([view], view)  # type: ignore[list-item, arg-type]
+
+    def on_progress(progress: Progress) -> None:
+        view.page.step()
+        panel = view.page._gait_panel
+        assert panel is not None
+        if progress.time_s > 0.2 and panel._inputs["frequency_hz"].value == 0.5:
+            moved_by_a_browser(panel, "frequency_hz", 0.3)
+            panel._inputs["frequency_hz"].value = 0.3
+
+    finished = execute(
+        prepare_gait("lateral-undulation", seconds=1.0, make_operator=hands.operator),
+        tmp_path / "run",
+        view=view,
+        stop_requested=hands.torque_off,
+        on_progress=on_progress,
+    )
+    view.page._server.stop()
+    said = [event.text for event in finished.record.events if event.kind == "operator"]
+    assert said == ["frequency_hz = 0.3"]
+
+
+def moved_by_a_browser(panel: GaitPanel, name: str, value: object) -> None:
+    target = SimpleNamespace(value=value)
+    panel._command_of(name)(SimpleNamespace(client_id=1, target=target))
+
+
+def test_a_slider_orders_its_newest_value_and_shows_what_the_run_made_of_it() -> None:
+    server, _ = open_page("127.0.0.1", 0)
+    panel = GaitPanel(server, server.gui.add_tab_group(), load_robot("alternating16"))
+    defaults = make_gait("sidewinding").params.model_dump()
+    panel.show("sidewinding", defaults)
+    assert "rolling" in panel._gait.options
+    assert set(panel._inputs) == set(defaults)
+    assert panel.commands(1.0) == []  # what `show` sets is no command
+    for value in (0.6, 0.61, 0.62):
+        moved_by_a_browser(panel, "frequency_hz", value)
+    panel._inputs["frequency_hz"].value = 0.62
+    assert panel.commands(1.0) == ["frequency_hz=0.62"]
+    moved_by_a_browser(panel, "mirror", True)
+    assert panel.commands(1.1) == []  # too soon after the last
+    panel.show("sidewinding", defaults | {"frequency_hz": 0.61})
+    assert panel._inputs["frequency_hz"].value == 0.62  # it is being moved
+    assert panel.commands(1.25) == ["mirror=1"]
+    panel.commands(2.3)
+    assert panel._inputs["frequency_hz"].value == 0.61  # as the run has it
+    panel.show("rolling", make_gait("rolling").params.model_dump())
+    assert panel._gait.value == "rolling"
+    assert "waves" not in panel._inputs
+    server.stop()
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page with")
 def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
@@ -130,6 +200,11 @@ def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
         page.get_by_text("lateral-undulation").wait_for()
         page.get_by_text("joint 4 (ID 4)").wait_for()
         assert bus["Torque Enable"].tolist() == [1] * 4
+        page.get_by_role("tab", name="gait").click()
+        page.get_by_role("slider").first.focus()
+        page.keyboard.press("ArrowRight")
+        page.get_by_role("tab", name="events").click()
+        page.get_by_text(re.compile(r"operator: frequency_hz = 0\.\d")).wait_for()
         page.keyboard.press("Escape")
         page.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
         assert button.is_disabled()

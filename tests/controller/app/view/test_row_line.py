@@ -45,6 +45,26 @@ def test_a_page_gets_every_event_in_order_and_of_cycles_the_newest_when_it_asks(
     assert list(page.rows(0.0)) == []
 
 
+def test_orders_reach_the_run_whole_whatever_pieces_they_come_in() -> None:
+    run, page, far = ends()
+    page.command("frequency_hz=0.4")
+    page.command("two\nlines")
+    far.sendall(b"gait=side")
+    assert run.commands() == ["frequency_hz=0.4", "two lines"]
+    far.sendall(b"winding\n\xff\n")
+    assert run.commands() == ["gait=sidewinding", "\ufffd"]
+    assert run.commands() == []
+    for k in range(300):
+        page.command(str(k))
+        run.pump()
+    assert run.commands() == [str(k) for k in range(200, 300)]  # the newest hundred
+    far.sendall(b"x" * 100_000)
+    assert run.commands() == []
+    far.close()
+    run.commands()
+    assert len(run._in) <= 4096
+
+
 def test_what_does_not_fit_the_socket_goes_on_where_it_stopped() -> None:
     run, page, _ = ends()
     long = json.dumps({"z_m": "7" * 2_000_000}).encode()
