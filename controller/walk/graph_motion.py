@@ -91,6 +91,12 @@ def graph_motion(
     m, at_m = leading(len(body)), 0.0
     angles, points, speed = [], [], []
     for t in range(frames):
+        if t > 0:
+            now, wanted = next(shapes)
+            body = handed_down(wanted, body, m)
+            if now != state:
+                state = now
+                on_state(t, state)
         swing = body - body.mean()
         heading = path.heading_rad(min(at_m, path.length_m))
         angles.append(swing + heading)
@@ -101,10 +107,5 @@ def graph_motion(
         at_m += advance_m
         if until(t, points[-1]):
             break
-        now, wanted = next(shapes)
-        if now != state:
-            state = now
-            on_state(t + 1, state)
-        body = handed_down(wanted, body, m)
     place = np.arange(len(angles))[:, None] + np.arange(len(body))[::-1].astype(float)
     return Locomotion(np.array(angles), np.array(points), np.array(speed), place)

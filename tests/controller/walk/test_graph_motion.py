@@ -100,3 +100,11 @@ def test_behind_the_leading_half_the_pattern_runs_down_a_point_a_frame(states: C
     angles, _ = lay(states, SplinePath(np.array([[0.0, 0.0], [50.0, 0.0]])), 300)
     bends = np.diff(angles, axis=1)
     np.testing.assert_allclose(bends[101:, 51:], bends[100:-1, 50:-1], atol=1e-12)
+
+
+def test_no_state_is_left_in_a_frame_that_is_not_made(states: Complexes) -> None:
+    """At ten frames from state to state the 31st frame would begin the fourth."""
+    path, told = SplinePath(np.array([[0.0, 0.0], [50.0, 0.0]])), []
+    shapes = graph_angles(states, 10, N, np.random.default_rng(0))
+    graph_motion(shapes, path, 30, 0.01, 0.04, lambda *_: False, lambda t, _: told.append(t))
+    assert told == [0, 10, 20]
