@@ -8,6 +8,7 @@ pickle in the group's attribute ``non_index_axes``.
 
 import io
 import pickle
+import re
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from snakewalk.controller.capture.track import frame_numbers
 PCUTOFF = 0.6
 """DeepLabCut's own default: below this likelihood it does not draw a point."""
 _LEVELS = {"scorer", "individuals", "bodyparts", "coords"}
+_NUMBER = re.compile(r"(\d+)(?:\.[A-Za-z]+)?$")  # 12, or labeled-data/film/img0012.png
 _OF_NONE = "single"  # body parts that belong to no animal
 Column = tuple[str, str, str]
 """Individual, body part, coordinate."""
@@ -62,10 +64,26 @@ def load_rows(
                     f"{file}: line {line + depth + 1}: {columns[k][1]} {columns[k][2]}: expected a "
                     f"number or nothing, found {text!r}"
                 ) from None
-    numbers = [row[0] for row in rows[depth:]]
-    digits = all(n.isdecimal() for n in numbers)
-    frame = frame_numbers(str(file), np.array(numbers, dtype=float)) if digits else None
+    frame = _frames(file, [row[first - 1] for row in rows[depth:]])
     return _track(file, columns, values, frame, rate_hz, least_score, choice)
+
+
+def _frames(file: Path, names: list[str]) -> Ints | None:
+    """(T,) frame numbers: of predictions the index, of hand labels that in the image's name.
+
+    Raises:
+        InputError: not rising, as where images of several films are in one table.
+
+    """
+    found = [_NUMBER.search(name) for name in names]
+    numbers = [float(one[1]) for one in found if one]
+    if len(numbers) < len(names):
+        return None
+    if not np.all(np.diff(numbers) > 0.0):
+        raise InputError(
+            f"{file}: the numbers of its images do not rise; expected the labels of one film"
+        )
+    return frame_numbers(str(file), np.array(numbers))
 
 
 def load_group(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.sparse.csgraph import minimum_spanning_tree
 
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
@@ -21,6 +22,7 @@ PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 """Planes onto which markers in space are projected: the axis to the right, and the one upwards."""
 _MISSING = 0.25  # of the keypoints, at least one: so many may be missing in a frame
 _FEWEST = 4  # points that a curve goes through
+_ZIGZAG = 1.5  # from which the order is none of a body
 _TURN_ON = 0.5  # of the last turn (of 0, 0.5 and 1 the best on a recorded fish)
 
 
@@ -170,10 +172,16 @@ class Keypoints:
         """Make a track of those along the midline; an unknown rate is assumed, and marked as such.
 
         Raises:
-            InputError: as of ``sure``, or no such keypoint.
+            InputError: as of ``sure``, no such keypoint, or an order that is none of a body.
 
         """
-        bridged, which = bridge(self.sure(choice.order(self.file, self.nodes)))
+        places = self.sure(choice.order(self.file, self.nodes))
+        if choice.keypoints is None and zigzag(places) > _ZIGZAG:
+            raise InputError(
+                f"{self.file}: its keypoints do not lie one after the other along a body: "
+                f"{', '.join(self.nodes)}; say --keypoints with those of the midline, head first"
+            )
+        bridged, which = bridge(places)
         status = [FrameStatus.BRIDGED if one else FrameStatus.GOOD for one in which]
         return track_from_points(
             self.file.stem,
@@ -184,6 +192,17 @@ class Keypoints:
             rate_assumed=self.rate_hz is None,
             status=status,
         )
+
+
+def zigzag(places: Floats) -> float:
+    """Way from point to point of (T, K, 2) over the least that joins them; 1 along a body."""
+    apart = np.hypot(*(places[:, :, None] - places[:, None]).transpose(3, 0, 1, 2))
+    seen = np.isfinite(apart).any(axis=0)
+    if not seen.all():
+        return 1.0
+    usual = np.nanmedian(apart, axis=0)
+    least = float(minimum_spanning_tree(usual).sum())
+    return float(usual.diagonal(1).sum()) / least if least > 0.0 else 1.0
 
 
 def bridge(places: Floats) -> tuple[Floats, Bools]:

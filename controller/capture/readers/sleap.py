@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.keypoints import Choice, Keypoints
 from snakewalk.controller.capture.track import MOST_FRAMES, frame_numbers
@@ -54,9 +54,7 @@ def load_table(
     names = list(dict.fromkeys(name or _NO_TRACK for name in whose))
     mine = np.array([name or _NO_TRACK for name in whose]) == choice.animal(file, names, names)
     frame, xy, scores = frame[mine], xy[mine], None if scores is None else scores[mine]
-    if len(np.unique(frame)) < len(frame):
-        raise InputError(f"{file}: more than one animal of one name in a frame; export one track")
-    order = np.argsort(frame, kind="stable")
+    order = _one_a_frame(file, frame, scores)
     return Keypoints(
         file,
         nodes,
@@ -68,6 +66,18 @@ def load_table(
     )
 
 
+def _one_a_frame(file: Path, frame: Floats, scores: Floats | None) -> Ints:
+    """Indices of rows, by frame: what was set by hand, without scores, replaces the prediction."""
+    by_hand = np.zeros(len(frame), bool)
+    if scores is not None:
+        by_hand[:] = np.isnan(scores).all(axis=1)
+    order = np.lexsort((~by_hand, frame))
+    again = np.asarray(np.diff(frame[order], prepend=np.nan) == 0.0)
+    if np.any(again & (by_hand[order] == by_hand[np.roll(order, 1)])):
+        raise InputError(f"{file}: more than one animal of one name in a frame; export one track")
+    return np.asarray(order[~again])
+
+
 def load_analysis(
     file: Path,
     held: Any,
@@ -76,7 +86,7 @@ def load_analysis(
     choice: Choice,
 ) -> Keypoints:
     """Load the open analysis HDF5 ``held``; see ``load.load_file``."""
-    tracks = np.asarray(held["tracks"][:], dtype=float)
+    tracks = _in_order(held["tracks"], ("track", "xy", "node", "frame"))
     nodes = _names(held, "node_names")
     if tracks.ndim != 4 or tracks.shape[1] != 2 or len(nodes) not in (0, tracks.shape[2]):
         raise InputError(
@@ -90,7 +100,7 @@ def load_analysis(
     one = names.index(choice.animal(file, names, seen))
     scores = None
     if "point_scores" in held:
-        stored = np.asarray(held["point_scores"][:], dtype=float)
+        stored = _in_order(held["point_scores"], ("track", "node", "frame"))
         if stored.shape != (tracks.shape[0], *tracks.shape[2:]):
             raise InputError(
                 f"{file}: point_scores: expected (tracks, nodes, frames), not {stored.shape}"
@@ -101,9 +111,33 @@ def load_analysis(
         nodes or [f"node_{k}" for k in range(tracks.shape[2])],
         tracks[one].transpose(2, 1, 0) * _DOWNWARDS,
         scores,
-        rate_hz=rate_hz,
+        rate_hz=_stated_rate(held) if rate_hz is None else rate_hz,
         least_score=0.0 if least_score is None else least_score,
     )
+
+
+def _in_order(stored: Any, axes: tuple[str, ...]) -> Floats:
+    """Array with its axes as SLEAP writes them; sleap-io names others in the attribute dims."""
+    values = np.asarray(stored[:], dtype=float)
+    named = _stated(stored, "dims")
+    if not isinstance(named, list) or {*map(str, named)} != {*axes} or values.ndim != len(named):
+        return values
+    return np.asarray(values.transpose([named.index(axis) for axis in axes]))
+
+
+def _stated_rate(held: Any) -> float | None:
+    """Frames a second that sleap-io states of the video; SLEAP itself states none."""
+    about = _stated(held, "video_backend_metadata")
+    rate = about.get("fps") if isinstance(about, dict) else None
+    return float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
+
+
+def _stated(held: Any, name: str) -> Any:
+    """What an attribute says as JSON; None where it is not there or no JSON."""
+    try:
+        return json.loads(_text(held.attrs[name]))
+    except (KeyError, ValueError):
+        return None
 
 
 def load_project(

@@ -11,6 +11,7 @@ import pytest
 from scipy.io import savemat
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.readers.keypoints import ALL, Choice, Keypoints
 from snakewalk.controller.capture.readers.load import load_file
 from snakewalk.controller.capture.readers.wcon import si_value
 from tests.helpers.travelling import FRAMES, RATE_HZ, ends, wave_angles
@@ -123,6 +124,50 @@ def test_sleap_analysis(tmp_path: Path) -> None:
         file["tracks"] = np.zeros((60, 11, 2, 1))
     with pytest.raises(InputError, match=r"expected \(tracks, 2, nodes, frames\)"):
         load_file(tmp_path / "one.h5")
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 0, 2, 1)])
+def test_axes_and_rate_that_sleap_io_names(order: tuple[int, ...], tmp_path: Path) -> None:
+    names, tracks = ("track", "xy", "node", "frame"), PIXELS.T[None]
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["tracks"], file["track_occupancy"] = tracks.transpose(order), np.ones((FRAMES, 1))
+        file["tracks"].attrs["dims"] = json.dumps([names[k] for k in order])
+        file["node_names"], file["track_names"] = [n.encode() for n in NODES], [b"eel"]
+        file.attrs["video_backend_metadata"] = json.dumps({"fps": RATE_HZ})
+    assert not same(load_file(tmp_path / "a.h5")).rate_assumed
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        file["tracks"].attrs["dims"] = file.attrs["video_backend_metadata"] = "{"
+    if order == (0, 1, 2, 3):
+        assert load_file(tmp_path / "a.h5").rate_assumed
+    else:
+        with pytest.raises(InputError, match=r"expected \(tracks, 2, nodes, frames\)"):
+            load_file(tmp_path / "a.h5")
+
+
+def test_images_of_hand_labels_say_which_frames_they_are(tmp_path: Path) -> None:
+    dlc_csv(tmp_path / "a.csv")
+    head, rows = (lines := (tmp_path / "a.csv").read_text().splitlines())[:3], lines[3:]
+    label = "labeled-data/eel/img{:03}.png"
+
+    def write(numbers) -> Path:
+        cells = [row.partition(",")[2] for row in rows]
+        labels = [label.format(n) + "," + c for n, c in zip(numbers, cells, strict=True)]
+        (tmp_path / "b.csv").write_text("\n".join([*head, *labels]) + "\n")
+        return tmp_path / "b.csv"
+
+    track = load_file(write(range(5, 5 + 2 * FRAMES, 2)), RATE_HZ)
+    np.testing.assert_allclose(np.diff(track.time_s), 2.0 / RATE_HZ)
+    with pytest.raises(InputError, match="do not rise; expected the labels of one film"):
+        load_file(write([*range(30), *range(30)]), RATE_HZ)
+
+
+def test_keypoints_in_another_order_than_along_the_body_are_told() -> None:
+    mixed = sorted(NODES)  # p0, p1, p10, p2: as sleap-io orders the columns of its tables
+    places = BODY[:, [NODES.index(name) for name in mixed]]
+    found = Keypoints(Path("eel.csv"), mixed, places, None, RATE_HZ)
+    with pytest.raises(InputError, match=r"eel.csv: its keypoints do not lie.*say --keypoints"):
+        found.track(ALL)
+    same(found.track(Choice(keypoints=tuple(NODES))))
 
 
 @pytest.mark.parametrize("old", [True, False])
