@@ -16,7 +16,8 @@ from snakewalk.controller.runlog.record import Header, RunRecord
 from snakewalk.drivers.types import BodyPose
 
 _HEAD: Final = (205, 72, 12)
-_LINKS: Final = ((26, 70, 128), (60, 118, 180))
+_LINKS: Final = ((26, 70, 128), (60, 118, 180)), ((30, 104, 52), (84, 168, 96))
+"""Two colours in turn, of the first run in a page and of the second."""
 _HOT: Final = (214, 32, 38)
 _GOAL: Final = (250, 190, 40)
 _PATH: Final = (240, 170, 20)
@@ -31,17 +32,23 @@ _ABOVE_M: Final = 0.006
 _GOAL_ABOVE, _GOAL_WIDTH = 1.4, 0.14
 """The goals' line: how far above the body's axis, and how thick, in radii of the body (ours)."""
 _LINE: Final = 3.0
+_FLOOR_M: Final = 12.0
+"""Side of the piece of a flat floor that is drawn (ours)."""
 _TRAIL_POINTS: Final = 400
 
 
 class BodyScene:
     """What is drawn of one run; everything moves below one frame, which can follow the body."""
 
-    def __init__(self, server: viser.ViserServer, header: Header) -> None:
+    def __init__(self, server: viser.ViserServer, header: Header, number: int = 0) -> None:
+        """Draw ground and waypoints; ``number`` is that of the run in its page."""
         self._scene, self._header = server.scene, header
+        self._root = f"/run{number}"
+        self.aside_m: Floats = np.zeros(3)
+        """(3,) by which all is moved: where another run is drawn beside it."""
         self._robot, self._ground = header.robot, header.ground
         self._limit_a = header.run.safety.current_limit_of_a(header.robot)
-        self._frame = self._scene.add_frame("/world", show_axes=False)
+        self._frame = self._scene.add_frame(self._root, show_axes=False)
         self._paths = 0
         self._reached = -1
         self._scene.set_up_direction("+z")
@@ -49,13 +56,13 @@ class BodyScene:
         self._draw_obstacle()
         self._waypoints = self._draw_waypoints()
         links = self._robot.link_count
-        colors = [_LINKS[k % 2] for k in range(links)]
+        colors = [_LINKS[number % 2][k % 2] for k in range(links)]
         self._colors = np.array([_HEAD, *colors[1:]], dtype=float)
         radii_m = np.array(self._robot.radii_m(links))
         self._goal_above_m = float(radii_m.max()) * _GOAL_ABOVE
-        self._body = self._links("/world/body", self._colors.astype(np.uint8), radii_m, 0.94)
+        self._body = self._links("body", self._colors.astype(np.uint8), radii_m, 0.94)
         line_m = np.full(links, _GOAL_WIDTH * float(radii_m.max()))
-        self._goals = self._links("/world/goals", np.array(_GOAL, dtype=np.uint8), line_m, 1.0)
+        self._goals = self._links("goals", np.array(_GOAL, dtype=np.uint8), line_m, 1.0)
         self._joint_of = np.minimum(np.arange(links), links - 2)
 
     def show(self, record: RunRecord, cycle: int, pose: int, *, follow: bool, goals: bool) -> None:
@@ -76,7 +83,7 @@ class BodyScene:
             sent = np.nan_to_num(rows.sent_rad[cycle, :spine])
             _place(self._goals, body_in_world(self._robot, head, sent), self._goal_above_m)
         if follow:
-            self._frame.position = (*(-measured.centre_m[:2]), 0.0)
+            self._frame.position = tuple(self.aside_m - [*measured.centre_m[:2], 0.0])
         reached = int(where.target[pose])
         if reached != self._reached:
             self._reached = reached
@@ -90,7 +97,7 @@ class BodyScene:
             return
         self._paths = laid
         for number, (_, points_m) in enumerate(paths):
-            name = f"/world/paths/{number}"
+            name = f"{self._root}/paths/{number}"
             if number < laid and len(points_m) > 1:
                 new = number == laid - 1
                 self._line(name, points_m, _PATH if new else _OLD_PATH, _LINE if new else 1.5)
@@ -102,11 +109,15 @@ class BodyScene:
         known = centre_m[np.isfinite(centre_m).all(axis=1)]
         step = max(1, len(known) // _TRAIL_POINTS)
         if len(known) > step:
-            self._line("/world/trail", known[::step, :2], _TRAIL, 2.0)
+            self._line(f"{self._root}/trail", known[::step, :2], _TRAIL, 2.0)
 
     def release(self) -> None:
         """Put the ground back where it is: the camera no longer follows."""
-        self._frame.position = (0.0, 0.0, 0.0)
+        self._frame.position = tuple(self.aside_m)
+
+    def hide_ground(self, hidden: bool) -> None:
+        """Leave the ground to another run, whose own is the same and lies there."""
+        self._floor.visible = not hidden
 
     def first_camera(self, server: viser.ViserServer) -> None:
         """Look from behind and above at the start, far enough to see body and path."""
@@ -128,7 +139,7 @@ class BodyScene:
         long = np.diff(self._robot.link_ends)
         links = self._robot.link_count
         return self._scene.add_batched_meshes_simple(
-            name,
+            f"{self._root}/{name}",
             np.asarray(mesh.vertices)[:, [2, 0, 1]],  # the cylinder stands along z
             np.asarray(mesh.faces),
             batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (links, 1)),
@@ -142,11 +153,10 @@ class BodyScene:
 
     def _draw_ground(self) -> None:
         if self._ground is None:
-            size_m = 12.0
-            self._scene.add_grid(
-                "/world/ground",
-                size_m,
-                size_m,
+            self._floor: viser.SceneNodeHandle = self._scene.add_grid(
+                f"{self._root}/ground",
+                _FLOOR_M,
+                _FLOOR_M,
                 cell_size=0.25,
                 section_size=1.0,
                 cell_color=(214, 211, 202),
@@ -156,7 +166,9 @@ class BodyScene:
                 position=(0.0, 0.0, -0.001),
             )
             return
-        self._scene.add_mesh_trimesh("/world/ground", _ground_mesh(self._ground))
+        self._floor = self._scene.add_mesh_trimesh(
+            f"{self._root}/ground", _ground_mesh(self._ground)
+        )
 
     def _draw_obstacle(self) -> None:
         obstacle = self._header.world.obstacle
@@ -167,7 +179,7 @@ class BodyScene:
         turn = (1.0, 0.0, 0.0, 0.0) if obstacle.upright else (0.5**0.5, 0.0, 0.5**0.5, 0.0)
         height_m = 0.5 * length_m if obstacle.upright else obstacle.radius_m
         self._scene.add_mesh_simple(
-            "/world/pole",
+            f"{self._root}/pole",
             np.asarray(pole.vertices),
             np.asarray(pole.faces),
             color=(150, 120, 90),
@@ -181,7 +193,7 @@ class BodyScene:
         heights_m = self._height_m(plan.waypoints_m)
         for number, (point_m, z_m) in enumerate(zip(plan.waypoints_m, heights_m, strict=True)):
             at = (float(point_m[0]), float(point_m[1]), float(z_m))
-            name = f"/world/waypoints/{number}"
+            name = f"{self._root}/waypoints/{number}"
             spheres.append(
                 self._scene.add_icosphere(
                     name, plan.waypoint_radius_m, color=_WAYPOINT, opacity=0.35, position=at

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("viser")
@@ -18,13 +19,13 @@ from snakewalk.controller.runlog.tables import record_of
 
 @pytest.fixture
 def page(record: RunRecord) -> Iterator[LogPage]:
-    made = LogPage(record, "127.0.0.1", 0)
+    made = LogPage({"log": record}, "127.0.0.1", 0)
     yield made
     made.server.stop()
 
 
 def state(page: LogPage) -> str:
-    return re.sub("<[^>]*>", " ", page._dashboard._state.content)
+    return re.sub("<[^>]*>", " ", page._shown[0].board._state.content)
 
 
 def test_it_plays_in_time_follows_the_slider_and_stops_at_the_end(page: LogPage) -> None:
@@ -50,34 +51,63 @@ def test_bars_and_curves_show_the_rows_of_the_time(page: LogPage, record: RunRec
     page._slider.value = round(0.5 * (page._begin_s + page._end_s), 2)
     page.step(0.05, 0.0)
     cycle = int((record.cycle.time_s <= page.time_s).sum()) - 1
-    bars = re.sub("<[^>]*>", " ", page._dashboard._bars.content)
+    bars = re.sub("<[^>]*>", " ", page._shown[0].board._bars.content)
     assert f"{record.cycle.measured_rad[cycle, 0]:.2f}" in bars
     assert f"{abs(record.cycle.current_a[cycle, 0]):.2f}" in bars
-    time_s, goal, measured = page._dashboard._angle.data
+    time_s, goal, measured = page._shown[0].board._angle.data
     assert time_s[-1] == record.cycle.time_s[cycle]
     assert goal[-1] == record.cycle.sent_rad[cycle, 0]
     assert measured[-1] == record.cycle.measured_rad[cycle, 0]
 
 
+def test_two_logs_begin_together_and_stand_beside_each_other(record: RunRecord) -> None:
+    late = record.cycle.time_s + 100.0
+    cut = len(late) // 2
+    cycle = replace(record.cycle, time_s=late)
+    pose = replace(record.pose, time_s=record.pose.time_s + 100.0)
+    slow = replace(record.slow, time_s=record.slow.time_s + 100.0)
+    other = replace(record, cycle=cycle, pose=pose, slow=slow)
+    page = LogPage({"one": record, "other": other}, "127.0.0.1", 0)
+    page._slider.value = round(float(record.cycle.time_s[cut]) + 0.005, 3)
+    page.step(0.05, 0.0)
+    one, two = (re.sub("<[^>]*>", " ", each.board._bars.content) for each in page._shown)
+    assert one == two
+    scenes = [each.scene for each in page._shown]
+    np.testing.assert_array_equal(
+        scenes[0]._body.batched_positions, scenes[1]._body.batched_positions
+    )
+    assert not page._apart.value  # type: ignore[union-attr]  # the same ground
+    page._apart.value = True  # type: ignore[union-attr]
+    page.step(0.05, 0.1)
+    wide_m = np.ptp(record.pose.centre_m[:, 1])
+    between_m = scenes[0]._frame.position[1] - scenes[1]._frame.position[1]
+    assert between_m >= wide_m + 0.5 - 1e-9
+    page.server.stop()
+
+
 def test_texts_of_a_log_steer_no_page(record: RunRecord) -> None:
     run = record.header.run.model_copy(update={"name": "<img src=x onerror=alert(1)>"})
     named = replace(record, header=replace(record.header, run=run))
-    page = LogPage(named, "127.0.0.1", 0)
+    page = LogPage({"log": named}, "127.0.0.1", 0)
     page.step(0.05, 0.0)
     page.server.stop()
-    assert "<img" not in page._dashboard._state.content
+    assert "<img" not in page._shown[0].board._state.content
 
 
 def test_a_log_without_a_cycle_is_refused(record: RunRecord) -> None:
     empty = record_of({}, complete=True, note="", header=record.header)
     with pytest.raises(InputError, match="nothing to show"):
-        LogPage(empty, "127.0.0.1", 0)
+        LogPage({"log": empty}, "127.0.0.1", 0)
 
 
 def test_the_command_refuses_in_a_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for words in (["nothing.mcap"], [str(tmp_path), "--view-at", "here:there"]):
+    for words in (
+        ["nothing.mcap"],
+        ["a.mcap", "b.mcap", "c.mcap"],
+        [str(tmp_path), "--view-at", "here:there"],
+    ):
         monkeypatch.setattr("sys.argv", ["snakewalk", "view", *words])
         with pytest.raises(SystemExit) as end:
             main()
