@@ -28,7 +28,7 @@ $(STAMP): pyproject.toml
 
 # The loops are compiled once, by two processes, before many would compile them each for itself.
 loops: setup
-	$(BIN)/python .ci/loops
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python .ci/loops
 
 run: loops
 	$(BIN)/snakewalk run
@@ -44,9 +44,10 @@ lint: setup
 types: setup
 	$(BIN)/mypy
 
-# Each process takes whole files in their order, so that a file's fixtures are made once.
+# Each process takes whole files in their order, so that a file's fixtures are made once. Byte code is kept,
+# also where the environment says that it is not: forty tests start a program of their own.
 unit: loops
-	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
 
 # make docs      the site, in build/docs; a link that leads nowhere inside it, or any other warning, is an error
 docs: setup

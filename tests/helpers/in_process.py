@@ -1,11 +1,13 @@
 """The command line without a new process: the same door, code and streams; a pool without any."""
 
 import io
+import pickle
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -33,12 +35,19 @@ def snakewalk(*words: str) -> Done:
     return Done(code, out.getvalue(), err.getvalue())
 
 
-class _Here(Executor):
-    """Does at once what it is given, where a worker would first import everything."""
+class InProcessExecutor(Executor):
+    """Does at once what it is given, where a worker would first import everything.
+
+    Work and result are pickled and read back, as on their way to a worker and from it.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        pass
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
         done: Future[Any] = Future()
-        done.set_result(fn(*args, **kwargs))
+        sent_fn, sent_args, sent_kwargs = pickle.loads(pickle.dumps((fn, args, kwargs)))
+        done.set_result(pickle.loads(pickle.dumps(sent_fn(*sent_args, **sent_kwargs))))
         return done
 
 
@@ -48,7 +57,19 @@ def work_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
     @contextmanager
     def here(workers: int) -> Iterator[Executor]:
-        yield _Here()
+        yield InProcessExecutor()
 
     for module in (pool, tune):
         monkeypatch.setattr(module, "process_pool", here)
+
+
+def leave_out_pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs leave their log and numbers: a page takes two seconds, and is drawn by other tests."""
+    from snakewalk.controller.app.report import artifacts
+
+    def numbers_only(record: Any, folder: Path, numbers: Any = None, **options: Any) -> Any:
+        assert numbers is not None, "the command makes a page of a log that was there before"
+        artifacts.write_summary(numbers, folder)
+        return artifacts.Artifacts(None, None, ())
+
+    monkeypatch.setattr(artifacts, "make_artifacts", numbers_only)

@@ -116,9 +116,9 @@ def simulate(
         start,
         method="LSODA",
         t_eval=time_s,
-        rtol=1e-6,
-        atol=1e-8,
-        max_step=0.02,
+        rtol=1e-5,
+        atol=1e-7,
+        max_step=0.05,
     )
     assert done.success, done.message
     return PlanarRun(done.y[:2].T, done.y[2], float(done.y[6, -1]))

@@ -4,6 +4,7 @@ import base64
 import gzip
 import json
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, Final
 
 import numpy as np
@@ -37,10 +38,8 @@ def curves_html(record: RunRecord) -> str:
     """HTML of the section, the library in it; empty where the log has nothing to draw."""
     if len(record.cycle.time_s) < 2:
         return ""
-    from plotly.offline import get_plotlyjs  # noqa: PLC0415  an extra
-
     panels, constant = _panels(record)
-    library, spec = get_plotlyjs(), json.dumps(_figure(record, panels))
+    spec = json.dumps(_figure(record, panels))
     joints = "".join(
         f"<option value='{k}'>joint {k + 1}</option>"
         for k in range(record.cycle.asked_rad.shape[1])
@@ -54,7 +53,7 @@ def curves_html(record: RunRecord) -> str:
         "<figcaption>Drag to zoom in time, double-click for all, click a name to hide its curve. "
         "Green: a waypoint reached; amber and orange: a warning, an error. The dark line is the "
         f"film's time.{which}{constant}</figcaption></figure>"
-        f"<script id='plotly' type='text/plain'>{_zipped(library)}</script>"
+        f"<script id='plotly' type='text/plain'>{_library()}</script>"
         f"<script id='curves-data' type='text/plain'>{_zipped(spec)}</script></section>"
     )
 
@@ -227,6 +226,14 @@ def _trace(name: str, colour: str, row: int, time_s: Floats, values: Floats) -> 
         "line": {"color": colour, "width": 1.3},
         "hovertemplate": f"{name} %{{y:.4g}}<extra></extra>",
     }
+
+
+@cache
+def _library() -> str:
+    """Plotly, compressed once however many pages a process makes."""
+    from plotly.offline import get_plotlyjs  # noqa: PLC0415  an extra
+
+    return _zipped(get_plotlyjs())
 
 
 def _zipped(text: str) -> str:

@@ -98,12 +98,12 @@ class PdeSurface:
         series = np.fft.rfft(curves, axis=1)[:, : kept + 1] / count
         double = np.where(2 * np.arange(kept + 1) == count, 1.0, 2.0)  # the last mode has no pair
         spine = np.linalg.solve(_conditions(places, kinds, 0.0), series[:, 0].real)
-        cosine, sine = np.zeros((2, kept, number, 3))
-        for n in range(1, kept + 1):
-            basis = _conditions(places, kinds, spread * n)
-            cosine[n - 1] = np.linalg.solve(basis, double[n] * series[:, n].real)
-            if 2 * n != count:
-                sine[n - 1] = np.linalg.solve(basis, -2.0 * series[:, n].imag)
+        basis = _conditions(places, kinds, spread * np.arange(1, kept + 1)[:, None])
+        by_mode = series[:, 1:].transpose(1, 0, 2)
+        cosine = np.linalg.solve(basis, double[1:, None, None] * by_mode.real)
+        sine = np.linalg.solve(basis, -2.0 * by_mode.imag)
+        if 2 * kept == count:
+            sine[kept - 1 :] = 0.0
         left_out = np.zeros((number, count, 3))
         if modes is not None:
             v = np.arange(count) * TURN / count
@@ -141,10 +141,11 @@ class PdeSurface:
         if around == 0:
             out += (_basis(us, 0.0, self._order, along) @ self.spine_terms)[:, None]
         quarter = around * 0.5 * np.pi  # a derivative of cos and sin is a quarter turn
-        for n in range(1, len(self.cosine) + 1):
-            basis = _basis(us, self.spread * n, self._order, along) * float(n) ** around
-            out += np.cos(n * vs + quarter)[None, :, None] * (basis @ self.cosine[n - 1])[:, None]
-            out += np.sin(n * vs + quarter)[None, :, None] * (basis @ self.sine[n - 1])[:, None]
+        n: Floats = np.arange(1.0, len(self.cosine) + 1)[:, None]
+        basis = _basis(us, self.spread * n, self._order, along) * n[..., None] ** around
+        turned = n * vs + quarter
+        out += np.tensordot(basis @ self.cosine, np.cos(turned), (0, 0)).transpose(0, 2, 1)
+        out += np.tensordot(basis @ self.sine, np.sin(turned), (0, 0)).transpose(0, 2, 1)
         if around < 2 and self.left_out.any():
             out += self._remainder(us, vs, along, around)
         return out
@@ -184,24 +185,26 @@ def carry_over(mesh_m: ArrayLike, before_m: ArrayLike, after_m: ArrayLike) -> Fl
     return np.asarray(mesh + np.asarray(after_m, float).reshape(-1, 3)[nearest] - rest[nearest])
 
 
-def _conditions(places: Floats, kinds: Sequence[int], rate: float) -> Floats:
-    """(2N, 2N) what each condition asks of the functions of u."""
+def _conditions(places: Floats, kinds: Sequence[int], rate: float | Floats) -> Floats:
+    """(2N, 2N) what each condition asks of the functions of u; (M, 2N, 2N) for rates (M, 1)."""
     order = len(places) // 2
     return np.stack(
-        [_basis(places[k : k + 1], rate, order, kind)[0] for k, kind in enumerate(kinds)]
+        [_basis(places[k : k + 1], rate, order, kind)[..., 0, :] for k, kind in enumerate(kinds)],
+        axis=-2,
     )
 
 
-def _basis(u: Floats, rate: float, order: int, along: int) -> Floats:
+def _basis(u: Floats, rate: float | Floats, order: int, along: int) -> Floats:
     """(U, 2N) functions of a mode that fades at ``rate``, differentiated ``along`` times.
 
-    Powers of u for the rate 0; else ``(1 - u)^k e^(-w (1 - u))`` and ``u^k e^(-w u)`` for k < N.
+    Powers of u for the rate 0; else ``(1 - u)^k e^(-w (1 - u))`` and ``u^k e^(-w u)`` for k < N;
+    (M, U, 2N) for rates (M, 1).
     """
-    if rate == 0.0:
+    if np.ndim(rate) == 0 and rate == 0.0:
         return np.stack([_power(u, k, along) for k in range(2 * order)], axis=1)
     sign = -1.0 if along % 2 else 1.0
     rising = [sign * _faded(1.0 - u, rate, k, along) for k in range(order)]
-    return np.stack([*rising, *(_faded(u, rate, k, along) for k in range(order))], axis=1)
+    return np.stack([*rising, *(_faded(u, rate, k, along) for k in range(order))], axis=-1)
 
 
 def _power(u: Floats, k: int, times: int) -> Floats:
@@ -209,10 +212,10 @@ def _power(u: Floats, k: int, times: int) -> Floats:
     return np.zeros_like(u) if times > k else perm(k, times) * u ** (k - times)
 
 
-def _faded(u: Floats, rate: float, k: int, times: int) -> Floats:
+def _faded(u: Floats, rate: float | Floats, k: int, times: int) -> Floats:
     """``u^k e^(-w u)``, differentiated by Leibniz' rule."""
     parts = [
         comb(times, j) * (-rate) ** (times - j) * _power(u, k, j)
         for j in range(min(times, k) + 1)
     ]  # fmt: skip
-    return np.asarray(np.sum(parts, axis=0) * np.exp(-rate * u))
+    return np.asarray(sum(parts) * np.exp(-rate * u))

@@ -26,6 +26,7 @@ from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.motion.operator import Operator
 from snakewalk.controller.runlog.reader import read_log
+from tests.helpers.in_process import leave_out_pages
 
 runner = CliRunner()
 
@@ -218,6 +219,7 @@ def test_a_key_and_a_pads_button_switch_torque_off(
     pad = tmp_path / "js0"
     os.mkfifo(pad)
     monkeypatch.setenv("COLUMNS", str(columns))
+    leave_out_pages(monkeypatch)
     words = ["gait", "run", "rolling", "--gamepad", str(pad), "--no-film", "--json"]
     monkeypatch.setattr("sys.argv", ["snakewalk", *words, "--out", str(tmp_path / "run")])
     reader = os.open(pad, os.O_RDONLY | os.O_NONBLOCK)

@@ -15,6 +15,7 @@ from snakewalk.controller.app.recordings.recorded_joints import recorded_joints
 from snakewalk.controller.app.runs.factory import prepare_playback, prepare_run, prepare_walk
 from snakewalk.controller.motion.recorded import RAMP_S
 from snakewalk.controller.runlog.reader import read_log
+from tests.helpers.in_process import leave_out_pages
 
 
 def test_auto_is_as_fast_as_the_joints_can_and_faster_is_refused() -> None:
@@ -73,8 +74,11 @@ def test_a_recording_that_bends_too_far_is_refused_scaled_or_clipped(tmp_path: P
     assert told[0] == f"joint angles scaled by {least:g}"
 
 
-def test_joints_of_a_synthesis_are_played_as_they_are(tmp_path: Path) -> None:
+def test_joints_of_a_synthesis_are_played_as_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """No detour over midlines where the file holds the robot's own joints; run and log agree."""
+    leave_out_pages(monkeypatch)
     robot = load_robot("yaw16")
     time_s = np.arange(61) / 30.0
     wave = 0.2 * np.sin(2.0 * time_s[:, None] + np.arange(16) / 3.0)

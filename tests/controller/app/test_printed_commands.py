@@ -4,9 +4,10 @@ They are run as printed, in this process, with a budget that the pages do not sh
 
 - a motion on simulated servos is cut ``MOTION_S`` after its ramp, and but for ``plan`` so is the
   motion that is carried out on paper before; path, start-up, bus, log and summary are whole;
+- a camera is looked through for a second;
 - page and film are made for the lines of ``WHOLE`` and by ``report`` only;
 - of a study's runs the first one is made, in this process; of a graph's walks one; of actions the
-  quick ones are recorded; a film of a crowd has two frames;
+  those of ``ACTIONS`` are recorded; a film of a crowd has two frames;
 - ``bus serve`` looks at its port a few times.
 
 What a line takes from its reader, a film or a map, is a small one under the printed name. A line
@@ -41,6 +42,7 @@ from tests.oracles.rendered_snake import SnakeScene, film
 from tests.oracles.tracked_animal import table
 
 MOTION_S = 0.2
+ACTIONS = {"forward-fast", "left-sharp", "right-sharp", "brake", "rest"}
 LOOKS = 5
 PENDULUM = "needs recordings of a pendulum: tests/controller/app/identification"
 BUS = "needs a bus: run on a simulated line by tests/controller/app (test_bus_commands and others)"
@@ -97,6 +99,7 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     from snakewalk.controller.app.cli.commands import bus
     from snakewalk.controller.app.report import artifacts, crowd_film
     from snakewalk.controller.app.runs import execute, walk_run
+    from snakewalk.controller.app.service import camera_watch
     from snakewalk.controller.app.studies import (
         graph_study,
         pool,
@@ -137,13 +140,17 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
         graph_study, "run_study", lambda spec, name, repeats, seed: run_study(spec, name, 1, seed)
     )
     record, crowd = repertoire_recording.record, crowd_film.film_crowd
-    quick = tuple(one for one in repertoire_recording.ACTIONS if one.frequency_hz > 0.4)
+    few = tuple(one for one in repertoire_recording.ACTIONS if one.name in ACTIONS)
+    look = camera_watch.CameraWatch.check
+    monkeypatch.setattr(
+        camera_watch.CameraWatch, "check", lambda watch, _, *a: look(watch, 1.0, *a)
+    )
 
     def short_film(*parts: Any, **options: Any) -> Any:
         scene, robot, place, ground, bodies, _, path = parts
         return crowd(scene, robot, place, ground, bodies, 0.1, path, **options)
 
-    monkeypatch.setattr(repertoire_recording, "record", lambda *a, **b: record(*a, quick, **b))
+    monkeypatch.setattr(repertoire_recording, "record", lambda *a, **b: record(*a, few, **b))
     monkeypatch.setattr(crowd_film, "film_crowd", short_film)
 
     def few_looks(*parts: Any) -> None:

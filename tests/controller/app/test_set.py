@@ -13,6 +13,7 @@ from snakewalk.controller.app.cli.options import key_values
 from snakewalk.controller.app.runs.factory import prepare_gait, prepare_playback, prepare_walk
 from snakewalk.controller.app.studies.replay import differences, replay
 from snakewalk.controller.runlog.reader import read_log
+from tests.helpers.in_process import leave_out_pages
 
 
 def call(*words: str) -> dict[str, object]:
@@ -45,8 +46,11 @@ def test_a_pair_has_a_key_and_a_value(text: str) -> None:
         key_values("--set", [text])
 
 
-def test_what_is_set_moves_the_body_stands_in_the_log_and_replays(tmp_path: Path) -> None:
+def test_what_is_set_moves_the_body_stands_in_the_log_and_replays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Twice the friction across is another way of the head; the replay of either is the same."""
+    leave_out_pages(monkeypatch)
     heads = []
     for across in (0.6, 1.2):
         told = call(

@@ -10,6 +10,8 @@ from PIL import Image
 
 from snakewalk.config.loader import shipped
 from snakewalk.controller.app.recordings.body_skin import Cut, body_skin
+from snakewalk.controller.app.runs.execute import execute
+from snakewalk.controller.app.runs.factory import prepare_gait
 from snakewalk.controller.capture.mesh.mesh_files import read_mesh
 from snakewalk.controller.capture.mesh.skin_file import Y_UP
 from snakewalk.controller.kinematics.links import body_in_world
@@ -22,9 +24,7 @@ from tests.oracles.gltf_player import GltfPlayer
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
-    words = ("sidewinding", "--seconds", "1", "--no-film", "--out", str(folder))
-    done = snakewalk("gait", "run", *words)
-    assert done.returncode == 0, done.stderr
+    execute(prepare_gait("sidewinding", seconds=1.0), folder)
     return folder
 
 

@@ -24,7 +24,7 @@ from snakewalk.sim.physics.split_plant import SplitPlant
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import parse_chain
 from snakewalk.sim.serve.pty import PtyServer
-from tests.helpers.in_process import Done, snakewalk
+from tests.helpers.in_process import Done, leave_out_pages, snakewalk
 from tests.helpers.pty_port import PtyPort, ServedClock
 
 
@@ -44,6 +44,7 @@ class Bench:
             return opened.enter_context(PtyPort(by_path[device], baud, clock))
 
         monkeypatch.setattr(backend, "open_port", open_port)
+        leave_out_pages(monkeypatch)
 
     def run(self, folder: Path, port: str, *words: str) -> Done:
         return snakewalk(

@@ -23,7 +23,7 @@ from snakewalk.drivers.protocol.control_table import load_control_table
 from snakewalk.drivers.protocol.registers import ServoUnits
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.sim.servo.models import MODELS
-from tests.helpers.in_process import work_in_this_process
+from tests.helpers.in_process import leave_out_pages, work_in_this_process
 
 _DOCS = Path(__file__).resolve().parents[4] / "docs"
 _RUN = """
@@ -88,6 +88,7 @@ def test_a_robot_from_the_pages_goes_through_every_command(
         return measure(Point("lateral-undulation", robot, "flat", 0, 0, 4.0))
 
     work_in_this_process(monkeypatch)
+    leave_out_pages(monkeypatch)
     one = tuple(action for action in ACTIONS if action.name == "forward-fast")
     monkeypatch.setattr(repertoire_recording, "record", partial(record, actions=one))
     # the search itself is tested elsewhere: here each of its runs is the same one
