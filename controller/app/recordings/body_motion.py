@@ -6,13 +6,20 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import Water
 from snakewalk.controller.app.report.film import body_qpos
 from snakewalk.controller.app.result_files import LOG
-from snakewalk.controller.capture.mesh.bone_motion import BoneMotion, from_track, swimming
+from snakewalk.controller.capture.fish.postures import holds_postures, load_postures
+from snakewalk.controller.capture.mesh.bone_motion import (
+    BoneMotion,
+    even_points,
+    from_points,
+    swimming,
+)
 from snakewalk.controller.capture.mesh.skin import Skin
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.gaits.registry import GAITS
@@ -54,15 +61,42 @@ def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, B
     log = path / LOG if path.is_dir() else path
     if log.name.endswith((".mcap", ".mcap.part")):
         return _robot_skin(skin, read_log(log), LOG_FPS if fps is None else fps, source)
-    track = load_track(source)
-    if track.frames < 2:
+    time_s, points = _in_space(skin, source)
+    if len(time_s) < 2:
         raise InputError(f"{source}: one frame is no motion")
-    rows = np.arange(track.frames) if fps is None else _thinned(track.time_s, fps)
-    length = 1.0 if track.length_m is None else track.length_m
-    sized = skin.sized(length)
-    belly = sized.axis_m - float(sized.mesh.vertices[:, 2].min())
-    motion = from_track(replace(track, points=track.points[rows], time_s=track.time_s[rows]), belly)
+    rows = np.arange(len(time_s)) if fps is None else _thinned(time_s, fps)
+    motion = from_points(points[rows], time_s[rows])
     return skin.sized(motion.length_m), motion
+
+
+def _in_space(skin: Skin, source: str) -> tuple[Floats, Floats]:
+    """Times (T,) and spines (T, P, 3) of a recording.
+
+    A fish is where it swam, the lowest place of all over the ground; what ``synthesise`` made has
+    heights of its own; all else is level and lies on the ground.
+    """
+    path = Path(source)
+    if holds_postures(path):
+        fish = load_postures(path)
+        points = fish.points_in_space()
+        seen = np.isfinite(points).all(axis=(1, 2))
+        points, time_s = points[seen], np.flatnonzero(seen) / fish.rate_hz
+        points[..., 2] += _belly_m(skin, fish.length) - points[..., 2].min(initial=0.0)
+        return time_s, points
+    track = load_track(source)
+    flat = even_points(track)
+    belly_m = _belly_m(skin, 1.0 if track.length_m is None else track.length_m)
+    height_m = np.full(flat.shape[:2], belly_m)
+    held = read_arrays(path, {"height_m"})[0] if path.suffix == ".npz" else {}
+    if "height_m" in held and held["height_m"].shape == height_m.shape:
+        height_m = np.asarray(held["height_m"], float)
+    return track.time_s, np.concatenate([flat, height_m[..., None]], axis=-1)
+
+
+def _belly_m(skin: Skin, length_m: float) -> float:
+    """Height of the axis of a skin of that length that lies on the ground."""
+    sized = skin.sized(length_m)
+    return sized.axis_m - float(sized.mesh.vertices[:, 2].min())
 
 
 def _robot_skin(skin: Skin, record: RunRecord, fps: float, source: str) -> tuple[Skin, BoneMotion]:

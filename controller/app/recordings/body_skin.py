@@ -10,6 +10,8 @@ from snakewalk.config.animal import SkinConfig
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load, locate, shipped
+from snakewalk.controller.capture.fish.model import fish_model
+from snakewalk.controller.capture.fish.postures import holds_fish, load_postures
 from snakewalk.controller.capture.mesh.body_model import (
     BodyModel,
     body_model,
@@ -61,12 +63,13 @@ class BodySkin:
 
 
 def is_skin(name: str) -> bool:
-    """Whether ``body_skin`` makes a skin of this without widths: a shipped one, or a mesh."""
-    return name in SKINS or Path(name).suffix.lower() in (*MESH_ENDINGS, ".toml")
+    """Whether ``body_skin`` makes a skin of this alone: a shipped one, a mesh, a matched fish."""
+    path = Path(name)
+    return name in SKINS or path.suffix.lower() in (*MESH_ENDINGS, ".toml") or holds_fish(path)
 
 
 def body_skin(name: str, how: Cut | None = None) -> BodySkin:
-    """Make the skin of a shipped name, a skin's TOML, a mesh, or a recording with widths.
+    """Make the skin of a shipped name, a skin's TOML, a mesh, a fish, or a recording with widths.
 
     Raises:
         InputError: none of these, or a fault inside it.
@@ -75,6 +78,8 @@ def body_skin(name: str, how: Cut | None = None) -> BodySkin:
     how = Cut() if how is None else how
     if Path(name).suffix.lower() in MESH_ENDINGS:
         return _given(Path(name), how)
+    if holds_fish(Path(name)):
+        return shipped_skin(fish_skin(Path(name)), how)
     if is_skin(name):
         return shipped_skin(load(locate("skins", name), SkinConfig), how)
     if name in EMBEDDED:
@@ -103,6 +108,31 @@ def shipped_skin(config: SkinConfig, how: Cut) -> BodySkin:
     skin = pde_skin(sections, tube, fins(tube, config.all_fins))
     facts: dict[str, object] = {"curves": how.curves, "fins": len(config.all_fins)}
     return BodySkin(config.name, skin, _paint(config, model), False, facts)
+
+
+def fish_skin(file: Path) -> SkinConfig:
+    """Skin of a matched fish: its widths and height, and the fins of its build ([TH] 3.2.2).
+
+    Where the fins of that very fish are is not searched, as in the paper.
+    """
+    fish = load_postures(file).model
+    if fish is None:
+        raise InputError(f"{file}: holds no fish; snakewalk fish match writes one from a film")
+    plain, config = fish_model(fish.build), load(locate("skins", fish.build), SkinConfig)
+    higher = float(np.median(fish.half_height / plain.half_height))
+    at = np.linspace(0.0, 1.0, len(fish.half_width))
+    sections = tuple(
+        one.model_copy(
+            update={
+                "half_width": float(np.interp(one.at, at, fish.half_width)),
+                "half_height": higher * one.half_height,
+            }
+        )
+        for one in config.sections
+    )
+    fins = tuple(one.model_copy(update={"span": higher * one.span}) for one in config.fins)
+    found = {"name": file.stem, "source": f"{file.name} and {config.source}"}
+    return config.model_copy(update=found | {"sections": sections, "fins": fins})
 
 
 def _given(file: Path, how: Cut) -> BodySkin:

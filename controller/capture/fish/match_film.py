@@ -90,7 +90,8 @@ def match_film(
         if len(side_sample) != len(sample):
             raise InputError(f"{name}: the two films differ in length; both must show every moment")
         camera = align(sample, side_sample, name)
-        side_view = SideView(_with_height(model, camera, sample, side_sample), camera)
+        model = _with_height(model, camera, sample, side_sample)
+        side_view = SideView(model, camera)
     rows, sides, values = [], [], []
     lost: dict[str, int] = {}
     side_frames = side() if side is not None else None
@@ -127,6 +128,7 @@ def match_film(
         pitch_rad=None if side_found is None else side_found[:, 1],
         value=np.array(values),
         name=name,
+        model=model,
     )
     return FilmMatch(postures, model, parameters, side_found, camera, lost)
 

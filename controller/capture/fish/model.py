@@ -35,6 +35,8 @@ class FishModel:
     """(STATIONS,) half width in the top view."""
     half_height: Floats
     """(STATIONS,) half height in the side view."""
+    build: str = ""
+    """Its name, as of ``fish_model``."""
     _turns: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -74,11 +76,7 @@ class FishModel:
         at = self.joints_at[0] * (STATIONS - 1)
         low = int(at)
         points -= points[low] * (low + 1 - at) + points[low + 1] * (at - low)
-        if pitch_rad:
-            ahead = np.array([np.cos(head_rad), np.sin(head_rad)])
-            along = points[:, :2] @ ahead
-            points[:, :2] += np.outer(along * (np.cos(pitch_rad) - 1.0), ahead)
-            points[:, 2] = along * np.sin(pitch_rad)
+        points = pitched(points[:, :2], np.array(head_rad), np.array(pitch_rad))
         points[:, : len(base_px)] += base_px
         return points
 
@@ -92,6 +90,15 @@ class FishModel:
         left = np.column_stack([-along[:, 1], along[:, 0]])
         left *= (self.half_width * self.length_px)[:, None]
         return np.asarray(np.concatenate([flat + left, (flat - left)[::-1]]))
+
+
+def pitched(points: Floats, head_rad: Floats, pitch_rad: Floats) -> Floats:
+    """(..., P, 3) places of a level body (..., P, 2) about its base, its head lifted by a pitch."""
+    ahead = np.stack([np.cos(head_rad), np.sin(head_rad)], axis=-1)[..., None, :]
+    along = (points * ahead).sum(axis=-1)
+    lean = np.asarray(pitch_rad)[..., None]
+    level = points + (along * (np.cos(lean) - 1.0))[..., None] * ahead
+    return np.concatenate([level, (along * np.sin(lean))[..., None]], axis=-1)
 
 
 def turn_shares(joints_at: tuple[float, ...], pieces: int) -> Floats:
@@ -121,8 +128,8 @@ def fish_model(build: str, length_px: float = 1.0) -> FishModel:
 
     if build == "carp":
         at = tuple(k / 7 for k in range(2, 6))
-        return FishModel(length_px, at, profile(_CARP), profile(_CARP_HIGH))
+        return FishModel(length_px, at, profile(_CARP), profile(_CARP_HIGH), build)
     if build == "eel":
         at = tuple(k / 9 for k in range(1, 9))
-        return FishModel(length_px, at, profile(_EEL), profile(_EEL) * 1.3)
+        return FishModel(length_px, at, profile(_EEL), profile(_EEL) * 1.3, build)
     raise InputError(f"{build}: no such build of a fish; there are carp and eel")

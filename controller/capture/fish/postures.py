@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.fish.model import turn_shares
+from snakewalk.controller.capture.fish.model import STATIONS, FishModel, pitched, turn_shares
 from snakewalk.controller.capture.resample import SEGMENTS, equal_arc_length, tangent_angles
 from snakewalk.controller.capture.track import Track
 
@@ -35,6 +36,8 @@ class Postures:
     """(T,) how far the head is lifted, from a side view."""
     value: Floats | None = None
     """(T,) V of Eq. 3; at most 1 + W."""
+    model: FishModel | None = None
+    """The fish that was matched; None of tracked midlines."""
     name: str = "fish"
     source: str = "not stated"
     licence: str = "not stated"
@@ -61,6 +64,14 @@ class Postures:
     def points(self) -> Floats:
         """(T, 101, 2) skeleton in the unit of ``base``."""
         return skeleton(self.base, self.tangents_rad(), self.joints_at[0], self.length)
+
+    def points_in_space(self) -> Floats:
+        """(T, 101, 3) skeleton with height and pitch; level at 0 where they were not seen."""
+        level = np.zeros(self.frames)
+        pitch = level if self.pitch_rad is None else self.pitch_rad
+        height = level if self.height is None else self.height
+        base = np.column_stack([self.base, height])[:, None]
+        return pitched(self.points() - base[..., :2], self.head_rad, pitch) + base
 
 
 def tangents(head_rad: Floats, angles_rad: Floats, joints_at: tuple[float, ...]) -> Floats:
@@ -121,6 +132,10 @@ def midline_angles(points: Floats, joints_at: tuple[float, ...]) -> tuple[float,
     return float(head[0]), angles[0]
 
 
+_POSTURES = {"base", "head_rad", "angles_rad_spine", "joints_at", "rate_hz"}
+_SECTIONS = ("half_width", "half_height")
+
+
 def save_postures(path: Path, postures: Postures) -> None:
     """Write postures with their skeletons, so that the file is a recording for a run as well."""
     optional = {
@@ -128,6 +143,9 @@ def save_postures(path: Path, postures: Postures) -> None:
         for key in ("height", "pitch_rad", "value")
         if (values := getattr(postures, key)) is not None
     }
+    if postures.model is not None:
+        optional |= {"build": postures.model.build, "length_px": postures.model.length_px}
+        optional |= {key: getattr(postures.model, key) for key in _SECTIONS}
     with path.open("wb") as stream:  # a path would get .npz appended where it ends in .NPZ
         np.savez_compressed(
             stream,
@@ -162,23 +180,53 @@ def load_postures(path: Path) -> Postures:
         raise InputError(
             f"{path}: holds no postures; snakewalk fish match writes them, as .npz"
         ) from None
-    missing = {"base", "head_rad", "angles_rad_spine", "joints_at", "rate_hz"} - held.keys()
+    missing = _POSTURES - held.keys()
     if missing:
         raise InputError(
             f"{path}: lacks {', '.join(sorted(missing))}; postures come from snakewalk fish match"
         )
     length_m = float(held.get("length_m", np.array(np.nan)))
+    joints_at = tuple(float(at) for at in held["joints_at"])
     return Postures(
         base=held["base"],
         head_rad=held["head_rad"],
         angles_rad=held["angles_rad_spine"],
-        joints_at=tuple(float(at) for at in held["joints_at"]),
+        joints_at=joints_at,
         rate_hz=float(held["rate_hz"]),
         length_m=length_m if np.isfinite(length_m) else None,
         height=held.get("height"),
         pitch_rad=held.get("pitch_rad"),
         value=held.get("value"),
+        model=_model(path, held, joints_at),
         name=str(held.get("name", path.stem)),
         source=str(held.get("source", "not stated")),
         licence=str(held.get("licence", "not stated")),
     )
+
+
+def holds_postures(path: Path) -> bool:
+    """Whether a file is an .npz of postures, or of a motion made of them."""
+    return _names(path) >= _POSTURES
+
+
+def holds_fish(path: Path) -> bool:
+    """Whether it holds the fish that was matched as well."""
+    return holds_postures(path) and _names(path) >= {*_SECTIONS}
+
+
+def _names(path: Path) -> set[str]:
+    """Names of its arrays; none of what is no .npz."""
+    try:
+        return set() if path.suffix != ".npz" else set(read_arrays(path, ())[1])
+    except (ValueError, OSError):
+        return set()
+
+
+def _model(path: Path, held: dict[str, Any], joints_at: tuple[float, ...]) -> FishModel | None:
+    """The fish that was matched, where the file holds it."""
+    if not held.keys() >= {*_SECTIONS, "build", "length_px"}:
+        return None
+    wide, high = (np.asarray(held[key], float) for key in _SECTIONS)
+    if any(one.shape != (STATIONS,) or not np.isfinite(one).all() for one in (wide, high)):
+        raise InputError(f"{path}: {' and '.join(_SECTIONS)} must be {STATIONS} numbers each")
+    return FishModel(float(held["length_px"]), joints_at, wide, high, str(held["build"]))

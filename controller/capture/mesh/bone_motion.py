@@ -34,16 +34,12 @@ class BoneMotion:
         return float(self.bone_m.sum())
 
 
-def from_track(track: Track, height_m: float) -> BoneMotion:
-    """Bones between the points of a recorded midline, level, ``height_m`` above the ground.
-
-    A midline of more than 101 points is divided into 100 parts of equal arc length first.
-    """
+def even_points(track: Track) -> Floats:
+    """(T, P, 2) midlines; those of more than 101 points in 100 parts of equal arc length."""
     points = track.points
     if points.shape[1] > SEGMENTS + 1:
         points = np.stack([equal_arc_length(body) for body in points])
-    lifted = np.concatenate([points, np.full((*points.shape[:2], 1), height_m)], axis=-1)
-    return from_points(lifted, track.time_s)
+    return points
 
 
 def from_points(points_m: Floats, time_s: Floats) -> BoneMotion:

@@ -1,6 +1,7 @@
 """``snakewalk body``: skins of shipped animals, meshes and recordings, moved by all there is."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,14 @@ import pytest
 import trimesh
 from PIL import Image
 
-from snakewalk.config.loader import shipped
-from snakewalk.controller.app.recordings.body_skin import Cut, body_skin
+from snakewalk.config.animal import SkinConfig
+from snakewalk.config.loader import load, locate, shipped
+from snakewalk.controller.app.recordings.body_skin import Cut, body_skin, fish_skin
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait
+from snakewalk.controller.capture.fish.model import fish_model
+from snakewalk.controller.capture.fish.postures import save_postures
+from snakewalk.controller.capture.fish.swimmer import swim
 from snakewalk.controller.capture.mesh.mesh_files import read_mesh
 from snakewalk.controller.capture.mesh.skin_file import Y_UP
 from snakewalk.controller.kinematics.links import body_in_world
@@ -61,6 +66,53 @@ def test_a_gait_of_a_spine_moves_a_shipped_skin(tmp_path: Path) -> None:
     np.testing.assert_allclose(player.corners(0), player.corners(24), atol=1e-5)
     assert np.ptp(player.bones(6)[:, 1, 3]) > 0.05  # up and down: y is up
     assert np.ptp(player.bones(6)[:, 2, 3]) < 1e-6
+
+
+def test_a_matched_fish_swims_in_space_with_the_fins_of_its_build(tmp_path: Path) -> None:
+    """[TH] 3.2.2: the model that was matched, and plates for fins whose places are not searched."""
+    plain, swum, file = fish_model("carp", 120.0), swim(), tmp_path / "tench.npz"
+    wide = np.linspace(1.3, 0.9, len(plain.half_width)) * plain.half_width
+    fish = replace(plain, half_width=wide, half_height=0.8 * plain.half_height)
+    save_postures(file, replace(swum, model=fish))
+    facts = made(str(file), "--animate", str(file), "-o", str(tmp_path / "fish.glb"))
+    assert (facts["frames"], facts["bones"], facts["fins"]) == (swum.frames, 100, 8)
+    skin, carp = fish_skin(file), load(locate("skins", "carp"), SkinConfig)
+    at = np.linspace(0.0, 1.0, len(wide))
+    for section, before in zip(skin.sections, carp.sections, strict=True):
+        assert section.half_width == pytest.approx(np.interp(section.at, at, wide))
+        assert section.half_height == pytest.approx(0.8 * before.half_height)
+    assert skin.fins[0].span == pytest.approx(0.8 * carp.fins[0].span)
+    player = GltfPlayer.read(tmp_path / "fish.glb")
+    assert swum.height is not None
+    assert swum.pitch_rad is not None
+    # the head is rigid: its tip lies 2/7 of the length ahead of the base, lifted by the pitch
+    rise = swum.height + 2.0 / 7.0 * np.sin(swum.pitch_rad)
+    tip = np.array([player.bones(k)[0, :3, 3] @ Y_UP for k in range(0, swum.frames, 30)])
+    assert np.ptp(rise) > 0.2
+    np.testing.assert_allclose(tip[:, 2] - tip[0, 2], (rise - rise[0])[::30], atol=2e-3)
+
+
+def test_a_fish_without_sections_and_one_that_is_damaged_are_told(tmp_path: Path) -> None:
+    save_postures(tmp_path / "lines.npz", swim())
+    assert "expected points_px and radius_px" in refused(
+        str(tmp_path / "lines.npz"), "-o", str(tmp_path / "a.glb")
+    )
+    save_postures(tmp_path / "bad.npz", replace(swim(), model=fish_model("eel", 90.0)))
+    with np.load(tmp_path / "bad.npz") as held:
+        np.savez(tmp_path / "bad.npz", **{**held, "half_width": np.ones(5)})
+    words = str(tmp_path / "bad.npz"), "-o", str(tmp_path / "a.glb")
+    assert "half_width and half_height must be 41 numbers each" in refused(*words)
+
+
+def test_heights_that_synthesise_wrote_are_kept(tmp_path: Path) -> None:
+    at = np.linspace(0.0, 1.0, 21)
+    points = np.stack([np.tile(-at, (5, 1)), np.zeros((5, 21))], axis=-1)
+    rise = 0.3 * at + 0.05 * np.arange(5)[:, None]
+    np.savez(tmp_path / "hill.npz", points=points, rate_hz=25.0, length_m=1.0, height_m=rise)
+    made("snake", "--animate", str(tmp_path / "hill.npz"), "-o", str(tmp_path / "s.glb"))
+    player = GltfPlayer.read(tmp_path / "s.glb")
+    for k in range(5):
+        np.testing.assert_allclose(player.bones(k)[:, 1, 3], rise[k, :-1], atol=1e-5)
 
 
 def test_a_log_is_read_back_pose_by_pose(log: Path, tmp_path: Path) -> None:

@@ -87,5 +87,5 @@ def test_the_skin_rests_where_the_belly_does_and_at_its_axis_in_water() -> None:
 def test_a_look_that_is_none_is_refused_before_a_run() -> None:
     check_look("servos")
     check_look("animal")
-    with pytest.raises(InputError, match=r"unicorn: no such body; shipped skins are dolphin"):
+    with pytest.raises(InputError, match=r"unicorn: no such body; shipped skins are carp"):
         check_look("unicorn")

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.mesh.body_model import spindle
-from snakewalk.controller.capture.mesh.bone_motion import BoneMotion, from_points, from_track
+from snakewalk.controller.capture.mesh.bone_motion import BoneMotion, even_points, from_points
 from snakewalk.controller.capture.mesh.cross_sections import ellipses
 from snakewalk.controller.capture.mesh.patches import Tube
 from snakewalk.controller.capture.mesh.rig import posed_m, spine_rig
@@ -52,7 +52,9 @@ def tumbling(frames: int = 30, bones: int = 9) -> BoneMotion:
 def test_every_frame_of_a_recording_is_read_back(track: Track, skin: Skin, tmp_path: Path) -> None:
     file = tmp_path / "snake.glb"
     length = float(track.length_m or 1.0)
-    motion = from_track(track, 0.01)
+    flat = even_points(track)
+    spine = np.concatenate([flat, np.full((*flat.shape[:2], 1), 0.01)], axis=-1)
+    motion = from_points(spine, track.time_s)
     write_skin(
         file, spine_rig(skin.sized(motion.length_m), motion.bone_m), motion, TEXTURE, "snake"
     )
