@@ -18,6 +18,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.app.runs.rendered_camera import (
     CHECK_FRAMES,
+    OnPicture,
     centre_of,
     require_whole_body,
 )
@@ -48,9 +49,16 @@ class DeviceCamera:
 
     """
 
-    def __init__(self, run: RunConfig, robot: RobotConfig, clock: Clock) -> None:
+    def __init__(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        clock: Clock,
+        on_picture: OnPicture = lambda picture, time_s: None,
+    ) -> None:
+        """Open it; ``on_picture`` is called from the thread that takes the frames."""
         camera = run.camera
-        self._clock = clock
+        self._clock, self._on_picture = clock, on_picture
         self.detector = overhead_detector(run, robot)
         self._name, self._latency_s = f"camera {camera.device}", camera.latency_s
         self._device = open_device(camera)
@@ -138,6 +146,7 @@ class DeviceCamera:
             taken += 1
             try:
                 picture, time_s = in_colour(frame), self._clock.now_s() - self._latency_s
+                self._on_picture(picture, time_s)
                 if taken % CHECK_FRAMES == 0:
                     self.detector = self.detector.registered(picture)
                 self._found.put(self._look(picture, time_s))

@@ -144,7 +144,8 @@ def execute(
             log.event(clock.now_s(), kind, text)
             on_event(kind, text)
 
-        with pose_provider(prepared, backend, log_event) as pose:
+        shown = {} if view is None else {"on_picture": view.on_picture}
+        with pose_provider(prepared, backend, log_event, **shown) as pose:
             source = prepared.make_source(log_event)
             link = SafeLink(
                 backend.chain,

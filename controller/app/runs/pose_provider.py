@@ -23,7 +23,7 @@ from snakewalk.drivers.types import BodyPose, JointState
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.runs.device_camera import DeviceCamera
-    from snakewalk.controller.app.runs.rendered_camera import RenderedCamera
+    from snakewalk.controller.app.runs.rendered_camera import OnPicture, RenderedCamera
     from snakewalk.controller.localization.camera_pose import CameraPose
 
 
@@ -143,9 +143,14 @@ class PoseComparison:
 
 @contextmanager
 def pose_provider(
-    prepared: PreparedRun, backend: Backend, on_event: OnEvent
+    prepared: PreparedRun,
+    backend: Backend,
+    on_event: OnEvent,
+    on_picture: "OnPicture" = lambda picture, time_s: None,
 ) -> Iterator[PoseProvider]:
     """Make the provider that the run asks for; at its end ``on_event`` takes how good it was.
+
+    ``on_picture`` takes each picture of a camera with its time.
 
     Raises:
         InputError: the camera is not there, does not show the robot, or cannot work here.
@@ -170,7 +175,7 @@ def pose_provider(
         if run.pose == "camera":
             from snakewalk.controller.localization.camera_pose import CameraPose  # noqa: PLC0415  OpenCV is an extra
 
-            device = stack.enter_context(closing(_camera(prepared, backend)))
+            device = stack.enter_context(closing(_camera(prepared, backend, on_picture)))
             provider.measure = provider.camera = CameraPose(
                 robot, device, reckoning, lambda text: on_event("camera", text)
             )
@@ -184,15 +189,17 @@ def pose_provider(
         on_event("pose", ", ".join(f"{key} {value}" for key, value in facts.items()))
 
 
-def _camera(prepared: PreparedRun, backend: Backend) -> "RenderedCamera | DeviceCamera":
+def _camera(
+    prepared: PreparedRun, backend: Backend, on_picture: "OnPicture"
+) -> "RenderedCamera | DeviceCamera":
     run, robot, clock = prepared.run, prepared.robot, backend.clock
     if backend.qpos is None:
         from snakewalk.controller.app.runs.device_camera import DeviceCamera  # noqa: PLC0415  OpenCV is an extra
 
-        return DeviceCamera(run, robot, clock)
+        return DeviceCamera(run, robot, clock, on_picture)
     from snakewalk.controller.app.runs.rendered_camera import RenderedCamera  # noqa: PLC0415  OpenCV is an extra
 
-    return RenderedCamera(run, robot, prepared.world, backend.qpos, clock)
+    return RenderedCamera(run, robot, prepared.world, backend.qpos, clock, on_picture)
 
 
 def _rms(values: Floats) -> float:

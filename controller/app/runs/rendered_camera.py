@@ -26,6 +26,8 @@ from snakewalk.drivers.clock import Clock
 if TYPE_CHECKING:
     from snakewalk.sim.rendering.looks import FloorPrint
 
+OnPicture = Callable[[Image, float], None]
+"""Takes a picture (H, W, 3), blue first as OpenCV has it, and its time."""
 CHECK_FRAMES = 15
 """After so many frames each it is looked whether the camera was bumped."""
 
@@ -93,13 +95,14 @@ class RenderedCamera:
         world: WorldConfig,
         qpos: Callable[[], Floats],
         clock: Clock,
+        on_picture: OnPicture = lambda picture, time_s: None,
     ) -> None:
         from snakewalk.sim.rendering.top_view import TopView  # noqa: PLC0415  the simulator is an extra
 
         centre_m = centre_of(run)
         self._view = TopView(robot, world, run.camera, centre_m, run.seed, floor_prints(run.camera))
         self.detector = rendered_detector(run, robot, self._view.empty_floor())
-        self._qpos, self._clock = qpos, clock
+        self._qpos, self._clock, self._on_picture = qpos, clock, on_picture
         self._period_s = 1.0 / run.camera.rate_hz
         self._next_s = clock.now_s()
         self._coming: deque[LineDetection | TrackedPose] = deque()
@@ -128,6 +131,7 @@ class RenderedCamera:
 
     def _track(self, now_s: float, prior: BodyPrior | None) -> LineDetection | TrackedPose:
         picture = self._view.picture(self._qpos())
+        self._on_picture(picture[..., ::-1], now_s)
         self._taken += 1
         if self._taken % CHECK_FRAMES == 0:
             self.detector = self.detector.registered(picture)

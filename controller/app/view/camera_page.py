@@ -58,7 +58,9 @@ class CameraPage:
         if now_s - self._shown_s < _EVERY_S:
             return
         self._shown_s = now_s
-        self._picture.image = with_markers(image, check.markers)
+        blue_first = self._camera.device is not None  # as OpenCV hands them over
+        seen = image[..., ::-1] if blue_first else image
+        self._picture.image = with_markers(seen, check.markers)
         if now_s - self._told_s < _REPORT_S:
             return
         self._told_s = now_s

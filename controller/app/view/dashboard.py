@@ -37,7 +37,8 @@ class Dashboard:
         self._volts = safety.voltage_limits_v(header.robot.servo)
         self._stale_s = safety.stale_limit_s
         self._names = [header.robot.joint_name(k) for k in range(header.robot.joint_count)]
-        gui = server.gui
+        self._gui = gui = server.gui
+        self._picture: viser.GuiImageHandle | None = None
         self._state = gui.add_html("")
         self.follow = gui.add_checkbox("follow the body", not header.run.waypoints_m)
         self.goals = gui.add_checkbox("show goals", True, hint="yellow, where joints should be")
@@ -58,6 +59,20 @@ class Dashboard:
             self._late = _plot(gui, "cycle began late by, ms", ("ms",))
         with tabs.add_tab("events"):
             self._events = gui.add_html("")
+
+    def show_picture(self, jpeg: bytes) -> None:
+        """Show what the run's camera saw; the first makes the tab."""
+        import cv2  # noqa: PLC0415  an extra, which a run with a camera has
+
+        picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+        if picture is None:
+            return
+        shown = cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
+        if self._picture is None:
+            with self.tabs.add_tab("camera"):
+                self._picture = self._gui.add_image(shown, format="jpeg")
+        else:
+            self._picture.image = shown
 
     def show_state(self, record: RunRecord, cycle: int, pose: int, text: str) -> None:
         """Show how the run is doing, in words."""

@@ -1,5 +1,6 @@
 """The process that serves a run's page: rows in, viser out, and the stop button pressed."""
 
+import base64
 import json
 import os
 import signal
@@ -102,6 +103,10 @@ class _LivePage:
                 self._scene.first_camera(self._server)
                 self._dashboard = Dashboard(self._server, self._header)
             self._show_gait()
+            return
+        if topic == "/picture":
+            if self._dashboard is not None:
+                self._dashboard.show_picture(base64.b64decode(row["jpeg"]))
             return
         if topic == "/gait":
             self._gait = row

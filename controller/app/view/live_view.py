@@ -1,6 +1,8 @@
 """A run's page: served by a process of its own, which is fed with the rows of the log."""
 
+import base64
 import json
+import math
 import signal
 import socket
 import sys
@@ -11,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
+from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.view.row_line import RunEnd
@@ -18,6 +21,9 @@ from snakewalk.controller.app.view.row_line import RunEnd
 _START_S: Final = 60.0
 """How long the page may take to start: a busy machine imports slowly (ours)."""
 _END_S: Final = 2.0
+_PICTURE_S: Final = 0.5
+"""Pictures of a camera are shown no more often (ours)."""
+_QUALITY: Final = 70
 
 
 class LiveView:
@@ -51,6 +57,8 @@ class LiveView:
             self._process.kill()
             raise InputError(f"--view-at {at}: {said.get('fault', 'the page did not start')}")
         self._end = RunEnd(ours)
+        self._picture: bytes | None = None
+        self._picture_s = -math.inf
 
     def __enter__(self) -> Self:
         return self
@@ -80,7 +88,22 @@ class LiveView:
 
     def on_row(self, topic: str, row: bytes) -> None:
         """Take a row of the log; returns at once."""
+        if topic == "/pose" and self._picture is not None:
+            picture, self._picture = self._picture, None
+            self._end.add("/picture", picture)
         self._end.add(topic, row)
+
+    def on_picture(self, image: Image, time_s: float) -> None:
+        """Take a picture (H, W, 3), blue first, of the run's camera, from its thread."""
+        if time_s - self._picture_s < _PICTURE_S:
+            return
+        import cv2  # noqa: PLC0415  an extra
+
+        self._picture_s = time_s
+        whole, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        if whole:
+            shown = base64.b64encode(data.tobytes()).decode()
+            self._picture = json.dumps({"time_s": time_s, "jpeg": shown}).encode()
 
     def on_button(self, path: Path) -> None:
         """Take the run's stop button, which the page presses."""

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 KEPT: Final = frozenset({"/config", "/path", "/event", "/button", "/gait"})
 """Topics of which every row is sent, in order; of others the newest."""
-SENT: Final = KEPT | {"/cycle", "/shadow", "/pose", "/slow"}
+SENT: Final = KEPT | {"/cycle", "/shadow", "/pose", "/slow", "/picture"}
 _KEPT_MAX: Final = 1000
 _COMMANDS_MAX: Final = 100
 """Commands that wait for the run; of more the oldest are dropped."""

@@ -15,10 +15,12 @@ import pytest
 
 pytest.importorskip("viser")
 
+from snakewalk.config.arrays import Image
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.app.cli.commands.gait_run import _Hands
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait
+from snakewalk.controller.app.view.dashboard import Dashboard
 from snakewalk.controller.app.view.gait_panel import GaitPanel
 from snakewalk.controller.app.view.live_page import _LivePage
 from snakewalk.controller.app.view.live_view import LiveView
@@ -26,6 +28,7 @@ from snakewalk.controller.app.view.page_server import open_page
 from snakewalk.controller.app.view.row_line import PageEnd, RunEnd
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.sim.serve.servo_bus import ServoBus
 
@@ -67,15 +70,22 @@ class View:
     def __init__(self) -> None:
         ours, far = socket.socketpair()
         self.end = RunEnd(ours)
-        self.on_row = self.end.add
+        self._picture: bytes | None = None
+        self._picture_s = -1.0
         server, _ = open_page("127.0.0.1", 0)
         self.page = _LivePage(server, PageEnd(far))
+
+    def on_row(self, topic: str, row: bytes) -> None:
+        LiveView.on_row(self, topic, row)  # type: ignore[arg-type]
 
     def on_button(self, path: Path) -> None:
         LiveView.on_button(self, path)  # type: ignore[arg-type]
 
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:
         LiveView.on_gait(self, name, parameters)  # type: ignore[arg-type]
+
+    def on_picture(self, image: Image, time_s: float) -> None:
+        LiveView.on_picture(self, image, time_s)  # type: ignore[arg-type]
 
     held = True
     pressed = property(lambda self: self.end.commands)
@@ -144,6 +154,33 @@ def test_what_is_set_in_the_page_changes_the_gait(
     view.page._server.stop()
     said = [event.text for event in finished.record.events if event.kind == "operator"]
     assert said == ["frequency_hz = 0.3"]
+
+
+def test_the_camera_of_a_run_is_shown_twice_a_second(record: RunRecord) -> None:
+    cv2 = pytest.importorskip("cv2")
+    view = View()
+    view.page._dashboard = Dashboard(view.page._server, record.header)
+    colour = np.full((48, 64, 3), (200, 120, 40), dtype=np.uint8)  # red first
+
+    def shown_at(time_s: float, image: Image) -> Image | None:
+        view.on_picture(image[..., ::-1], time_s)
+        view.on_row("/pose", b"{}")
+        view.page._end.ask()
+        view.end.pump()
+        for topic, row in view.page._end.rows(1.0):
+            if topic == "/picture":
+                view.page._take(topic, row)
+        assert view.page._dashboard is not None
+        picture = view.page._dashboard._picture
+        return None if picture is None else picture.image
+
+    first = shown_at(1.0, colour)
+    assert first is not None
+    assert np.abs(first.astype(int) - colour).max() < 12
+    assert np.array_equal(shown_at(1.3, colour // 2), first)
+    assert shown_at(1.6, colour // 2).mean() < 0.6 * first.mean()  # type: ignore[union-attr]
+    assert cv2 is not None
+    view.page._server.stop()
 
 
 def moved_by_a_browser(panel: GaitPanel, name: str, value: object) -> None:
