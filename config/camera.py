@@ -1,4 +1,4 @@
-"""Schema of an overhead camera: its place, its image and its frame rate."""
+"""Schemas of cameras: one above a level floor, and a stereo pair on the robot."""
 
 from typing import Literal, Self
 
@@ -85,3 +85,58 @@ class CameraConfig(Strict):
     def marker_places_m(self) -> dict[int, Place]:
         """``markers_m`` by number; empty where there are none."""
         return {int(name): place for name, place in (self.markers_m or {}).items()}
+
+
+class StereoHeadConfig(Strict):
+    """A pair of cameras on a mast on the spine that looks ahead and down (docs/maps.md).
+
+    The simulator draws its pictures; noise, exposure and the camera's pose error are those of the
+    simulated device.
+    """
+
+    link: int = Field(0, ge=0, description="of the spine, on which the mast stands; 0 is the head")
+    height_m: float = Field(
+        0.25, ge=0.0, le=1.0, description="of the lenses above the link's middle"
+    )
+    tilt_rad: float = Field(0.5, ge=-0.5, le=1.5, description="by which they look down")
+    baseline_m: float = Field(0.095, gt=0.01, le=0.5, description="between the lenses")
+    width_px: int = Field(320, ge=160, le=2048)
+    height_px: int = Field(240, ge=120, le=2048)
+    focal_px: float = Field(200.0, gt=20.0, le=10_000.0, description="focal length")
+    disparities: int = Field(80, ge=16, le=512, description="that are tried, from infinity on")
+    exposure_s: float = Field(0.005, ge=0.0, le=0.1, description="how long a picture is exposed")
+    mass_kg: float = Field(
+        0.055, ge=0.0, le=2.0, description="of cameras and mast; it is added to the link's"
+    )
+    position_error_m: float = Field(
+        0.002, ge=0.0, le=0.1, description="standard deviation, along each axis, of a picture's "
+        "measured place"
+    )  # fmt: skip
+    angle_error_rad: float = Field(
+        0.005, ge=0.0, le=0.2, description="the same about each axis of its measured attitude"
+    )
+
+    @model_validator(mode="after")
+    def _disparities_fit_the_picture(self) -> Self:
+        if self.disparities > self.width_px // 2:
+            raise ValueError(
+                f"disparities: {self.disparities} of pictures {self.width_px} px wide; at most half"
+            )
+        return self
+
+
+class MappingConfig(Strict):
+    """How a run maps the ground by its robot's stereo head, and when it plans again."""
+
+    spacing_m: float = Field(0.04, gt=0.005, le=0.5, description="between the map's samples")
+    period_s: float = Field(0.7, gt=0.01, le=60.0, description="between two pictures")
+    latency_s: float = Field(
+        0.3, ge=0.0, le=10.0, description="from a picture to its ground in the map"
+    )
+    error_m: float = Field(
+        0.05, gt=0.001, le=0.5, description="expected error beyond which a point is left out"
+    )
+    far_m: float = Field(2.0, gt=0.1, le=20.0, description="points farther from the lens are, too")
+    replan_bodies: float = Field(
+        0.5, gt=0.05, le=10.0, description="body lengths of travel between two plans"
+    )

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple, Self, TypeVar
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Name, Strict
+from snakewalk.config.camera import StereoHeadConfig
 
 N = TypeVar("N", int, float)
 Baud = Literal[9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000]
@@ -362,6 +363,9 @@ class RobotConfig(Strict):
     )
     servo: ServoConfig = ServoConfig()
     imu: ImuConfig | None = Field(None, description="a table [imu]; default: there is none")
+    stereo_head: StereoHeadConfig | None = Field(
+        None, description="a table [stereo_head]; default: there is none"
+    )
     ports: tuple[PortConfig, ...] = Field(
         (),
         description="tables [[ports]], where segments of the chain are on adapters of their own, "
@@ -461,6 +465,14 @@ class RobotConfig(Strict):
             raise ValueError(f"imu: link {self.imu.link} of {self.link_count}: 0 is the head")
         if self.imu is not None and self.imu.id in self.servo_ids:
             raise ValueError(f"imu: id {self.imu.id} is a joint's")
+        return self
+
+    @model_validator(mode="after")
+    def _stereo_head_is_on_the_spine(self) -> Self:
+        if self.stereo_head is not None and self.stereo_head.link >= self.link_count:
+            raise ValueError(
+                f"stereo_head: link {self.stereo_head.link} of {self.link_count}: 0 is the head"
+            )
         return self
 
     @model_validator(mode="after")
@@ -630,8 +642,13 @@ class RobotConfig(Strict):
 
     @property
     def link_masses_kg(self) -> tuple[float, ...]:
-        """Mass of each link of the spine, head first."""
-        return self._of_links("mass_kg", self.link_mass_kg)
+        """Mass of each link of the spine, head first, with what stands on it."""
+        masses_kg = self._of_links("mass_kg", self.link_mass_kg)
+        if self.stereo_head is None:
+            return masses_kg
+        at = self.stereo_head.link
+        loaded_kg = masses_kg[at] + self.stereo_head.mass_kg
+        return (*masses_kg[:at], loaded_kg, *masses_kg[at + 1 :])
 
     @property
     def link_radii_m(self) -> tuple[float, ...]:

@@ -6,7 +6,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Name, Strict
-from snakewalk.config.camera import CameraConfig, PoseName
+from snakewalk.config.camera import CameraConfig, MappingConfig, PoseName
 from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.gait import GaitConfig
 from snakewalk.config.playback import PlaybackConfig, RepertoireConfig
@@ -215,6 +215,11 @@ class RunConfig(Strict):
         "or the joints",
     )
     camera: CameraConfig = CameraConfig()
+    mapping: MappingConfig | None = Field(
+        None,
+        description="a table [mapping]: the ground is not known before the run, the robot's stereo "
+        "head maps it on the way; default: the walk knows the world's ground",
+    )
     synthesis: SynthesisConfig = SynthesisConfig()
 
     @model_validator(mode="after")

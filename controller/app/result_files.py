@@ -14,7 +14,9 @@ LOG: Final = "log.mcap"
 FILM: Final = "film.mp4"
 REPORT: Final = "report.html"
 SUMMARY: Final = "summary.json"
-RUN_FILES: Final = (LOG, f"{LOG}.part", FILM, REPORT, SUMMARY)
+MAP: Final = "map.npz"
+"""Of a run that maps its ground; a world of kind ``map`` takes it."""
+RUN_FILES: Final = (LOG, f"{LOG}.part", FILM, REPORT, SUMMARY, MAP)
 """What a run leaves in its folder, which holds the files of one run only."""
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 

@@ -159,7 +159,7 @@ class ElevationMap:
         z_m = self.z_m if known.all() else filled(self.z_m, ~known)
         trusted = known
         if fill_m > 0.0:
-            trusted = known | ~_opened(~known, 0.5 * fill_m / self.spacing_m)
+            trusted = known | ~opened(~known, 0.5 * fill_m / self.spacing_m)
         return HeightField(z_m - z_m.min(), self.spacing_m, self.x0_m, self.y0_m, trusted)
 
 
@@ -207,7 +207,7 @@ def filled(z_m: Floats, holes: Bools) -> Floats:
     return whole
 
 
-def _opened(holes: Bools, radius: float) -> Bools:
+def opened(holes: Bools, radius: float) -> Bools:
     """Keep the parts of holes (rows, columns) that a disc of a radius, in samples, fits into.
 
     Beyond the border everything is a hole.

@@ -93,22 +93,15 @@ def stereo_ground(
         InputError: no ground is found, or nothing is near enough for the error.
 
     """
-    least = max(0, int(np.floor(-pair.offset_px)))
-    disparity = np.where(pair.seen, match(pair.left, pair.right, count, least), np.nan)
-    points = pair.points_m(disparity)
-    distance = np.linalg.norm(points, axis=-1)
-    with np.errstate(invalid="ignore"):
-        expected_m = distance * DISPARITY_ERROR_PX / (disparity + pair.offset_px)
-        good = expected_m <= error_m
-    if good.sum() < 100:
+    disparity, used, expected_m = seen_points(pair, count, error_m)
+    if len(used) < 100:
         raise InputError(
-            f"stereo: {int(good.sum())} points are known to {error_m:g} m: nothing in the pictures "
+            f"stereo: {len(used)} points are known to {error_m:g} m: nothing in the pictures "
             "is matched, or all is too far; look at the pictures, --disparities and --error"
         )
-    used = points[good]
     fitted = stand is None
     if stand is None:
-        stand = fit_ground(used, expected_m[good])
+        stand = fit_ground(used, expected_m)
     world = used @ stand.world_from_camera().T
     world[:, 2] += stand.height_m
     world = world[world[:, 0] <= far_m]
@@ -122,6 +115,26 @@ def stereo_ground(
         float(np.isfinite(disparity).sum()) / seen,
         len(world) / seen,
     )
+
+
+def seen_points(pair: RectifiedPair, count: int, error_m: float) -> tuple[Floats, Floats, Floats]:
+    """What a pair shows: disparities (H, W), points (n, 3), and the expected error of each (n,).
+
+    Args:
+        pair: rectified pictures.
+        count: disparities that are tried, from that of a point at infinity on.
+        error_m: a point is left out if its expected error, ``distance * DISPARITY_ERROR_PX /
+            disparity``, is more.
+
+    """
+    least = max(0, int(np.floor(-pair.offset_px)))
+    disparity = np.where(pair.seen, match(pair.left, pair.right, count, least), np.nan)
+    points = pair.points_m(disparity)
+    distance = np.linalg.norm(points, axis=-1)
+    with np.errstate(invalid="ignore"):
+        expected_m = distance * DISPARITY_ERROR_PX / (disparity + pair.offset_px)
+        good = expected_m <= error_m
+    return disparity, points[good], expected_m[good]
 
 
 def fit_ground(points_m: Floats, error_m: Floats) -> CameraStand:

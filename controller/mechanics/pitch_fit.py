@@ -52,6 +52,10 @@ class PitchFitter:
         behind = np.arange(robot.joint_count + 1)[:, None] > self._pitch
         self._behind = behind.astype(float)
 
+    def change_ground(self, ground: HeightField) -> None:
+        """Fit to another ground from now on."""
+        self._step = GroundStep(ground)
+
     def __call__(self, head_in_world_m: ArrayLike, heading_rad: Floats) -> PitchFit:
         """Fit the chain to the ground under it.
 

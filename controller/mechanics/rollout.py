@@ -103,8 +103,7 @@ class Rollout:
         ground: HeightField | None,
         points: int,
     ) -> None:
-        field = ground or HeightField(np.zeros((2, 2)), 1.0, 0.0, 0.0)
-        self._field = np.ascontiguousarray(field.z_m), field.x0_m, field.y0_m, field.spacing_m
+        self.change_ground(ground or HeightField(np.zeros((2, 2)), 1.0, 0.0, 0.0))
         retarget = Retarget(robot, points)
         shares = half_lengths_m(robot), link_weights(robot)
         self._links = (*shares, retarget.edges, retarget.group_of_link)
@@ -117,6 +116,10 @@ class Rollout:
                 robot.joint_speed_limit_rad_s,
             ]
         )
+
+    def change_ground(self, ground: HeightField) -> None:
+        """Roll out on another ground from now on."""
+        self._field = np.ascontiguousarray(ground.z_m), ground.x0_m, ground.y0_m, ground.spacing_m
 
     def begin(
         self,

@@ -207,13 +207,16 @@ class Drive:
 
     def _steer(self, period_s: float, view: BodyView) -> Floats:
         path, log, now_s = self._path, self._log, self._clock.now_s()
-        reached = path.reached
+        reached, missed = path.reached, path.missed
         goal = self._motion.step(period_s, view)
         if path.reached > reached:
             log.event(now_s, "waypoint", f"waypoint {path.reached} reached")
         if path.replanned is not None:
             text = f"{path.replanned}: another path to waypoint {path.reached + 1}"
-            log.event(now_s, "missed", text, "warning")
+            if path.missed > missed:
+                log.event(now_s, "missed", text, "warning")
+            else:
+                log.event(now_s, "replanned", text)
             log.path_replanned(now_s, path.path_m(60))
         d = path.decision
         if d is not None:

@@ -18,7 +18,7 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 EDGE_TOLERANCE_M = 1e-9
 """By which a point may lie beyond the margin and count as on it."""
 _UNKNOWN_RISK = 1e9
-"""Of samples beside which something was not measured; finite, as it is interpolated."""
+"""Of samples beside which something was not measured: never safe; finite, as it is interpolated."""
 
 
 class Relief:
@@ -27,7 +27,10 @@ class Relief:
     Both are exact on the field's samples, up to its border, and bilinear between them.
     """
 
-    def __init__(self, ground: HeightField, config: PlannerConfig) -> None:
+    def __init__(
+        self, ground: HeightField, config: PlannerConfig, *, unknown_risk: float = _UNKNOWN_RISK
+    ) -> None:
+        """Take samples beside which something was not measured for as risky as told; 0 is free."""
         self.ground = ground
         self.config = config
         self._variance = elevation_variance_m2(ground, config.variance_window_m)
@@ -41,7 +44,7 @@ class Relief:
             # A slope is known if its whole window is: what is filled in proves nothing.
             _, _, disc = _disc(ground, config.slope_window_m)
             self._unknown[binary_dilation(~ground.known, disc > 0.0)] = 1.0
-        self._risk = np.where(self._unknown > 0.0, _UNKNOWN_RISK, self._risk)
+        self._risk = np.where(self._unknown > 0.0, unknown_risk, self._risk)
 
     @property
     def layers(self) -> Floats:

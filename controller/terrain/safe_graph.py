@@ -53,6 +53,8 @@ class SafeGraph:
         index = np.where(safe, np.cumsum(safe).reshape(safe.shape) - 1, -1)
         self.nodes_m = np.stack([xx[safe], yy[safe]], axis=-1)
         """(n, 2) safe nodes."""
+        self.place = np.flatnonzero(safe)
+        """(n,) number of each node in the grid of all nodes, which graphs of one area share."""
         self.safe_share = float(safe.mean()) if safe.size else 0.0
         """Safe nodes over all nodes inside the margin."""
         self._avoid_m = np.empty((0, 2))
@@ -94,7 +96,28 @@ class SafeGraph:
 
     def can_reach(self, target: int) -> Bools:
         """(n,) nodes from which ``target`` can be reached."""
-        return np.isfinite(self._tree(target)[0])
+        return np.isfinite(self.costs_to(target))
+
+    def costs_to(self, target: int) -> Floats:
+        """(n,) cost of the cheapest path to ``target``; infinite where there is none."""
+        return self._tree(target)[0]
+
+    def costs_from(self, point_m: Floats, reach_m: float) -> Floats:
+        """(n,) cost of the cheapest path to each node from a point, safe or not.
+
+        It begins straight to a node within ``reach_m``, or to the nearest one.
+        """
+        gap = np.hypot(*(self.nodes_m - point_m).T)
+        first = np.flatnonzero(gap <= max(reach_m, float(gap.min(initial=np.inf))))
+        n = len(self.nodes_m)
+        edges = self._edges.tocoo()
+        weight = np.concatenate([edges.data, self.length_weight * gap[first]])
+        ends = (
+            np.concatenate([edges.col, np.full(len(first), n)]),
+            np.concatenate([edges.row, first]),
+        )
+        both = csr_array(coo_array((weight, ends), shape=(n + 1, n + 1)))
+        return np.asarray(dijkstra(both, directed=True, indices=[n]))[0, :n]
 
     def cheapest_path(self, start: int, target: int) -> Floats | None:
         """(m, 2) nodes of the cheapest path, both ends included; None if there is none."""

@@ -8,12 +8,14 @@ the places where it stood still.
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.terrain.path import SplinePath
 
 _OFF_PATH_BODIES = 0.5
@@ -22,6 +24,12 @@ _REPLAN_AFTER_BODIES = 2.0
 # A body that gains less than this on its path over so much travel stands still.
 _STALL_BODIES = 0.25
 _STALL_AFTER_BODIES = 5.0
+_KEPT_M = 0.3
+"""Of the path before the head that stays when the rest is renewed: the body is on it by then."""
+_BEND_RAD = 0.8
+"""By which a renewed path may bend where it goes on (ours)."""
+_BEYOND = 1.5
+"""Metres of path for a straight metre that none leads along yet (ours)."""
 
 
 class PathPlanner(Protocol):
@@ -49,6 +57,17 @@ def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -
         step = carrot - before
         carrot = carrot + step / max(float(np.hypot(*step)), 1e-9) * (at - path.length_m)
     return float(np.arctan2(carrot[1] - from_m[1], carrot[0] - from_m[0]))
+
+
+@dataclass(frozen=True, slots=True)
+class _Onward:
+    """A path that goes on otherwise than before."""
+
+    path: SplinePath
+    passed_m: list[float]
+    """Arc lengths at the waypoints."""
+    length_m: float
+    """Its own, and what is left from its end to the last waypoint, straight but weighted."""
 
 
 class OnCourse:
@@ -138,6 +157,10 @@ class Course:
         """How often another path was laid to a waypoint."""
         self.replanned: str | None = None
         """Why another path was laid in the last step, if one was."""
+        self.path: SplinePath
+        """In force."""
+        self._passed_m: list[float]
+        """Arc lengths at which it passes the waypoints; infinite where it does not lead to one."""
         self._lay(np.asarray(start_m, float), None)
 
     @property
@@ -148,7 +171,12 @@ class Course:
     def ahead_m(self, reach_m: float) -> Floats:
         """(2,) the next waypoint, or a point of the path before it, ``reach_m`` ahead."""
         at = min(float(self._along_m[0]) + reach_m, self._passed_m[self.reached])
-        return np.asarray(self.path.position(at))
+        return np.asarray(self.path.position(at))  # its end, where it leads to no waypoint yet
+
+    @property
+    def leads_on(self) -> bool:
+        """Whether the path leads to every waypoint that is left."""
+        return not math.isinf(self._passed_m[-1])
 
     @property
     def astray(self) -> bool:
@@ -226,6 +254,68 @@ class Course:
             with suppress(InputError):  # no safe path leads back from here: the old one stays
                 self._lay(self._followers_m[1].copy(), heading_rad())
 
+    def renew(
+        self,
+        why: str,
+        is_clear: Callable[[Floats], bool],
+        heading_rad: Callable[[], float],
+    ) -> None:
+        """Plan again what lies beyond the next piece of the path, as more of the ground is known.
+
+        A piece that is not clear any more is left at once: then the path begins at the head, in the
+        body's direction. Where no path is found, the old one stays.
+
+        Args:
+            why: for ``replanned``.
+            is_clear: of points (n, 2).
+            heading_rad: of the body.
+
+        """
+        path, along_m = self.path, float(self._along_m[1])
+        join_m = min(along_m + _KEPT_M, path.length_m)
+        if self._passed_m[-1] <= join_m:
+            return
+        if self._gap_m[1] > _KEPT_M or not is_clear(path.piece_m(along_m, join_m)):
+            with suppress(InputError):
+                self._lay(self._followers_m[1].copy(), heading_rad())
+                self.replanned = why
+            return
+        found: list[_Onward] = []
+        for at_m in dict.fromkeys((join_m, max(join_m, path.length_m - _KEPT_M))):
+            if is_clear(path.piece_m(join_m, at_m)):
+                with suppress(InputError):
+                    found.append(self._onward(at_m))
+        best = min(found, key=lambda each: each.length_m, default=None)
+        if best is not None and best.path is not path:
+            self.path, self._passed_m, self.replanned = best.path, best.passed_m, why
+
+    def _onward(self, join_m: float) -> "_Onward":
+        """Keep the path up to ``join_m``, and plan from there.
+
+        It goes on in its direction, unless it ends there and bends little.
+
+        Raises:
+            InputError: as the planner.
+
+        """
+        path = self.path
+        behind = [at for at in self._passed_m if at <= join_m]
+        left_m, kept_m = self.waypoints_m[len(behind) :], path.piece_m(0.0, join_m)
+        if not len(left_m):
+            return _Onward(path, self._passed_m, path.length_m)
+        points_m = np.vstack([kept_m[-1], left_m])
+        avoid_m = np.array(self._stalls_m).reshape(-1, 2)
+        heading = path.heading_rad(max(join_m - 0.05, 0.0))
+        more = self._plan(points_m, None, avoid_m=avoid_m)
+        if abs(wrap(more.heading_rad(0.05) - heading)) > _BEND_RAD:
+            more = self._plan(points_m, heading, avoid_m=avoid_m)
+        more_m = more.piece_m(0.0, more.length_m)
+        passes = [at + join_m for at in self._passes(more, left_m)]
+        gaps_m = [more_m[-1], *left_m[np.isinf(passes)]]
+        beyond_m = float(np.hypot(*np.diff(gaps_m, axis=0).T).sum())
+        whole = SplinePath.tabulated(np.vstack([kept_m, more_m[1:]]))
+        return _Onward(whole, [*behind, *passes], whole.length_m + _BEYOND * beyond_m)
+
     def _failing(self, centre_m: Floats) -> str | None:
         """Why the path in force is none any more; None while it is."""
         if self._is_stalled:
@@ -265,4 +355,15 @@ class Course:
         self._gained_m, self._gained_at = 0.0, self._travel
         self._along_m[:] = 0.0
         left_m = self.waypoints_m[self.reached :]
-        self._passed_m = [0.0] * self.reached + self.path.passes(left_m)
+        self._passed_m = [0.0] * self.reached + self._passes(self.path, left_m)
+
+    def _passes(self, path: SplinePath, waypoints_m: Floats) -> list[float]:
+        """Arc lengths of a path at waypoints (k, 2), infinite from the first that it leads not to.
+
+        A path on a map that does not reach a waypoint yet ends before it.
+        """
+        passes, on = path.passes(waypoints_m), True
+        for k, (waypoint, at) in enumerate(zip(waypoints_m, passes, strict=True)):
+            on = on and float(np.hypot(*(path.position(at) - waypoint))) <= self._radius_m
+            passes[k] = at if on else math.inf
+        return passes

@@ -208,9 +208,13 @@ def _link(robot: RobotConfig, index: int, *, balls: bool) -> str:
     length = robot.link_lengths_m[index]
     centre = f"{0.0 if index == 0 else -length / 2!r} 0 0"
     across = m * (3 * r**2 + length**2) / 12
+    mast = 0.0  # its mass is in the link's; here is what its height adds to the inertia
+    if robot.stereo_head is not None and robot.stereo_head.link == index:
+        mast = robot.stereo_head.mass_kg * robot.stereo_head.height_m**2
+    about = " ".join(repr(each) for each in (m * r**2 / 2 + mast, across + mast, across))
     return (
-        f'<inertial pos="{centre}" mass="{m!r}" diaginertia="{m * r**2 / 2!r} {across!r} '
-        f'{across!r}"/>{_belly(robot, index, balls)}'
+        f'<inertial pos="{centre}" mass="{m!r}" diaginertia="{about}"/>'
+        f"{_belly(robot, index, balls)}"
     )
 
 

@@ -278,6 +278,7 @@ def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
         ends = (0.0, 0.0, low, -lengths_m[i], 0.0, low)
         _add(body, _CAPSULE, (thick, 0, 0), (), BACK[i % 2], ends)
     _legs(spec, robot)
+    _mast(spec, robot)
     head = spec.body("link0")
     r, half = radii_m[0], lengths_m[0] / 2
     _add(head, _ELLIPSOID, (half * 1.25, r * 1.02, r * 0.78), (half * 0.2, 0, -0.2 * r), HEAD)
@@ -298,6 +299,18 @@ def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
         TONGUE,
         (half * 1.3, 0, -0.35 * r, half * 1.9, 0, -0.35 * r),
     )
+
+
+def _mast(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
+    """A rod with a bar across; the lenses are at the bar's front."""
+    config = robot.stereo_head
+    if config is None:
+        return
+    body = spec.body(f"link{config.link}")
+    middle = 0.0 if config.link == 0 else -0.5 * robot.link_lengths_m[config.link]
+    back, top, half = middle - 0.012, config.height_m, 0.5 * config.baseline_m + 0.008
+    _add(body, _CAPSULE, (0.004, 0, 0), (), PUPIL, (back, 0, 0, back, 0, top))
+    _add(body, _CAPSULE, (0.010, 0, 0), (), PUPIL, (back, -half, top, back, half, top))
 
 
 def _legs(spec: mujoco.MjSpec, robot: RobotConfig) -> None:

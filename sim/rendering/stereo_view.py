@@ -1,6 +1,8 @@
 """The view of a pair of cameras over a world: what a stereo head takes of its ground."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -22,8 +24,31 @@ _CONTRAST = 34.0
 """Standard deviation of the ground's grey levels, of 255 (ours)."""
 
 
+@dataclass(frozen=True, slots=True)
+class CameraFrame:
+    """Where a camera is and looks."""
+
+    at_m: Floats
+    """(3,) its lens."""
+    axes: Floats
+    """(3, 3) columns: right, down and forward in the world."""
+
+
+def tilted(tilt_rad: float, carrier: Floats) -> Floats:
+    """(3, 3) axes of a camera, right, down and forward, that looks ahead and down by an angle.
+
+    ``carrier`` are the axes (3, 3) of what carries it: columns forward, left and up.
+    """
+    c, s = math.cos(tilt_rad), math.sin(tilt_rad)
+    return np.asarray(carrier @ [[0.0, -s, c], [-1.0, 0.0, 0.0], [0.0, -c, -s]])
+
+
+def _level(c: float, s: float) -> Floats:
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
 class StereoView:
-    """Draws a hilly world, with grain on it and without the robot, from two places; ``close`` it.
+    """Draws a hilly world, with grain on it, from two places; ``close`` it.
 
     Raises:
         OffscreenError: nothing here draws without a screen.
@@ -62,7 +87,7 @@ class StereoView:
     def pictures(
         self, at_m: tuple[float, float, float], heading_rad: float, tilt_rad: float
     ) -> tuple[Image, Image]:
-        """(H, W, 3) left and right pictures, with the sensors' noise.
+        """(H, W, 3) left and right pictures, with the sensors' noise, without the robot.
 
         Args:
             at_m: of the left camera.
@@ -70,19 +95,34 @@ class StereoView:
             tilt_rad: of its axis, downwards.
 
         """
+        c, s = math.cos(heading_rad), math.sin(heading_rad)
+        return self.taken([CameraFrame(np.array(at_m), tilted(tilt_rad, _level(c, s)))])
+
+    def taken(
+        self, frames: Sequence[CameraFrame], qpos: Floats | None = None
+    ) -> tuple[Image, Image]:
+        """(H, W, 3) left and right pictures of a left camera that moves while it exposes.
+
+        Args:
+            frames: where it is, one instant after the other: the picture is their mean.
+            qpos: (7 + J,) of the robot, which is in the picture then.
+
+        """
         option = mujoco.MjvOption()
-        option.geomgroup[1] = 0  # the robot's skin
+        option.geomgroup[1] = int(qpos is not None)  # the robot's skin
+        if qpos is not None:
+            self._data.qpos[:] = qpos
         mujoco.mj_forward(self._model, self._data)
         everything = mujoco.mjtCatBit.mjCAT_ALL
         view = mujoco.MjvCamera()
         mujoco.mjv_updateScene(self._model, self._data, option, None, view, everything, self._scene)
-        c, s = math.cos(heading_rad), math.sin(heading_rad)
-        right = np.array([s, -c, 0.0])
         taken = []
         for shift_m in (0.0, self._baseline_m):
-            self._look(np.array(at_m) + shift_m * right, np.array([c, s, 0.0]), tilt_rad)
-            drawn = self._screen.draw(self._scene)
-            noisy = drawn + self._random.normal(0.0, NOISE, drawn.shape)
+            drawn = np.zeros((*self._size[::-1], 3))
+            for frame in frames:
+                self._look(frame.at_m + shift_m * frame.axes[:, 0], frame.axes)
+                drawn += self._screen.draw(self._scene)
+            noisy = drawn / len(frames) + self._random.normal(0.0, NOISE, drawn.shape)
             taken.append(np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
         return taken[0], taken[1]
 
@@ -90,14 +130,11 @@ class StereoView:
         """Free the frame buffer."""
         self._screen.close()
 
-    def _look(self, at_m: Floats, ahead: Floats, tilt_rad: float) -> None:
-        up = np.array([0.0, 0.0, 1.0])
+    def _look(self, at_m: Floats, axes: Floats) -> None:
         wide, tall = self._size
         scale = _NEAR_M / self._focal_px
         for camera in self._scene.camera:
-            camera.pos = at_m
-            camera.forward = math.cos(tilt_rad) * ahead - math.sin(tilt_rad) * up
-            camera.up = math.sin(tilt_rad) * ahead + math.cos(tilt_rad) * up
+            camera.pos, camera.forward, camera.up = at_m, axes[:, 2], -axes[:, 1]
             camera.frustum_center, camera.frustum_width = 0.0, 0.5 * wide * scale
             camera.frustum_bottom, camera.frustum_top = -0.5 * tall * scale, 0.5 * tall * scale
             camera.frustum_near, camera.frustum_far = _NEAR_M, _FAR_M

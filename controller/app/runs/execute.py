@@ -22,6 +22,7 @@ from snakewalk.controller.app.runs.backend import (
     simulated,
     split,
 )
+from snakewalk.controller.app.runs.map_provider import MapProvider, map_faults, map_provider
 from snakewalk.controller.app.runs.pose_provider import PoseProvider, pose_faults, pose_provider
 from snakewalk.controller.app.runs.prepared_run import PreparedRun, pose_with
 from snakewalk.controller.app.shadow.diagnosis import check_level
@@ -55,6 +56,8 @@ class Finished:
     summary: RunSummary
     pose: PoseProvider
     """What measured the pose, and how well where this is known."""
+    map: MapProvider
+    """What mapped the ground on the way, and how well, where something did."""
     source: MotionSource
     """The motion that ran, at its end."""
 
@@ -145,7 +148,10 @@ def execute(
             on_event(kind, text)
 
         shown = {} if view is None else {"on_picture": view.on_picture}
-        with pose_provider(prepared, backend, log_event, **shown) as pose:
+        with (
+            pose_provider(prepared, backend, log_event, **shown) as pose,
+            map_provider(prepared, backend, pose.measure, folder, log_event) as mapped,
+        ):
             source = prepared.make_source(log_event)
             link = SafeLink(
                 backend.chain,
@@ -158,7 +164,7 @@ def execute(
             drive = Drive(
                 link=link,
                 clock=clock,
-                pose=pose.measure,
+                pose=mapped.measure,
                 motion=source,
                 log=log,
                 robot=prepared.robot,
@@ -179,7 +185,7 @@ def execute(
                     beside.end(clock.now_s())
     LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
     record, numbers = _read_back(log_path)
-    return Finished(outcome, log_path, record, numbers, pose, source)
+    return Finished(outcome, log_path, record, numbers, pose, mapped, source)
 
 
 @contextmanager
@@ -211,6 +217,7 @@ def _read_back(log: Path) -> tuple[RunRecord, RunSummary]:
 def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:
     """Refuse what no plan shows: a pose that nothing measures, compliance, a shadow's ground."""
     pose_faults(prepared.run, prepared.robot, prepared.world, metal=metal)
+    map_faults(prepared, metal=metal)
     check_compliance(prepared.run, prepared.robot)
     if shadow:
         require_extra("a shadow needs", "mujoco")

@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+from snakewalk.config.camera import MappingConfig
 from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.gait import GaitSetConfig
@@ -319,6 +320,21 @@ def with_compliance(run: RunConfig, on: bool | None) -> RunConfig:
         return run
     table = (run.compliance or ComplianceConfig()) if on else None
     return run.model_copy(update={"compliance": table})
+
+
+def with_map(run: RunConfig, source: str | None) -> RunConfig:
+    """Let the walk know the ground of its world, or map it as it goes; None: as the run says.
+
+    Raises:
+        InputError: the source is neither ``world`` nor ``stereo``.
+
+    """
+    if source not in (None, "world", "stereo"):
+        raise InputError(f"--map {source}: the walk knows its ground from: world, stereo")
+    if source is None:
+        return run
+    table = (run.mapping or MappingConfig()) if source == "stereo" else None
+    return run.model_copy(update={"mapping": table})
 
 
 def prepare_playback(

@@ -95,6 +95,11 @@ class GroundedRun:
         """The world's height field; None on a flat floor."""
         return build_ground(self.world)
 
+    @property
+    def ground_ahead(self) -> HeightField | None:
+        """The ground as far as the run may know it before it begins: nothing, where it maps it."""
+        return None if self.run.mapping is not None else self.ground
+
 
 @dataclass(frozen=True)
 class PathlessRun(GroundedRun):
@@ -118,7 +123,7 @@ class PathRun(GroundedRun):
     @cached_property
     def planner(self) -> TerrainPlanner:
         """Plans paths over safe ground."""
-        return TerrainPlanner(self.ground, self.world.planner)
+        return TerrainPlanner(self.ground_ahead, self.world.planner)
 
     @cached_property
     def path(self) -> SplinePath:

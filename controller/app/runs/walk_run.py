@@ -13,6 +13,7 @@ from snakewalk.controller.app.runs.prepared_run import PathRun, pose_with
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.kinematics.roll_compensation import RollCompensation
+from snakewalk.controller.mapping.growing_map import GrowingMap
 from snakewalk.controller.mechanics.ground_step import bridged
 from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.controller.mechanics.rollout import Rollout
@@ -22,8 +23,10 @@ from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.runtime.forecast import Forecast, forecast, margin_faults
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
-from snakewalk.controller.walk.course import Course
+from snakewalk.controller.terrain.map_planner import MapPlanner
+from snakewalk.controller.walk.course import Course, PathPlanner
 from snakewalk.controller.walk.joint_track import JointTrack
+from snakewalk.controller.walk.map_walk import MapWalk
 from snakewalk.controller.walk.pilot import Aimed, Pilot, ShapeChooser
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker
 from snakewalk.controller.walk.serpenoid import Serpenoid
@@ -49,9 +52,17 @@ class WalkRun(PathRun):
     @cached_property
     def bridged(self) -> HeightField | None:
         """The ground as far as a chain of stiff links can follow it."""
-        if self.ground is None:
+        return None if self.ground_ahead is None else self._bridged(self.ground_ahead)
+
+    def _bridged(self, ground: HeightField) -> HeightField:
+        return bridged(ground, _BRIDGED_LINKS * self.robot.mean_link_length_m)
+
+    @cached_property
+    def ground_map(self) -> GrowingMap | None:
+        """The map that a run over unknown ground makes; each run begins with an empty one."""
+        if self.run.mapping is None or self.ground is None:
             return None
-        return bridged(self.ground, _BRIDGED_LINKS * self.robot.mean_link_length_m)
+        return GrowingMap.over(self.ground, self.run.mapping.spacing_m)
 
     @cached_property
     def retarget(self) -> Retarget:
@@ -117,7 +128,14 @@ class WalkRun(PathRun):
         """
         return self._pilot(self._chooser(), level=level)
 
-    def _pilot(self, chooser: ShapeChooser, *, level: bool = False) -> Pilot:
+    def _pilot(
+        self,
+        chooser: ShapeChooser,
+        *,
+        level: bool = False,
+        planner: PathPlanner | None = None,
+        fitter: PitchFitter | None = None,
+    ) -> Pilot:
         run, robot = self.run, self.robot
         time_law = TimeLaw(
             JointTrack(chooser.track, self.retarget.joints_rad, robot.limit_rad),
@@ -130,7 +148,7 @@ class WalkRun(PathRun):
             time_law,
             pace=Pace.limit(robot),
             course=Course(
-                self.planner,
+                planner or self.planner,
                 run.waypoints_m,
                 start_m=np.array(run.start_m),
                 radius_m=run.waypoint_radius_m,
@@ -139,7 +157,7 @@ class WalkRun(PathRun):
                 travel=time_law.head,
                 feedback=run.motion != "walk-blind",
             ),
-            pitch_fitter=None if level or self.ground is None else self.pitch_fitter,
+            pitch_fitter=None if level or self.ground is None else fitter or self.pitch_fitter,
             pitch_lead_s=robot.servo.pitch_lead_s,
             roll=None if level or not robot.pitch_joints else RollCompensation(robot),
             fall_back=(
@@ -166,7 +184,7 @@ class WalkRun(PathRun):
             self.world.friction,
             start_m=np.array(self.run.start_m),
             heading_rad=self.start_heading_rad,
-            ground=self.ground,
+            ground=self.ground_ahead,
             limit_s=self.run.time_limit_s,
         )
         faults = margin_faults(plan, self.robot)
@@ -194,6 +212,8 @@ class WalkRun(PathRun):
         """Return a fresh pilot; it warns where the recording has no part in the walk."""
         for line in self.warnings:
             on_event("shapes", line)
+        if self.ground_map is not None:
+            return self._map_walk(self.ground_map)
         chooser = self._chooser()
         pilot = self._pilot(chooser)
         if not isinstance(chooser, PredictiveWalker) or self.bridged is None or not self._rolls:
@@ -213,11 +233,43 @@ class WalkRun(PathRun):
             on_event=on_event,
         )
 
+    def _map_walk(self, ground_map: GrowingMap) -> MapWalk:
+        """A walk on the map as it is, and as it grows."""
+        planner = MapPlanner(self.world.planner)
+        ground = ground_map.height_field()
+        rollout = self._rollout()
+        if ground is not None:
+            planner.update(ground)
+        fitter = PitchFitter(self.robot, None, self.run.walk.pitch.fit_gain)
+        pilot = self._pilot(self._chooser(rollout), planner=planner, fitter=fitter)
+
+        def change_ground(ground: HeightField) -> None:
+            smooth = self._bridged(ground)
+            rollout.change_ground(smooth)
+            fitter.change_ground(smooth)
+
+        if ground is not None:
+            change_ground(ground)
+        assert self.run.mapping is not None
+        return MapWalk(
+            pilot,
+            ground_map,
+            planner,
+            change_ground=change_ground,
+            replan_m=self.run.mapping.replan_bodies * self.robot.length_m,
+        )
+
+    def _rollout(self) -> Rollout:
+        return Rollout(self.robot, self.world.friction, self.bridged, POINTS)
+
     @property
     def _rolls(self) -> bool:
-        """Whether the body may roll sideways: it has to be round, on joints that carry it."""
+        """Whether the body may roll sideways: it has to be round, on joints that carry it.
+
+        A mast would lie under it.
+        """
         robot = self.robot
-        if not robot.pitch_joints or robot.belly.shape == "rails":
+        if not robot.pitch_joints or robot.belly.shape == "rails" or robot.stereo_head is not None:
             return False
         carried_a = min(robot.current_limits_a[joint] for joint in robot.pitch_joints)
         return self.run.walk.rolls and carried_a >= _ROLLING_A
@@ -265,16 +317,16 @@ class WalkRun(PathRun):
         order = np.random.default_rng(self.run.seed).permutation(len(library.shapes_rad))
         return np.asarray(library.shapes_rad[order])
 
-    def _chooser(self) -> ShapeChooser:
+    def _chooser(self, rollout: Rollout | None = None) -> ShapeChooser:
         if self.run.motion == "serpenoid":
             return Aimed(Serpenoid(POINTS))
         if self.run.motion != "walk":
             return Aimed(self.walker(self.library, self.shape_filters))
-        rollout = Rollout(self.robot, self.world.friction, self.bridged, POINTS)
+        predicts = rollout or self._rollout()
         return PredictiveWalker(
             self._shuffled(self.library),
             self.run.walk,
-            lambda track: Steering(rollout, track, self.pulse_segments_s),
+            lambda track: Steering(predicts, track, self.pulse_segments_s),
             len(self.robot.yaw_joints),
             passes_all({name: self.shape_filters[name] for name in MADE}),
         )

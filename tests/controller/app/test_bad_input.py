@@ -127,6 +127,8 @@ ROWS = [
     ("terrain from cells.csv -o w.txt", "w.txt: a world's file ends in .toml"),
     ("terrain from cells.csv -o one.toml", "one.toml: exists; --force overwrites it"),
     ("terrain from flat.npz -o w.toml", "holds no array named 'elevation', but z"),
+    ("run --map lidar", "--map lidar: the walk knows its ground from: world, stereo"),
+    ("run --map stereo", "robot alternating16 has no stereo head"),
     ("terrain from-stereo a.png b.png --calibration no.yml -o w.toml", "no.yml: No such file"),
     ("terrain from-stereo a.png b.png --calibration empty -o w.toml --unit inch", "--unit inch"),
     (

@@ -50,6 +50,15 @@ def run(
             autocompletion=completion.words("simulator", "camera", "imu", "joints"),
         ),
     ] = None,
+    map_: Annotated[
+        str | None,
+        typer.Option(
+            "--map",
+            help="what the walk knows of hilly ground: world (all of it), or stereo: what the "
+            "robot's stereo head has seen so far",
+            autocompletion=completion.words("world", "stereo"),
+        ),
+    ] = None,
     set_: Set = None,
     out: RunFolder = None,
     compliance: Compliant = None,
@@ -65,7 +74,11 @@ def run(
     from snakewalk.controller.app.progress import PathBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.recordings.body_look import check_look  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.app.runs.factory import prepare_job, with_compliance  # noqa: PLC0415
+    from snakewalk.controller.app.runs.factory import (  # noqa: PLC0415
+        prepare_job,
+        with_compliance,
+        with_map,
+    )
     from snakewalk.controller.app.view.live_view import open_view  # noqa: PLC0415
 
     check_look(look)
@@ -73,11 +86,13 @@ def run(
         run, keys=key_values("--set", set_), seed=seed, motion=motion, robot=robot, world=world,
         track=track, pose=pose,
     )  # fmt: skip
-    prepared = replace(prepared, run=with_compliance(prepared.run, compliance))
+    prepared = replace(prepared, run=with_map(with_compliance(prepared.run, compliance), map_))
     changed = [Path(each).stem for each in (robot, world, track) if each is not None]
     parts = [prepared.run.name, *changed, prepared.run.motion, f"seed{prepared.run.seed}"]
     if prepared.run.pose is not None:
         parts.append(f"pose-{prepared.run.pose}")
+    if prepared.run.mapping is not None:
+        parts.append("map-stereo")
     name = "-".join(parts)
     with (
         run_folder(name, out) as folder,
@@ -106,6 +121,7 @@ def run(
             "tripped": outcome.tripped,
             "advance_alarms": outcome.alarms,
             **finished.pose.facts(),
+            **finished.map.facts(),
             "log": str(finished.log),
             "summary": str(folder / "summary.json"),
             **artifacts.to_dict(),

@@ -1,0 +1,141 @@
+"""Paths on a map that grows: over known safe ground, as far as that leads towards the waypoints.
+
+A waypoint that the map does not reach yet is planned to as if what is unknown could be passed, at
+the price of ground beside what cannot be climbed. Of that plan the body is sent along the part that
+is known and safe. (The free-space assumption: A. Stentz, The focussed D* algorithm for real-time
+replanning, IJCAI 1995; here no step of it is taken for granted.)
+"""
+
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.world import PlannerConfig
+from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.terrain.planner import TerrainPlanner
+from snakewalk.controller.terrain.relief import Relief
+from snakewalk.controller.terrain.safe_graph import SafeGraph
+
+_REACH_M: Final = 0.6
+"""From the head to the first node (ours): a mast's cameras do not see the ground at its foot."""
+_LEAST_M: Final = 0.4
+"""Shortest path worth walking, where there is a longer one (ours)."""
+_WITHIN_M: Final = (np.inf, 1.2, 0.7)
+"""How far a path may lead, the nearer ones where no smooth one leads farther (ours)."""
+_SURELY_UNSAFE: Final = 1.15
+"""Risk of ground that is not passed any more: what was planned as safe may be found a little worse
+by the next picture."""
+_TIES: Final = 0.01
+_UNSEEN: Final = 1.5
+"""Metres of level path that a straight metre is taken for where no path is found at all."""
+
+
+class MapPlanner:
+    """Plans as ``TerrainPlanner`` does, on the map as it is now; before there is one, straight."""
+
+    def __init__(self, config: PlannerConfig) -> None:
+        self._config = config
+        self._on: _Knowledge | None = None
+
+    def update(self, ground: HeightField) -> None:
+        """Plan on this map from now on."""
+        self._on = _Knowledge(ground, self._config)
+
+    def __call__(
+        self, points_m: ArrayLike, heading_rad: float | None = None, *, avoid_m: ArrayLike = ()
+    ) -> SplinePath:
+        """Plan through (n, 2) points in order, or through the first of them and on.
+
+        Raises:
+            InputError: no safe ground is known.
+
+        """
+        points = np.asarray(points_m, float)
+        if self._on is None:
+            return TerrainPlanner(None, self._config)(points, heading_rad, avoid_m=avoid_m)
+        faults: tuple[str, ...] = ()
+        for within_m in _WITHIN_M:
+            corners = self._on.corners(points, within_m)
+            try:
+                return self._on.cautious(corners, heading_rad, avoid_m=avoid_m)
+            except InputError as error:  # no smooth way: not so far
+                faults = error.faults
+        raise InputError(faults)
+
+    def clear(self, points_m: Floats) -> bool:
+        """Whether nothing that is known of points (n, 2) forbids them."""
+        return self._on is None or bool(
+            (self._on.open_relief.risk(*points_m.T) <= _SURELY_UNSAFE).all()
+        )
+
+    def safe(self, point_m: Floats) -> bool:
+        """Whether a point (2,) is known, and safe."""
+        if self._on is None or self._on.cautious.relief is None:
+            return False
+        return bool(self._on.cautious.relief.safe(*point_m))
+
+
+class _Knowledge:
+    """A map, and what is built on it when it is first asked for."""
+
+    def __init__(self, ground: HeightField, config: PlannerConfig) -> None:
+        self._ground, self._config = ground, config
+
+    @cached_property
+    def cautious(self) -> TerrainPlanner:
+        """Takes nothing unknown for safe."""
+        return TerrainPlanner(self._ground, self._config)
+
+    @cached_property
+    def open_relief(self) -> Relief:
+        """Takes what is unknown for passable."""
+        return Relief(self._ground, self._config, unknown_risk=0.0)
+
+    @cached_property
+    def _open_graph(self) -> SafeGraph:
+        return SafeGraph(self.open_relief)
+
+    def corners(self, points: Floats, within_m: float) -> Floats:
+        """(k, 2) the points, as far as known safe ground joins them, then the farthest on it.
+
+        Args:
+            points: (n, 2) the first is where the head is.
+            within_m: from the head; what is farther off is not known.
+
+        """
+        graph, relief = self.cautious.graph, self.cautious.relief
+        if graph is None or relief is None or not len(graph.nodes_m):
+            return points  # the planner has the words for it
+        near = np.hypot(*(graph.nodes_m - points[0]).T) <= within_m
+        found, reach_m = [points[0]], _REACH_M
+        for point in points[1:]:
+            costs = np.where(near, graph.costs_from(found[-1], reach_m), np.inf)
+            node = graph.nearest(point)
+            if node is None or not np.isfinite(costs[node]) or not relief.safe(*point):
+                if np.isfinite(costs).any():
+                    found.append(self._farthest(graph, costs, found[-1], point))
+                break
+            found.append(point)
+            reach_m = 0.0
+        return np.array(found) if len(found) > 1 else points
+
+    def _farthest(self, graph: SafeGraph, costs: Floats, start: Floats, goal: Floats) -> Floats:
+        """(2,) node at which the best way to a goal leaves what is known and safe."""
+        to_go = _UNSEEN * graph.length_weight * np.hypot(*(graph.nodes_m - goal).T)
+        target = self._open_graph.nearest(goal)
+        if target is not None:
+            at = np.searchsorted(self._open_graph.place, graph.place)
+            open_to_go = self._open_graph.costs_to(target)[at]
+            if (np.isfinite(costs) & np.isfinite(open_to_go)).any():
+                to_go = open_to_go
+        # Along the best way all sums are equal: the farthest of its nodes counts.
+        whole = (1.0 - _TIES) * costs + to_go
+        far = np.hypot(*(graph.nodes_m - start).T) >= _LEAST_M
+        if np.isfinite(whole[far]).any():
+            whole = np.where(far, whole, np.inf)
+        return np.asarray(graph.nodes_m[int(np.argmin(whole))])

@@ -1,0 +1,107 @@
+"""A walk over ground that it gets to know on its way, from a map that grows.
+
+All that the walk does by the ground - its path, its predictions, the pitch that fits it to what is
+under it - is done by the map; what the map does not know is taken as it is filled in there, and no
+path leads over it.
+"""
+
+from collections.abc import Callable
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.mapping.growing_map import GrowingMap
+from snakewalk.controller.motion.path_progress import Decision
+from snakewalk.controller.motion.source import Pace
+from snakewalk.controller.terrain.map_planner import MapPlanner
+from snakewalk.controller.walk.course import OnCourse
+from snakewalk.controller.walk.pilot import Pilot
+
+
+class MapWalk(OnCourse):
+    """A ``MotionSource`` with ``PathProgress``: a pilot, and a map that changes under it."""
+
+    def __init__(
+        self,
+        pilot: Pilot,
+        ground_map: GrowingMap,
+        planner: MapPlanner,
+        *,
+        change_ground: Callable[[HeightField], None],
+        replan_m: float,
+    ) -> None:
+        """Begin with the map as it is.
+
+        Args:
+            pilot: of the walk, whose course plans by ``planner``.
+            ground_map: someone else adds pictures to it.
+            planner: the pilot's.
+            change_ground: takes the ground by which the pilot predicts and bends.
+            replan_m: travel of the walk between two plans of a path that ends before a waypoint.
+
+        """
+        super().__init__(pilot.course)
+        self._pilot, self._map, self._planner = pilot, ground_map, planner
+        self._change_ground, self._replan_m = change_ground, replan_m
+        self._pictures, self._planned_m, self._travel_m = ground_map.pictures, 0.0, 0.0
+        self.needs = pilot.needs
+
+    @property
+    def done(self) -> bool:
+        """Whether the walk is over."""
+        return self._pilot.done
+
+    @property
+    def pulse_m_s(self) -> float:
+        """How fast the shape travels along the body."""
+        return self._pilot.pulse_m_s
+
+    @property
+    def decision(self) -> Decision | None:
+        """Made in the last step, if one was."""
+        return self._pilot.decision
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return self._pilot.goal_rad()
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        return self._pilot.velocity_rad_s()
+
+    def pace(self) -> Pace:
+        """The robot's limits: what comes next is not known."""
+        return self._pilot.pace()
+
+    def begin(self, view: BodyView) -> Floats:
+        """(J,) where the walk begins."""
+        return self._pilot.begin(view)
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Go on by ``dt_s`` and return the new targets (J,)."""
+        goal_rad = self._pilot.step(dt_s, view)
+        self._travel_m += self._pilot.pulse_m_s * dt_s
+        if self.course.replanned is not None:
+            self._planned_m = self._travel_m
+        if self._map.pictures > self._pictures and not self.course.complete:
+            self._pictures = self._map.pictures
+            ground = self._map.height_field()
+            if ground is not None:
+                self._change_ground(ground)
+                self._planner.update(ground)
+                self._renew(view)
+        return goal_rad
+
+    def _renew(self, view: BodyView) -> None:
+        """Plan again if the path leads over what is seen to be unsafe, or may lead farther now."""
+        course = self.course
+        ahead_m = course.path.piece_m(course.head_along_m, course.path.length_m)
+        if not self._planner.clear(ahead_m):
+            why = "the path ahead is seen to be unsafe"
+        elif not course.leads_on and self._travel_m >= self._planned_m + self._replan_m:
+            why = "more of the ground is known"
+        else:
+            return
+        course.renew(why, self._planner.clear, lambda: float(view.headings_rad.mean()))
+        if course.replanned is not None:
+            self._planned_m = self._travel_m

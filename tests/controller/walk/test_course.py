@@ -1,0 +1,105 @@
+"""A course whose path is renewed while the body is on it, as more of the ground is known."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.walk.course import Course
+
+WAYPOINTS = [(2.0, 0.0), (4.0, 1.0)]
+
+
+class Plans:
+    """Plans straight pieces, no farther than ``reach_m`` in x."""
+
+    def __init__(self, reach_m: float) -> None:
+        self.reach_m = reach_m
+        self.asked: list[np.ndarray] = []
+
+    def __call__(self, points_m, heading_rad=None, *, avoid_m=()) -> SplinePath:
+        points = np.asarray(points_m, float)
+        self.asked.append(points)
+        within = points[points[:, 0] <= self.reach_m]
+        if len(within) < len(points):
+            after = points[len(within)]
+            share = (self.reach_m - within[-1][0]) / (after[0] - within[-1][0])
+            within = np.vstack([within, within[-1] + share * (after - within[-1])])
+        return SplinePath(within)
+
+
+def course(plan: Callable[..., SplinePath]) -> Course:
+    return Course(
+        plan, WAYPOINTS, start_m=np.zeros(2), radius_m=0.3, length_m=1.2, travel_per_body=100.0
+    )
+
+
+def walked(on: Course, head_x_m: float) -> None:
+    on.follow(np.array([head_x_m - 0.6, 0.0]), np.array([head_x_m, 0.0]), lambda: 0.0, 0.0)
+
+
+def test_a_path_that_ends_before_a_waypoint_does_not_pass_it_by() -> None:
+    on = course(Plans(1.2))
+    assert on.path.length_m == pytest.approx(1.2)
+    for x in np.arange(0.0, 1.8, 0.1):
+        walked(on, float(x))
+    assert on.replanned is None
+    assert on.missed == 0
+    np.testing.assert_allclose(on.ahead_m(2.5), [1.2, 0.0])
+
+
+def test_renewed_it_keeps_the_piece_under_the_body_and_goes_on_from_there() -> None:
+    plan = Plans(1.2)
+    on = course(plan)
+    walked(on, 0.8)
+    before = on.path.piece_m(0.0, 1.0)
+    plan.reach_m = 3.0
+    on.renew("more", lambda points: True, lambda: 0.0)
+    assert on.replanned == "more"
+    assert on.missed == 0
+    np.testing.assert_allclose(plan.asked[-1][0], [1.1, 0.0], atol=0.01)
+    np.testing.assert_allclose(on.path.piece_m(0.0, 1.0), before, atol=1e-6)
+    assert on.path.position(on.path.length_m)[0] == pytest.approx(3.0)
+    assert on.head_along_m == pytest.approx(0.8, abs=0.01)
+    walked(on, 2.6)  # the centre is at the first waypoint
+    assert on.reached == 1
+    plan.reach_m = 9.0
+    on.renew("more", lambda points: True, lambda: 0.0)
+    assert len(plan.asked[-1]) == 2  # the waypoint under the body is not asked for again
+    np.testing.assert_allclose(on.path.position(on.path.length_m), WAYPOINTS[1])
+
+
+def test_a_piece_that_is_not_clear_is_left_from_the_head_on() -> None:
+    plan = Plans(9.0)
+    on = course(plan)
+    walked(on, 0.8)
+    on.renew("unsafe", lambda points: False, lambda: 0.3)
+    np.testing.assert_allclose(plan.asked[-1][0], [0.8, 0.0])
+    assert on.head_along_m == 0.0
+
+
+def test_where_no_path_is_found_the_old_one_stays() -> None:
+    plan = Plans(1.2)
+    on = course(plan)
+    walked(on, 0.5)
+    path = on.path
+
+    def refuses(points_m, heading_rad=None, *, avoid_m=()) -> SplinePath:
+        raise InputError("no way")
+
+    on._plan = refuses
+    on.renew("more", lambda points: True, lambda: 0.0)
+    assert on.path is path
+    assert on.replanned is None
+
+
+def test_with_the_path_over_every_waypoint_behind_there_is_nothing_to_renew() -> None:
+    plan = Plans(9.0)
+    on = course(plan)
+    for x in np.arange(0.0, 4.2, 0.2):
+        on.observe(np.array([0.0, 5.0]), np.array([x, min(0.5 * max(x - 2.0, 0.0), 1.0)]))
+    count = len(plan.asked)
+    on.renew("more", lambda points: True, lambda: 0.0)
+    assert len(plan.asked) == count
