@@ -136,23 +136,25 @@ class SerialPort(LinePort):
         return os.path.realpath(self._name).startswith("/dev/pts/")
 
     def _open_error(self, error: Exception) -> PortError:
-        return PortError(self._open_fault(error))
+        return PortError(open_fault(self._name, self._baud, error))
 
-    def _open_fault(self, error: Exception) -> str:
-        number = getattr(error, "errno", None)
-        if number == errno.ENOENT:
-            there = ", ".join(sorted(port.device for port in list_ports.comports()))
-            return f"{self._name}: no such port; there is {there or 'none: is it plugged in?'}"
-        if number in (errno.EACCES, errno.EPERM):
-            return f"{self._name}: no permission; join the group that owns it (often 'dialout')"
-        if number in (errno.EBUSY, errno.EAGAIN):
-            holders = ", ".join(_holders(self._name))
-            return f"{self._name}: another program has it open{holders and ': '}{holders}"
-        if isinstance(error, ValueError):
-            return f"{self._name}: {self._baud} bit/s is not possible here: {error}"
-        if _is_no_terminal(self._name):
-            return f"{self._name}: is no serial device, which is such as /dev/ttyUSB0"
-        return f"{self._name}: cannot be opened: {error}"
+
+def open_fault(name: str, baud: int, error: Exception) -> str:
+    """Say why a device could not be opened, and what would be right."""
+    number = getattr(error, "errno", None)
+    if number == errno.ENOENT:
+        there = ", ".join(sorted(port.device for port in list_ports.comports()))
+        return f"{name}: no such port; there is {there or 'none: is it plugged in?'}"
+    if number in (errno.EACCES, errno.EPERM):
+        return f"{name}: no permission; join the group that owns it (often 'dialout')"
+    if number in (errno.EBUSY, errno.EAGAIN):
+        holders = ", ".join(_holders(name))
+        return f"{name}: another program has it open{holders and ': '}{holders}"
+    if isinstance(error, ValueError):
+        return f"{name}: {baud} bit/s is not possible here: {error}"
+    if _is_no_terminal(name):
+        return f"{name}: is no serial device, which is such as /dev/ttyUSB0"
+    return f"{name}: cannot be opened: {error}"
 
 
 def _is_no_terminal(device: str) -> bool:

@@ -3,14 +3,10 @@
 import ast
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-FILES = {
-    path.relative_to(ROOT): ast.parse(path.read_text(encoding="utf-8"))
-    for top in ("config", "drivers", "sim", "controller")
-    for path in sorted((ROOT / top).rglob("*.py"))
-}
 _WORDS = """
 agenda alive arrivals climb coming_to_rest company debts easing express eyes faint footing
 glimpse habit hear heard hillside hottest_c house jam judged laid learn listen look_again loops
@@ -24,6 +20,16 @@ RETIRED = frozenset(_WORDS.split())
 Not here are words that are also right somewhere: effort and overlay, a verdict and a note of the
 log, the turn of a heading, the eye of a snake, the pulse of [PT].
 """
+
+
+@cache
+def trees() -> dict[Path, ast.Module]:
+    """Of each file; parsed by the first test, not by every process that collects it."""
+    return {
+        path.relative_to(ROOT): ast.parse(path.read_text(encoding="utf-8"))
+        for top in ("config", "drivers", "sim", "controller")
+        for path in sorted((ROOT / top).rglob("*.py"))
+    }
 
 
 def names(tree: ast.Module) -> Iterator[tuple[str, int]]:
@@ -41,7 +47,7 @@ def names(tree: ast.Module) -> Iterator[tuple[str, int]]:
 def test_no_name_is_a_retired_word() -> None:
     found = [
         f"{path}:{line}: {name}"
-        for path, tree in FILES.items()
+        for path, tree in trees().items()
         for name, line in names(tree)
         if name.strip("_").lower() in RETIRED
     ]
@@ -50,7 +56,7 @@ def test_no_name_is_a_retired_word() -> None:
 
 def test_no_class_name_is_defined_in_two_files() -> None:
     files: dict[str, set[str]] = defaultdict(set)
-    for path, tree in FILES.items():
+    for path, tree in trees().items():
         for node in tree.body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 files[node.name].add(str(path))

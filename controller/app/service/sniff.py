@@ -10,6 +10,7 @@ import serial
 
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.clock import WallClock
+from snakewalk.drivers.port.serial_port import open_fault
 
 CHUNK_BYTES = 4096
 WAIT_S = 0.1
@@ -62,4 +63,4 @@ def _opened(device: str, baud: int) -> serial.Serial:
     try:
         return serial.Serial(device, baud, timeout=WAIT_S)
     except (serial.SerialException, ValueError) as error:
-        raise InputError(f"{device}: {error}") from None
+        raise InputError(open_fault(device, baud, error)) from None

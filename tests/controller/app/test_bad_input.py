@@ -74,6 +74,7 @@ ROWS = [
     ("bus serve --servos 1 --link file.txt", "file.txt: "),
     ("bus serve --servos 1 --pace 0", "pace"),
     ("bus serve --servos 1 --latency -1", "must not be negative"),
+    ("bus sniff /dev/null", "/dev/null: is no serial device, which is such as /dev/ttyUSB0"),
     ("bus sniff empty", "empty: holds no exchange"),
     ("bus sniff noise.bin", "noise.bin: holds no packet in 400 bytes"),
     ("trials flat-slalom --robot nosuch --seeds 1", "nosuch: no such robot"),

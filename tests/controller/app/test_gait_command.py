@@ -179,7 +179,12 @@ def test_an_operators_keys_change_a_run_over_the_bus(tmp_path: Path) -> None:
 
 def test_live_from_a_terminal(tmp_path: Path) -> None:
     ours, theirs = pty.openpty()
-    command = "from snakewalk.controller.app.cli.main import main; main()"
+    command = (  # with a page without pictures
+        "from snakewalk.controller.app.cli.main import main\n"
+        "from snakewalk.controller.app.report import artifacts\n"
+        "artifacts._draw = lambda record, made: artifacts._Drawn([], '', made)\n"
+        "main()"
+    )
     words = ["gait", "run", "rolling", "--live", "--no-film", "--json", "--out", str(tmp_path)]
     process = subprocess.Popen(
         [sys.executable, "-c", command, *words],

@@ -137,6 +137,8 @@ def test_an_interrupted_film_costs_neither_the_page_nor_an_older_film(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(artifacts, "film_run", interrupted)
+    # a page without pictures, of which others tell
+    monkeypatch.setattr(artifacts, "_draw", lambda record, made: artifacts._Drawn([], "", made))
     log = make(tmp_path / "log.mcap", seconds=1.0)
     with pytest.raises(KeyboardInterrupt):
         artifacts.make_artifacts(read_log(log), tmp_path)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.report import artifacts
 from snakewalk.controller.app.report import page as page_module
 from snakewalk.controller.app.report.artifacts import build_report
 from snakewalk.controller.app.report.curves import curves_html
@@ -86,6 +87,13 @@ def test_a_run_that_hardly_began_has_a_page(make: Make, tmp_path: Path, seconds:
     assert "0 of 4" in page_path.read_text(encoding="utf-8")
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages without pictures and curves, of which others tell."""
+    monkeypatch.setattr(artifacts, "_draw", lambda record: artifacts._Drawn([], "", ""))
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_a_summary_that_is_known_is_not_computed_again(record: RunRecord, tmp_path: Path) -> None:
     numbers = replace(summary(record), run="as known")
     report = build_report(record, tmp_path, numbers=numbers)
@@ -209,6 +217,7 @@ def test_a_supply_that_never_changes_is_told_and_not_drawn(record: RunRecord) ->
     assert "lowest supply" in [trace["name"] for trace in spec["traces"]]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_event_leads_into_the_film(record: RunRecord, tmp_path: Path) -> None:
     start_s, faster = film_times(record)
     assert start_s == record.pose.time_s[0]
