@@ -20,6 +20,7 @@ def film(
     build: str = "carp",
     conditions: FilmConditions | None = None,
     seed: int = 0,
+    fins: float = 0.0,
 ) -> tuple[list[SilhouetteFrame], FishModel, Floats]:
     """Frames from above, the model that was drawn, and the base (n, 2) in pixels."""
     model = fish_model(build, length_px)
@@ -30,7 +31,8 @@ def film(
     scene = FishScene(rows, columns, seed, conditions)
     empty = scene.background()
     half = model.half_width * length_px
-    top = [silhouette_frame(scene.top(body + shift, half), empty, Polarity.DARK) for body in spine]
+    images = [scene.top(body + shift, half, fins * length_px) for body in spine]
+    top = [silhouette_frame(image, empty, Polarity.DARK) for image in images]
     return top, model, truth.base[list(frames)] * length_px + shift
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from snakewalk.config.animal import SkinConfig
+from snakewalk.config.animal import FinConfig, SkinConfig
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load, locate, shipped
-from snakewalk.controller.capture.fish.model import fish_model
+from snakewalk.controller.capture.fish.model import PECTORAL, fish_model
 from snakewalk.controller.capture.fish.postures import holds_fish, load_postures
 from snakewalk.controller.capture.mesh.body_model import (
     BodyModel,
@@ -113,7 +113,8 @@ def shipped_skin(config: SkinConfig, how: Cut) -> BodySkin:
 def fish_skin(file: Path) -> SkinConfig:
     """Skin of a matched fish: its widths and height, and the fins of its build ([TH] 3.2.2).
 
-    Where the fins of that very fish are is not searched, as in the paper.
+    Pectoral fins that were seen from above are as long as there; how the others stand is not
+    searched, as in the paper.
     """
     fish = load_postures(file).model
     if fish is None:
@@ -130,9 +131,18 @@ def fish_skin(file: Path) -> SkinConfig:
         )
         for one in config.sections
     )
-    fins = tuple(one.model_copy(update={"span": higher * one.span}) for one in config.fins)
+    fins = tuple(_fin(one, higher, fish.fin) for one in config.fins)
     found = {"name": file.stem, "source": f"{file.name} and {config.source}"}
     return config.model_copy(update=found | {"sections": sections, "fins": fins})
+
+
+def _fin(plain: FinConfig, higher: float, pectoral: float) -> FinConfig:
+    """A fin of a build on a fish that is higher, or as long as the pectoral fins that were seen."""
+    if not (plain.paired and pectoral > 0.0 and PECTORAL[0] <= plain.at <= PECTORAL[1]):
+        return plain.model_copy(update={"span": higher * plain.span})
+    beside = plain.span * float(np.cos(np.radians(plain.around_deg)))
+    longer = pectoral / float(np.hypot(beside, plain.sweep))
+    return plain.model_copy(update={"span": longer * plain.span, "sweep": longer * plain.sweep})
 
 
 def _given(file: Path, how: Cut) -> BodySkin:

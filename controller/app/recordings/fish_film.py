@@ -24,6 +24,7 @@ def render(
     length_px: float = 120.0,
     frames: int | None = None,
     side: bool = False,
+    fins: float = 0.0,
     seed: int = 0,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Postures:
@@ -36,6 +37,7 @@ def render(
         length_px: body length.
         frames: at most so many.
         side: also film from the side; a recording of midlines has no height and swims level.
+        fins: length of the pectoral fins, body lengths; 0: folded away.
         seed: of patterns and noise.
         on_progress: called with the frames done, and in all.
 
@@ -59,7 +61,7 @@ def render(
         _write(folder / "side-background.png", beside.background())
     for k, body in enumerate(spine):
         body_px = body * length_px + shift
-        _write(folder / "top" / f"{k:05d}.png", top.top(body_px, half_width))
+        _write(folder / "top" / f"{k:05d}.png", top.top(body_px, half_width, fins * length_px))
         if side:
             height_px = height[k] * length_px - 0.5 * side_rows
             _write(

@@ -25,7 +25,9 @@ class MatchFacts:
     rate_hz: float
     largest_angles_deg: list[float]
     length_px: float | None = None
-    """Of a film; None of midlines, and so are the next four."""
+    """Of a film; None of midlines, and so are the next five."""
+    fins: float | None = None
+    """Length of the pectoral fins that were seen from above, body lengths; 0: none."""
     rate_assumed: bool | None = None
     background: str | None = None
     """What the film's frames were compared with, in words."""
@@ -106,6 +108,7 @@ def match_footage(
         rate_hz=round(postures.rate_hz, 3),
         largest_angles_deg=_largest_angles_deg(postures),
         length_px=round(film.model.length_px, 1),
+        fins=film.model.fin,
         rate_assumed=above.footage.rate_assumed,
         background=above.detector.background_source,
         left_out=film.lost,

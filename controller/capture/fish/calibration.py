@@ -1,8 +1,8 @@
 """The model's size and sections from the film itself, [TH] 3.2.3, without a fish that holds still.
 
 The text films a straight fish and grows a small model until it fits best. Here the posture is
-searched in a few frames, the width is read off the silhouettes along the spines found, and length
-and width are scaled to the largest V; twice.
+searched in a few frames, the width is read off the silhouettes along the spines found, length and
+width are scaled to the largest V, and so are the pectoral fins chosen; twice.
 """
 
 from dataclasses import replace
@@ -19,6 +19,8 @@ from snakewalk.controller.capture.fish.pattern_search import pattern_search
 from snakewalk.controller.capture.fish.top_view import Match, TopViewFit, search, window_of
 
 SHORTEST_PX = 20.0
+FINS = (0.0, 0.04, 0.06, 0.08, 0.1, 0.12, 0.14, 0.17)
+"""Lengths of the pectoral fins that are tried, body lengths."""
 
 
 def calibrate(model: FishModel, sample: list[SilhouetteFrame], name: str = "film") -> FishModel:
@@ -63,7 +65,25 @@ def calibrate(model: FishModel, sample: list[SilhouetteFrame], name: str = "film
         sizes = np.array([_size(model, frame, match) for frame, match in good])
         grown = np.median(sizes, axis=0)
         model = model.sized(model.length_px * float(grown[0]), width=float(grown[1]))
+        model = _with_fins(model, good)
     return model
+
+
+def _with_fins(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> FishModel:
+    """Fins of the largest V: those that stand out from the body widen what is read off there."""
+    made = [model.with_fins(length) for length in FINS]
+    return max(made, key=lambda one: float(np.median([_value(one, *pair) for pair in good])))
+
+
+def _value(model: FishModel, frame: SilhouetteFrame, match: Match) -> float:
+    """V of a posture that was found, with another model."""
+    scale = min(1.0, 200.0 / model.length_px)
+    window = window_of(frame, model, match.parameters[:2], scale)
+    return (
+        float("-inf")
+        if window is None
+        else TopViewFit(Target(frame, window, 3), model).value(match.parameters)
+    )
 
 
 def _widths(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> Floats:

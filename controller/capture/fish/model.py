@@ -15,6 +15,9 @@ from snakewalk.config.errors import InputError
 
 STATIONS = 41
 """Places along the body at which its sections are given, both ends included."""
+PECTORAL = (0.225, 0.3)
+"""Places along the body between which a pectoral fin is rooted (ours)."""
+_ASIDE, _BACK = 0.75, 0.66  # where it points, from above
 _CARP = ((0.0, 0.01), (0.03, 0.035), (0.1, 0.06), (0.22, 0.085), (0.33, 0.09), (0.5, 0.075),
          (0.7, 0.042), (0.83, 0.022), (0.9, 0.012), (1.0, 0.006))  # fmt: skip
 _CARP_HIGH = ((0.0, 0.015), (0.05, 0.06), (0.2, 0.12), (0.35, 0.145), (0.5, 0.125), (0.7, 0.07),
@@ -37,6 +40,8 @@ class FishModel:
     """(STATIONS,) half height in the side view."""
     build: str = ""
     """Its name, as of ``fish_model``."""
+    fin: float = 0.0
+    """Length of the pectoral fins as seen from above, stiff plates on the body; 0: none."""
     _turns: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -80,16 +85,37 @@ class FishModel:
         points[:, : len(base_px)] += base_px
         return points
 
+    def with_fins(self, length: float) -> Self:
+        """Return the same body with pectoral fins; it is no wider where they stand than beside."""
+        first, last = (round(at * (STATIONS - 1)) for at in PECTORAL)
+        wide = self.half_width.copy()
+        if length > 0.0:
+            ends = [first - 2, last + 2]
+            wide[first - 2 : last + 3] = np.interp(np.arange(first - 2, last + 3), ends, wide[ends])
+        return replace(self, half_width=wide, fin=length)
+
     def outline(self, midline_px: Floats) -> Floats:
-        """(2 STATIONS, 2) outline in the top view of a midline (STATIONS, 2 or 3)."""
+        """(n, 2) outline in the top view of a midline (STATIONS, 2 or 3)."""
         flat = midline_px[:, :2]
         along = np.empty_like(flat)
         along[1:-1] = flat[:-2] - flat[2:]
         along[0], along[-1] = flat[0] - flat[1], flat[-2] - flat[-1]
         along /= np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)[:, None]
         left = np.column_stack([-along[:, 1], along[:, 0]])
-        left *= (self.half_width * self.length_px)[:, None]
-        return np.asarray(np.concatenate([flat + left, (flat - left)[::-1]]))
+        across = left * (self.half_width * self.length_px)[:, None]
+        one, other = flat + across, flat - across
+        if self.fin > 0.0:
+            first, last = (round(at * (STATIONS - 1)) for at in PECTORAL)
+            k = (first + last) // 2
+            reach = self.fin * self.length_px
+            one, other = (
+                np.concatenate([side[: first + 1], side[[first, last]] + tip, side[last:]])
+                for side, tip in (
+                    (one, reach * (_ASIDE * left[k] - _BACK * along[k])),
+                    (other, reach * (-_ASIDE * left[k] - _BACK * along[k])),
+                )
+            )
+        return np.asarray(np.concatenate([one, other[::-1]]))
 
 
 def pitched(points: Floats, head_rad: Floats, pitch_rad: Floats) -> Floats:

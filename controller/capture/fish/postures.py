@@ -144,8 +144,8 @@ def save_postures(path: Path, postures: Postures) -> None:
         if (values := getattr(postures, key)) is not None
     }
     if postures.model is not None:
-        optional |= {"build": postures.model.build, "length_px": postures.model.length_px}
-        optional |= {key: getattr(postures.model, key) for key in _SECTIONS}
+        names = ("build", "length_px", "fin", *_SECTIONS)
+        optional |= {key: getattr(postures.model, key) for key in names}
     with path.open("wb") as stream:  # a path would get .npz appended where it ends in .NPZ
         np.savez_compressed(
             stream,
@@ -229,4 +229,5 @@ def _model(path: Path, held: dict[str, Any], joints_at: tuple[float, ...]) -> Fi
     wide, high = (np.asarray(held[key], float) for key in _SECTIONS)
     if any(one.shape != (STATIONS,) or not np.isfinite(one).all() for one in (wide, high)):
         raise InputError(f"{path}: {' and '.join(_SECTIONS)} must be {STATIONS} numbers each")
-    return FishModel(float(held["length_px"]), joints_at, wide, high, str(held["build"]))
+    size, fin = float(held["length_px"]), float(held.get("fin", 0.0))
+    return FishModel(size, joints_at, wide, high, str(held["build"]), fin)

@@ -60,15 +60,20 @@ class FishScene:
         """(H, W) the empty scene, filmed once."""
         return self._film(self._ground)
 
-    def top(self, midline_px: Floats, half_width_px: Floats) -> Image:
-        """(H, W) the fish from above: midline (P, 2), x right and y up; half widths (S,)."""
+    def top(self, midline_px: Floats, half_width_px: Floats, fin_px: float = 0.0) -> Image:
+        """(H, W) the fish from above: midline (P, 2), x right and y up; half widths (S,).
+
+        ``fin_px`` is the length of the pectoral fins, which lie flat behind the head.
+        """
         points, width = _fine(midline_px, half_width_px)
         image = self._ground.copy()
-        rows, columns = _box(image.shape, points, width.max() + 3.0)
+        rows, columns = _box(image.shape, points, width.max() + 3.0 + fin_px)
         y, x = np.mgrid[rows, columns]
         here = np.column_stack([x.ravel(), -y.ravel()]).astype(float)
         far, near = cKDTree(points).query(here)
         covered = np.clip(width[near] - far + 0.5, 0.0, 1.0).reshape(x.shape)
+        for root, tip in _fin_ends(points, width, fin_px):
+            covered = np.maximum(covered, _blade(here, root, tip).reshape(x.shape))
         across = np.clip(far / np.maximum(width[near], 1e-9) * 31.0, 0, 63).astype(int)
         grey = self.conditions.fish + self._back[across, near].reshape(x.shape)
         return self._composite(image, rows, columns, covered, grey)
@@ -110,6 +115,27 @@ class FishScene:
         seen = gaussian_filter(image, self.conditions.blur_px) if self.conditions.blur_px else image
         seen = seen + self._rng.normal(size=image.shape) * self.conditions.noise
         return np.clip(np.rint(seen), 0, 255).astype(np.uint8)
+
+
+def _fin_ends(points: Floats, width: Floats, length: float) -> list[tuple[Floats, Floats]]:
+    """Root and tip of both pectoral fins, outwards and back from behind the head; none of 0."""
+    k = round(0.26 * (len(points) - 1))
+    ahead = points[k - 1] - points[k + 1]
+    ahead = ahead / np.hypot(*ahead)
+    ends = []
+    for side in (np.array([-ahead[1], ahead[0]]), np.array([ahead[1], -ahead[0]])):
+        root = points[k] + 0.9 * width[k] * side
+        ends.append((root, root + length * (0.8 * side - 0.6 * ahead)))
+    return ends if length > 0.0 else []
+
+
+def _blade(places: Floats, root: Floats, tip: Floats) -> Floats:
+    """(n,) how much of each pixel a fin covers, which widens a little to its round tip."""
+    length = float(np.hypot(*(tip - root)))
+    way, away = (tip - root) / length, places - root
+    on = np.clip(away @ way, 0.0, length)
+    gap = np.hypot(*(away - on[:, None] * way).T)
+    return np.asarray(np.clip(length * (0.14 + 0.08 * on / length) - gap + 0.5, 0.0, 1.0))
 
 
 def _fine(points: Floats, size: Floats) -> tuple[Floats, Floats]:

@@ -38,6 +38,9 @@ def film(
     length_px: Annotated[float, typer.Option(min=20, max=2000, help="body length")] = 120.0,
     frames: Annotated[int | None, typer.Option(min=2, help="at most so many")] = None,
     side: Annotated[bool, typer.Option("--side", help="film from the side as well")] = False,
+    fins: Annotated[
+        float, typer.Option(min=0.0, max=0.3, help="pectoral fins seen from above, body lengths")
+    ] = 0.0,
     seed: Annotated[int, typer.Option(min=0, help="of patterns and noise")] = 0,
     force: Force = False,
     as_json: Json = False,
@@ -53,7 +56,7 @@ def film(
     with ProgressBar("frames", transient=True) as bar:
         truth = render(
             folder, motion=motion, build=build, length_px=length_px, frames=frames, side=side,
-            seed=seed, on_progress=bar.update,
+            fins=fins, seed=seed, on_progress=bar.update,
         )  # fmt: skip
     found: dict[str, object] = {
         "folder": str(folder),

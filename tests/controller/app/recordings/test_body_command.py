@@ -82,6 +82,10 @@ def test_a_matched_fish_swims_in_space_with_the_fins_of_its_build(tmp_path: Path
         assert section.half_width == pytest.approx(np.interp(section.at, at, wide))
         assert section.half_height == pytest.approx(0.8 * before.half_height)
     assert skin.fins[0].span == pytest.approx(0.8 * carp.fins[0].span)
+    save_postures(tmp_path / "seen.npz", replace(swum, model=replace(fish, fin=0.15)))
+    seen = next(one for one in fish_skin(tmp_path / "seen.npz").fins if one.paired)
+    beside = seen.span * np.cos(np.radians(seen.around_deg))
+    assert np.hypot(beside, seen.sweep) == pytest.approx(0.15)
     player = GltfPlayer.read(tmp_path / "fish.glb")
     assert swum.height is not None
     assert swum.pitch_rad is not None

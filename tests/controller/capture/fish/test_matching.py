@@ -5,6 +5,7 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.fish.accuracy import compare
+from snakewalk.controller.capture.fish.calibration import calibrate
 from snakewalk.controller.capture.fish.initial_posture import midline_starts, rough_midline
 from snakewalk.controller.capture.fish.match_film import match_film, track_film
 from snakewalk.controller.capture.fish.matching import SilhouetteFrame, Target, agreement
@@ -62,6 +63,18 @@ def test_spine_angles_of_a_rendered_film_are_found() -> None:
     assert np.degrees(np.percentile(errors.angles_rad, 95)) < 9.0
     assert np.degrees(np.median(errors.head_rad)) < 1.0
     assert np.median(errors.skeleton) < 0.035
+
+
+@pytest.mark.parametrize("fins", [0.0, 0.12])
+def test_pectoral_fins_are_found_and_do_not_widen_the_body(fins: float) -> None:
+    """[TH] 3.2.2: plates on the body; a model without them took 1.3 px of the fins for width."""
+    top, drawn, _ = film(TRUTH, range(20, 200, 20), 110.0, fins=fins)
+    found = calibrate(fish_model("carp"), top)
+    assert found.fin == pytest.approx(fins, abs=0.041)
+    assert (found.fin > 0.0) == (fins > 0.0)
+    behind = slice(9, 15)  # where fins are rooted, and lie
+    px = found.half_width[behind] * found.length_px - drawn.half_width[behind] * drawn.length_px
+    assert np.abs(px).max() < 0.8
 
 
 def test_a_side_view_gives_height_and_pitch() -> None:
