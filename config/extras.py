@@ -22,6 +22,7 @@ EXTRAS: Final = {
     "distributed": ("Dask", "sweep"),
     "dask": ("Dask", "sweep"),
     "gymnasium": ("Gymnasium", "gym"),
+    "cma": ("cma", "learn"),
     "viser": ("viser", "page"),
     "rosbags": ("rosbags", "export"),
     "pyarrow": ("pyarrow", "export"),

@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from snakewalk.config.world import WorldConfig
 
 M = TypeVar("M", bound=BaseModel)
-Kind = Literal["robots", "worlds", "runs", "recordings", "gaits", "skins", "animals"]
+Kind = Literal["robots", "worlds", "runs", "recordings", "gaits", "skins", "animals", "policies"]
+
+_ONE_OF: Final = {"policies": "policy"}
+"""Kinds whose singular is not the word without its s."""
 
 
 def shipped(kind: Kind) -> tuple[str, ...]:
@@ -36,8 +39,8 @@ def locate(kind: Kind, name_or_path: str, beside: Path | None = None) -> Path:
         if path.is_file():
             return path
         raise ConfigError(
-            f"{name_or_path}: no such {kind[:-1]}; shipped are {', '.join(shipped(kind))}; "
-            "a file of your own ends in .toml"
+            f"{name_or_path}: no such {_ONE_OF.get(kind, kind[:-1])}; "
+            f"shipped are {', '.join(shipped(kind))}; a file of your own ends in .toml"
         )
     path = Path(name_or_path)
     if beside is not None and not path.is_absolute() and (beside / path).is_file():

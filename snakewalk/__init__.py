@@ -15,7 +15,12 @@ if TYPE_CHECKING:
     from snakewalk.config.run import RunConfig, SafetyConfig
     from snakewalk.config.world import WorldConfig
     from snakewalk.controller.app.runs.execute import execute
-    from snakewalk.controller.app.runs.factory import prepare_gait, prepare_source, prepare_walk
+    from snakewalk.controller.app.runs.factory import (
+        prepare_gait,
+        prepare_policy,
+        prepare_source,
+        prepare_walk,
+    )
     from snakewalk.controller.app.studies.sweep_measure import measure
     from snakewalk.controller.app.studies.sweep_points import plan_sweep
     from snakewalk.controller.gaits.gait import Gait, Needs
@@ -78,6 +83,7 @@ __all__ = [
     "measure",
     "plan_sweep",
     "prepare_gait",
+    "prepare_policy",
     "prepare_source",
     "prepare_walk",
     "read_log",
@@ -94,7 +100,12 @@ _NAMES = {
     "config.run": ("RunConfig", "SafetyConfig"),
     "config.world": ("WorldConfig",),
     "controller.app.runs.execute": ("execute",),
-    "controller.app.runs.factory": ("prepare_gait", "prepare_source", "prepare_walk"),
+    "controller.app.runs.factory": (
+        "prepare_gait",
+        "prepare_policy",
+        "prepare_source",
+        "prepare_walk",
+    ),
     "controller.app.studies.sweep_measure": ("measure",),
     "controller.app.studies.sweep_points": ("plan_sweep",),
     "controller.gaits.gait": ("Gait", "Needs"),

@@ -16,3 +16,8 @@ register(
     entry_point="snakewalk.controller.app.learning.environment:SnakeEnvironment",
     max_episode_steps=500,
 )
+register(
+    id="snakewalk/SnakeWave-v0",
+    entry_point="snakewalk.controller.app.learning.policy_environment:PolicyEnvironment",
+    max_episode_steps=500,
+)

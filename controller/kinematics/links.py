@@ -58,6 +58,14 @@ def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> Body
     return BodyView(centres[:-1], rotation, centres[-1])
 
 
+def chain_angles_rad(robot: RobotConfig, body: BodyView) -> Floats:
+    """(J,) angles of the spine's joints, in (-pi, pi]: the inverse of ``body_in_world``."""
+    ahead, behind = body.rotation[:-1], body.forward[1:]
+    side = np.where(_yaws(robot.joint_axes)[:, None], ahead[:, :, 1], ahead[:, :, 2])
+    sine, cosine = (behind * side).sum(axis=1), (behind * ahead[:, :, 0]).sum(axis=1)
+    return np.asarray(np.arctan2(-sine, cosine))
+
+
 def chain_points_m(robot: RobotConfig, body: BodyView) -> Floats:
     """(J + 2, 3) the head's tip, the joints and the tail's end."""
     half = half_lengths_m(robot)[:, None] * body.forward

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.gait import GaitConfig
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.virtual_chassis import virtual_chassis
@@ -34,10 +33,13 @@ class GaitDisplacement:
     """Body lengths a cycle: what a climber is for."""
 
 
-def full_rate_span_s(start_s: float, end_s: float, gait: GaitConfig) -> tuple[float, float]:
-    """Times between which a gait runs at full rate; its log is from ``start_s`` to ``end_s``."""
+def full_rate_span_s(start_s: float, end_s: float, duration_s: float) -> tuple[float, float]:
+    """Times between which a motion runs at full rate that comes to rest after ``duration_s``.
+
+    Its log is from ``start_s`` to ``end_s``.
+    """
     last_s = end_s - STOP_S
-    return max(last_s - gait.duration_s + SKIPPED_S, start_s), last_s
+    return max(last_s - duration_s + SKIPPED_S, start_s), last_s
 
 
 def gait_displacement(record: RunRecord) -> GaitDisplacement:
@@ -57,7 +59,7 @@ def gait_displacement(record: RunRecord) -> GaitDisplacement:
         return unknown
     time_s, links = pose.time_s[known], pose.links_m[known]
     up = pose.rotation[known][:, :, 2]
-    first_s, last_s = full_rate_span_s(float(time_s[0]), float(time_s[-1]), config)
+    first_s, last_s = full_rate_span_s(float(time_s[0]), float(time_s[-1]), config.duration_s)
     count = int((last_s - first_s) * hz + 1e-9)
     if count < 1:
         return unknown

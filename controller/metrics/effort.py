@@ -104,7 +104,7 @@ def effort(record: RunRecord) -> Effort:
     unknown = Effort(*(float("nan"),) * 5)
     if gait is None or len(pose.time_s) == 0:
         return unknown
-    from_s, end_s = full_rate_span_s(float(pose.time_s[0]), float(pose.time_s[-1]), gait)
+    from_s, end_s = full_rate_span_s(float(pose.time_s[0]), float(pose.time_s[-1]), gait.duration_s)
     steady = (pose.time_s >= from_s) & (pose.time_s <= end_s)
     if steady.sum() < 2 or not np.isfinite(pose.links_m[steady]).all():
         return unknown

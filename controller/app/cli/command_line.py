@@ -56,6 +56,12 @@ from snakewalk.controller.app.cli.commands.logs.shadow import shadow
 from snakewalk.controller.app.cli.commands.logs.view import view
 from snakewalk.controller.app.cli.commands.plan import plan
 from snakewalk.controller.app.cli.commands.play import play
+from snakewalk.controller.app.cli.commands.policy import (
+    learn_policy,
+    list_policies,
+    policy_trials,
+    run_policy,
+)
 from snakewalk.controller.app.cli.commands.repertoire.crowd import crowd
 from snakewalk.controller.app.cli.commands.repertoire.playback import play_actions
 from snakewalk.controller.app.cli.commands.repertoire.repertoire import record, run_plan, show_file
@@ -446,6 +452,34 @@ gait_app.command(
     "fit",
     epilog=_examples("gait fit CURVE.csv --picture fit.png", "gait fit CURVE.csv -o joints.npz"),
 )(fit_gait)
+
+policy_app = _App(no_args_is_help=True, help="Learnt policies: list, run, compare, learn.")
+
+app.add_typer(policy_app, name="policy", rich_help_panel=_MOTION)
+
+policy_app.command("list", epilog=_examples("policy list --json"))(list_policies)
+
+policy_app.command(
+    "run",
+    epilog=_examples(
+        "policy run wave-cma --seconds 10",
+        "policy run mine.toml --set world.friction.across=0.3 --json",
+        "policy run wave-ppo --port /dev/ttyUSB0",
+    ),
+)(run_policy)
+
+policy_app.command(
+    "learn",
+    epilog=_examples("policy learn -o mine.toml", "policy learn --seed 1 --workers 8 -o one.toml"),
+)(learn_policy)
+
+policy_app.command(
+    "trials",
+    epilog=_examples(
+        "policy trials wave-cma wave-ppo lateral-undulation --first-seed 1000",
+        "policy trials mine.toml wave-cma --world flat --world flat-friction-3 --json",
+    ),
+)(policy_trials)
 
 robot_app = _App(no_args_is_help=True, help="A robot: show it, export it, import one.")
 

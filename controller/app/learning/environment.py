@@ -120,6 +120,28 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._view: BodyView | None = None
         self._sent_rad: Floats = np.zeros(body.joint_count)
 
+    @property
+    def robot(self) -> RobotConfig:
+        """The body and its servos."""
+        return self._prepared.robot
+
+    @property
+    def period_s(self) -> float:
+        """Of the robot's time, a step."""
+        return 1.0 / self._prepared.run.cycle_hz
+
+    @property
+    def view(self) -> BodyView:
+        """The body as it was measured last.
+
+        Raises:
+            gymnasium.error.ResetNeeded: there is no episode.
+
+        """
+        if self._view is None:
+            raise gymnasium.error.ResetNeeded("call reset before a look at the body")
+        return self._view
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
@@ -147,7 +169,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return observation, self._info(link)
 
     def step(
-        self, action: NDArray[np.float32]
+        self, action: NDArray[np.floating[Any]]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Send goals (J,), as shares of the limits; wait for the next cycle, read all servos.
 
@@ -159,7 +181,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if backend is None or link is None or link.tripped:
             raise gymnasium.error.ResetNeeded("call reset before step")
         goal_rad = np.asarray(action, dtype=float) * self.limit_rad
-        self._due_s += 1.0 / self._prepared.run.cycle_hz
+        self._due_s += self.period_s
         try:
             link.write(JointCommand(backend.clock.now_s(), goal_rad))
         except SafetyTrippedError:

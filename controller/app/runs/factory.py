@@ -34,6 +34,8 @@ from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.capture.readers.load import track_beside
 from snakewalk.controller.gaits.gait import Gait, fitting_robot
 from snakewalk.controller.gaits.registry import GAITS, make_gait
+from snakewalk.controller.motion.policy import load_policy
+from snakewalk.controller.motion.policy_motion import PolicyMotion
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.repertoire.repertoire import load_repertoire
 from snakewalk.drivers.bus.budget import robot_budget
@@ -52,6 +54,7 @@ GAIT_PITCH_SHARE = 0.75
 (1.5 A of an XM430; ours): soft ones would not carry the links."""
 
 _OWN_MOTION = {"run.robot": "--robot", "run.motion": "the command"}
+_OF_A_SOURCE = _OWN_MOTION | {"run.time_limit_s": "--seconds"}
 _OF_A_GAIT = _OWN_MOTION | {"run.gait": "--param, --seconds, --then, --by, --look-heading-rad"}
 _OF_A_SCHEDULE = _OWN_MOTION | {"run.repertoire": "FILE, --speed, --turn, --schedule, --seconds"}
 _OF_A_RECORDING = _OWN_MOTION | {"run.track": "TRACK", "run.playback": "--speed, --scale, --clip"}
@@ -419,18 +422,20 @@ def prepare_source(
     seconds: float = 20.0,
     seed: int = 0,
     name: str = "source",
+    keys: Mapping[str, object] | None = None,
 ) -> SourceRun:
     """Prepare a run of your own motion source, of at most ``seconds``; it ends earlier when done.
 
     ``make`` takes the robot and returns a fresh source at each call: one is stepped on paper before
-    torque is on, another one in the run.
+    torque is on, another one in the run; ``keys`` as of ``prepare_walk``.
 
     Raises:
         InputError: the robot lacks joints that the source needs, or its cycle does not fit the
             wire; limits of the joints are checked by ``execute``.
 
     """
-    body = load_robot(robot or "yaw16")
+    keys = _checked_keys(keys, _OF_A_SOURCE)
+    body = _with_keys_of("robot", load_robot(robot or "yaw16"), keys)
     needs = make(body).needs
     needs.check(body, "the motion source")
     fields = {
@@ -441,9 +446,39 @@ def prepare_source(
         "seed": seed,
         "time_limit_s": seconds,
     }
-    run = checked(RunConfig, fields, "prepare_source")
+    run = _with_keys_of("run", checked(RunConfig, fields, "prepare_source"), keys)
     _check_servos(run, body)
-    return SourceRun(run, _with_gains(body, pitch=needs.pitch), load_world(run.world), make)
+    ground = _with_keys_of("world", load_world(run.world), keys)
+    return SourceRun(run, _with_gains(body, pitch=needs.pitch), ground, make)
+
+
+def prepare_policy(
+    name: str,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    seconds: float = 20.0,
+    seed: int = 0,
+    keys: Mapping[str, object] | None = None,
+) -> SourceRun:
+    """Prepare a learnt policy, shipped or of a file; after ``seconds`` it comes to rest.
+
+    Robot and world are by default those that it was learnt on.
+
+    Raises:
+        InputError: no such policy, or a robot whose joints it does not know.
+
+    """
+    policy = load_policy(name)
+    return prepare_source(
+        lambda body: PolicyMotion(policy, body, duration_s=seconds),
+        robot=robot or policy.robot,
+        world=world or policy.origin.world,
+        seconds=seconds + 30.0,
+        seed=seed,
+        name=policy.name,
+        keys=keys,
+    )
 
 
 def check_supply(robot: RobotConfig) -> None:

@@ -4,16 +4,19 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TypeVar
 
 import numpy as np
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait
-from snakewalk.controller.app.runs.gait_run import GaitRun
+from snakewalk.controller.app.runs.prepared_run import GroundedRun
 from snakewalk.controller.app.studies.sweep_points import Point
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.metrics.effort import effort
+
+P = TypeVar("P", bound=GroundedRun)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +63,7 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
             seed=point.seed,
         )
         if vary is not None:
-            prepared = _varied(prepared, np.random.default_rng(vary))
+            prepared = varied(prepared, np.random.default_rng(vary))
         with TemporaryDirectory() as folder:
             finished = execute(prepared, Path(folder), stoppable=False)
     except InputError as error:
@@ -89,7 +92,8 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
     )
 
 
-def _varied(prepared: GaitRun, rng: np.random.Generator) -> GaitRun:
+def varied(prepared: P, rng: np.random.Generator) -> P:
+    """Return a run with other friction (up to 15 % off) and another supply (5 %)."""
     world, robot = prepared.world, prepared.robot
     slick, volts = rng.uniform(-1.0, 1.0, 2)
     factor = 1.0 + FRICTION_SPREAD * slick

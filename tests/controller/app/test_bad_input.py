@@ -94,6 +94,13 @@ ROWS = [
     ("gait run rolling --set robot.link_mas_kg=1", "did you mean link_mass_kg?"),
     ("trials flat-slalom --seeds 1 --over run=3", "run: a key begins with run., robot."),
     # commands that came later
+    ("policy run nosuch", "nosuch: no such policy; shipped are wave-cma, wave-ppo"),
+    ("policy run typo.toml", "typo.toml: robot: is required"),
+    ("policy run wave-ppo --robot alternating16", "its network observes the joints of yaw16"),
+    ("policy run wave-cma --set run.time_limit_s=9", "run.time_limit_s: is given by --seconds"),
+    ("policy learn -o file.txt", "file.txt: a policy's file ends in .toml"),
+    ("policy learn -o /nosuch/a.toml", "/nosuch: no such folder"),
+    ("policy trials nosuch --seeds 1", "nosuch: no such policy"),
     ("view .", "a folder; a run's log is log.mcap"),
     ("view empty", "is not an MCAP log"),
     ("view empty --view-at 127.0.0.1:99999", "expected HOST or HOST:PORT, e.g. 127.0.0.1:8080"),

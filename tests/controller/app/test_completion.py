@@ -35,6 +35,7 @@ def completed(line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
         ("snakewalk play lam", ["lamprey-like"]),
         ("snakewalk trials flat-sq", ["flat-square"]),
         ("snakewalk tune roll", ["rolling"]),
+        ("snakewalk policy run wave-c", ["wave-cma"]),
         ("snakewalk run --set world.friction.ac", ["world.friction.across="]),
         ("snakewalk run --set run.walk.no", []),
         ("snakewalk schema ro", ["robot"]),

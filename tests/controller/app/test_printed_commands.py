@@ -48,6 +48,7 @@ PENDULUM = "needs recordings of a pendulum: tests/controller/app/identification"
 BUS = "needs a bus: run on a simulated line by tests/controller/app (test_bus_commands and others)"
 FOUND = "needs what calibrate finds on a bus: tests/controller/app/test_chain_calibration.py"
 SEARCH = "a search takes 18 whole runs at least: tests/controller/app/test_set.py"
+EPISODES = "takes hundreds of episodes: tests/controller/app/learning"
 NOT_RUN = {
     "--port": BUS,
     "scan": BUS,
@@ -72,6 +73,9 @@ NOT_RUN = {
     "fish synthesise": "needs a film of some beats: test_fish_command.py",
     "tune": SEARCH,
     "gait run mine.toml": SEARCH,
+    "policy learn": EPISODES,
+    "policy run mine.toml": EPISODES,
+    "policy trials": "takes whole runs: tests/controller/app/studies/test_policy_trials.py",
     "--dask": "needs a cluster: tests/controller/app/studies/test_pool.py",
     "terrain from-stereo": "needs a calibrated pair: test_terrain_command.py",
     "identify": PENDULUM,

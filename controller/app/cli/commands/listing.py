@@ -18,7 +18,7 @@ RobotName = Annotated[
 
 
 def list_(as_json: Json = False) -> None:
-    """List what is shipped: runs, robots, worlds, recordings, sets of gait parameters."""
+    """List what is shipped: runs, robots, worlds, recordings, policies, sets of gait parameters."""
     from snakewalk.config.loader import load_gait, load_robot, load_run, load_world, shipped  # noqa: PLC0415  --help stays quick
 
     rows = {
@@ -30,6 +30,7 @@ def list_(as_json: Json = False) -> None:
         ],
         "worlds": [[n, load_world(n).ground.kind] for n in shipped("worlds")],
         "recordings": [[n, "snakewalk track, play, run --track"] for n in shipped("recordings")],
+        "policies": [[n, "snakewalk policy list, run"] for n in shipped("policies")],
         "gaits": [[n, f"{(g := load_gait(n)).gait} on {g.robot}"] for n in shipped("gaits")],
     }
     if as_json:

@@ -1,0 +1,156 @@
+"""A learnt policy that runs: it observes joints and heading, and moves within the robot's limits.
+
+All that it observes a robot has without a camera: measured angles, its own last goals, its phase,
+and a heading (of an IMU, of a pose, or by dead reckoning). So what runs is what was trained: the
+environment of the training steps this motion.
+"""
+
+from math import cos, sin
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Needs
+from snakewalk.controller.gaits.wave import TURN, places
+from snakewalk.controller.kinematics.links import BodyView, chain_angles_rad
+from snakewalk.controller.motion.policy import WAVE_ENDS, WAVE_SPAN, Policy
+from snakewalk.controller.motion.rate_limiter import RateLimiter
+from snakewalk.controller.motion.source import HEADROOM, Pace
+from snakewalk.controller.motion.stop_profile import StopProfile
+
+GAIN_PER_S = 25.0
+"""Of the rate limiter: a goal lags its wave by 40 ms where no limit binds (ours)."""
+CHANGE_S = 0.1
+"""In which the wave follows an action (ours)."""
+
+
+class PolicyMotion:
+    """A policy on a robot; it begins with a straight body at rest."""
+
+    needs = Needs(yaw=True, wheels=True)
+
+    def __init__(
+        self, policy: Policy, robot: RobotConfig, *, duration_s: float = float("inf")
+    ) -> None:
+        """Make it ready; after ``duration_s`` it comes to rest by itself.
+
+        Raises:
+            InputError: the robot lacks yaw joints, or has others than the network observes.
+
+        """
+        self.needs.check(robot, f"policy {policy.name}")
+        policy.check(robot)
+        self._yaw = np.array(robot.yaw_joints)
+        place = places(robot, robot.yaw_joints)
+        self._start = policy.wave.vector()
+        self._wave = self._start.copy()
+        self._layers = [(np.array(each.weights), np.array(each.bias)) for each in policy.network]
+        thirds = np.clip(place - np.arange(3)[:, None] / 3.0, 0.0, 1.0 / 3.0)
+        along = np.zeros((3, len(WAVE_SPAN), len(place)))
+        along[0, 1:5], along[1, 5:8], along[2, 10:13] = (
+            _hats(4, place),
+            TURN * thirds,
+            _hats(3, place),
+        )
+        self._along = along
+        """(3, P, n) amplitude, lag and steering of each joint by the values of a wave."""
+        self._most_rad = HEADROOM * np.array(robot.limit_rad)[self._yaw]
+        self._pace = Pace(
+            HEADROOM * Pace.limit(robot).speed_rad_s,
+            HEADROOM * Pace.limit(robot).acceleration_rad_s2,
+        )
+        self._limiter = RateLimiter(
+            np.zeros(len(self._yaw)),
+            HEADROOM * robot.joint_speed_limit_rad_s,
+            HEADROOM * robot.joint_acceleration_limit_rad_s2,
+            GAIN_PER_S,
+        )
+        self._phase_rad = 0.0
+        self._heading_rad, self._mean_heading_rad = 0.0, np.nan
+        self._measured_rad = np.zeros(len(self._yaw))
+        self._robot = robot
+        self._remaining_s = duration_s
+        self._stop_profile = StopProfile()
+        self.cycles = 0.0
+        """Of the wave, gone through so far."""
+
+    @property
+    def done(self) -> bool:
+        """Whether it has come to rest after its duration."""
+        return self._stop_profile.over
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return self._of_all(self._limiter.angle_rad)
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        return self._of_all(self._stop_profile.rate * self._limiter.speed_rad_s)
+
+    def pace(self) -> Pace:
+        """The robot's limits, but for the headroom."""
+        return self._pace
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Observe, and go on by ``dt_s``."""
+        self._remaining_s -= dt_s
+        if self._remaining_s <= 0.0:
+            self._stop_profile.stop()
+        part_s = self._stop_profile.step(dt_s)
+        values = self.observe(view)
+        for weights, bias in self._layers[:-1]:
+            values = np.tanh(weights @ values + bias)
+        if self._layers:
+            weights, bias = self._layers[-1]
+            return self.act(weights @ values + bias, part_s)
+        return self.act(np.zeros(len(self._wave)), part_s)
+
+    def observe(self, view: BodyView) -> Floats:
+        """Take the measured body; returns what a network observes, as ``observation_names``."""
+        self._measured_rad = chain_angles_rad(self._robot, view)[self._yaw]
+        self._heading_rad = float(view.headings_rad.mean())
+        told = [cos(self._phase_rad), sin(self._phase_rad)]
+        told += [cos(self._heading_rad), sin(self._heading_rad)]
+        return np.concatenate([told, self._measured_rad, self._limiter.angle_rad])
+
+    def act(self, action: Floats, dt_s: float) -> Floats:
+        """Change the wave by an action (P,), -1 to 1, and go on by ``dt_s``; returns targets (J,).
+
+        The wave follows the action within ``CHANGE_S``.
+        """
+        target = np.clip(self._start + WAVE_SPAN * np.clip(action, -1.0, 1.0), *WAVE_ENDS)
+        self._wave += (1.0 - np.exp(-dt_s / CHANGE_S)) * (target - self._wave)
+        wave = self._wave
+        frequency_hz, sine, cosine = wave[0], wave[8], wave[9]
+        self.cycles += dt_s * frequency_hz
+        self._phase_rad = float((self._phase_rad + dt_s * TURN * frequency_hz) % TURN)
+        heading_rad = self._mean_heading(dt_s * frequency_hz)
+        amplitude_rad, lag_rad, gain = wave @ self._along
+        at = self._phase_rad - lag_rad
+        swing = np.sin(at) + sine * np.sin(3.0 * at) + cosine * np.cos(3.0 * at)
+        off = np.zeros(len(at) + 2)
+        off[1:-1] = self._measured_rad - self._limiter.angle_rad
+        reflex = wave[13] * off[1:-1] + wave[14] * off[:-2] + wave[15] * off[2:]
+        goal = amplitude_rad * swing - heading_rad / len(at) * gain + reflex
+        self._limiter.step(dt_s, np.clip(goal, -self._most_rad, self._most_rad))
+        return self.goal_rad()
+
+    def _mean_heading(self, cycles: float) -> float:
+        """Return the heading without its swing: a running mean of about a cycle."""
+        if np.isnan(self._mean_heading_rad):
+            self._mean_heading_rad = self._heading_rad
+        off = (self._heading_rad - self._mean_heading_rad + np.pi) % TURN - np.pi
+        self._mean_heading_rad += (1.0 - np.exp(-cycles)) * off
+        return float((self._mean_heading_rad + np.pi) % TURN - np.pi)
+
+    def _of_all(self, yaw: Floats) -> Floats:
+        joints = np.zeros(self._robot.joint_count)
+        joints[self._yaw] = yaw
+        return joints
+
+
+def _hats(count: int, place: Floats) -> Floats:
+    """(count, n) weights of values at ``count`` knots from 0 to 1, interpolated at places (n,)."""
+    knots = np.linspace(0.0, 1.0, count)
+    return np.array([np.interp(place, knots, row) for row in np.eye(count)])
