@@ -26,6 +26,7 @@ EXTRAS: Final = {
     "viser": ("viser", "page"),
     "rosbags": ("rosbags", "export"),
     "pyarrow": ("pyarrow", "export"),
+    "rclpy": ("rclpy", "ros"),
 }
 """Module to (name of the package, extra of ``pyproject.toml`` that brings it)."""
 BASE: Final = frozenset({"numba", "scipy", "networkx", "typer", "rich", "mcap"})

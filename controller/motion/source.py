@@ -1,7 +1,7 @@
 """The one interface of everything that moves joints: walker, gait, recording, live operator."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -67,6 +67,15 @@ class MotionSource(Protocol):
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` (0 or more) and return the new targets (J,)."""
+        ...
+
+
+@runtime_checkable
+class StartsAnywhere(Protocol):
+    """A ``MotionSource`` may offer this, too: it begins where the joints are found."""
+
+    def start_at(self, joint_rad: Floats) -> None:
+        """Take the angles (J,) that were measured before the first cycle."""
         ...
 
 

@@ -14,7 +14,7 @@ from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.kinematics.smoothstep import QUINTIC_BEND_MAX, QUINTIC_SLOPE_MAX, quintic
 from snakewalk.controller.motion.compliance import Compliance
 from snakewalk.controller.motion.path_progress import path_progress
-from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.motion.source import MotionSource, StartsAnywhere
 from snakewalk.controller.runlog.record import MotorEnergy
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.derating import Derating
@@ -147,6 +147,8 @@ class Drive:
             if self._observer is not None:
                 self._observer.begin(state)
             view = body_in_world(self._robot, self._pose(state), state.position_rad)
+            if isinstance(motion, StartsAnywhere):
+                motion.start_at(state.position_rad)
             ramp = Ramp(
                 state.position_rad,
                 path.begin(view),

@@ -92,6 +92,7 @@ NEEDY = [
     (("fish", "match", "film.mp4"), "vision"),
     (("fish", "film", "tank"), "vision"),
     (("export", "log.mcap", "--ros2", "b.mcap"), "export"),
+    (("ros",), "ros"),
     (("export", "log.mcap", "--parquet", "tables"), "export"),
     (("run", "flat-slalom", "--pose", "camera", "--port", "/dev/null"), "vision"),
 ]

@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 from snakewalk.controller.app.cli.commands.analyse import analyse
 from snakewalk.controller.app.cli.commands.bench.calibrate import calibrate
 from snakewalk.controller.app.cli.commands.bench.doctor import doctor
+from snakewalk.controller.app.cli.commands.bench.ros import ros
 from snakewalk.controller.app.cli.commands.bench.scan import scan
 from snakewalk.controller.app.cli.commands.bench.stop import stop
 from snakewalk.controller.app.cli.commands.body import body
@@ -260,6 +261,15 @@ app.command(
     epilog=_examples("stop", "stop --port /dev/ttyUSB0 --json", "stop runs/flat-square-walk-seed0"),
     rich_help_panel=_JOB,
 )(stop)
+
+app.command(
+    epilog=_examples(
+        "ros",
+        "ros --robot my.toml --port /dev/ttyUSB0 --domain 7 --namespace snake",
+        "ros --robot alternating16 --gait rolling --network",
+    ),
+    rich_help_panel=_JOB,
+)(ros)
 
 app.command(
     epilog=_examples("view runs/flat-square-walk-seed0/log.mcap", "gait run sidewinding --view"),

@@ -89,6 +89,9 @@ ViewAt = Annotated[
         "--view-at", metavar="HOST:PORT", help="of the page; beyond this machine it needs a token"
     ),
 ]
+Ros = Annotated[
+    bool, typer.Option("--ros", help="tell a ROS 2 graph of the run, with a service that stops it")
+]
 VIEW_AT = "127.0.0.1:8080"
 Force = Annotated[bool, typer.Option("--force", help="overwrite files")]
 Robot = Annotated[

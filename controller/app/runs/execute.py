@@ -42,7 +42,7 @@ from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
 
 if TYPE_CHECKING:
-    from snakewalk.controller.app.view.live_view import LiveView
+    from snakewalk.controller.app.view.watcher import Watcher
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ def execute(
     *,
     force: bool = False,
     stoppable: bool = True,
-    view: "LiveView | None" = None,
+    view: "Watcher | None" = None,
     shadow: bool = False,
     confirm: Callable[[str], bool] | None = None,
     stop_requested: Callable[[], str | None] = lambda: None,
@@ -83,8 +83,9 @@ def execute(
 
     The folder is made; one that holds a run's files is refused without ``force``, which deletes
     them when the new log begins. A ``stoppable`` run has a button that ``snakewalk stop`` presses;
-    the simulated runs of a study have none. ``view`` is a page that shows the run. With
-    ``shadow`` a simulated chain follows the same goals, and log and ``on_event`` tell what differs.
+    the simulated runs of a study have none. ``view`` looks on: a page that shows the run, a ROS
+    node that tells of it. With ``shadow`` a simulated chain follows the same goals, and log and
+    ``on_event`` tell what differs.
     ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``);
     ``stop_requested``, asked in every read and write, why torque goes off, or None;
     ``on_progress`` is called after each cycle, ``on_event`` with what the motion decides by itself:

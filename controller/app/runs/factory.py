@@ -24,6 +24,7 @@ from snakewalk.config.playback import ScheduleConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.app.runs.commanded_run import CommandedRun, MakeCommanded
 from snakewalk.controller.app.runs.gait_run import GaitRun, MakeOperator
 from snakewalk.controller.app.runs.playback_run import PlaybackRun
 from snakewalk.controller.app.runs.prepared_run import PreparedRun
@@ -264,10 +265,10 @@ def prepare_gait(
     if make_operator is not None and (then or by == "cpg"):
         raise InputError("--live changes gaits by keys and joins: leave out --then and --by cpg")
     keys = _checked_keys(keys, _OF_A_GAIT)
-    gait, known = _gait_by_name(name, parameters)
+    gait, known = gait_by_name(name, parameters)
     if known is not None:
         robot, world = robot or known.robot, world or known.world
-    changes = [(at_s, _gait_by_name(other, values)[0]) for at_s, other, values in then]
+    changes = [(at_s, gait_by_name(other, values)[0]) for at_s, other, values in then]
     gaits = [gait, *(other for _, other in changes)]
     pitch = any(each.needs.pitch for each in gaits)
     own = robot or fitting_robot(each.needs for each in gaits)
@@ -481,6 +482,38 @@ def prepare_policy(
     )
 
 
+def prepare_commanded(
+    make: MakeCommanded,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    seconds: float,
+    name: str,
+    keys: Mapping[str, object] | None = None,
+) -> CommandedRun:
+    """Prepare a run that another program commands, for ``seconds`` at most.
+
+    Pitch joints are set up to carry links, as for gaits; ``keys`` as of ``prepare_walk``.
+
+    Raises:
+        InputError: no such robot or world; its cycle does not fit the wire.
+
+    """
+    keys = _checked_keys(keys, _OF_A_SOURCE)
+    body = _with_keys_of("robot", load_robot(robot or "yaw16"), keys)
+    fields = {
+        "name": name,
+        "robot": body.name,
+        "world": world or "flat",
+        "motion": "source",
+        "time_limit_s": seconds,
+    }
+    run = _with_keys_of("run", checked(RunConfig, fields, "command line"), keys)
+    _check_servos(run, body)
+    ground = _with_keys_of("world", load_world(run.world), keys)
+    return CommandedRun(run, _with_gains(body, pitch=bool(len(body.pitch_joints))), ground, make)
+
+
 def check_supply(robot: RobotConfig) -> None:
     """Refuse a supply at which a servo would do nothing but raise its alarm.
 
@@ -517,9 +550,7 @@ def _check_servos(run: RunConfig, robot: RobotConfig) -> None:
     robot_budget(robot, robot.servo.baud, fast=True).check(run.cycle_hz)
 
 
-def _gait_by_name(
-    name: str, parameters: dict[str, Any] | None
-) -> tuple[Gait, GaitSetConfig | None]:
+def gait_by_name(name: str, parameters: dict[str, Any] | None) -> tuple[Gait, GaitSetConfig | None]:
     """Make a gait by its name or by that of a set of parameters, and return the set."""
     if name in GAITS:
         return make_gait(name, parameters), None

@@ -16,7 +16,7 @@ import viser
 from snakewalk.controller.app.view.dashboard import SPAN_S, Dashboard
 from snakewalk.controller.app.view.gait_panel import GaitPanel
 from snakewalk.controller.app.view.page_server import StopPanel, open_page
-from snakewalk.controller.app.view.row_line import PageEnd
+from snakewalk.controller.app.view.row_line import WatcherEnd
 from snakewalk.controller.app.view.scene import BodyScene
 from snakewalk.controller.runlog.record import Header, RunRecord
 from snakewalk.controller.runlog.tables import record_of
@@ -44,7 +44,7 @@ def serve(line: socket.socket, host: str, port: int) -> None:
         line.sendall(json.dumps({"fault": str(fault)}).encode() + b"\n")
         return
     line.sendall(json.dumps({"url": url}).encode() + b"\n")
-    page = _LivePage(server, PageEnd(line))
+    page = _LivePage(server, WatcherEnd(line))
     with suppress(EOFError, OSError):
         while True:
             page.step()
@@ -54,7 +54,7 @@ def serve(line: socket.socket, host: str, port: int) -> None:
 class _LivePage:
     """State of the page between two steps."""
 
-    def __init__(self, server: viser.ViserServer, end: PageEnd) -> None:
+    def __init__(self, server: viser.ViserServer, end: WatcherEnd) -> None:
         self._server, self._end = server, end
         self._clock = WallClock()
         self._stop = StopPanel(server, self._press)

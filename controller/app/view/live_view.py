@@ -3,30 +3,23 @@
 import base64
 import json
 import math
-import signal
 import socket
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from multiprocessing import get_context
-from pathlib import Path
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.app.view.row_line import RunEnd
+from snakewalk.controller.app.view.watcher import WatcherProcess
 
-_START_S: Final = 60.0
-"""How long the page may take to start: a busy machine imports slowly (ours)."""
-_END_S: Final = 2.0
 _PICTURE_S: Final = 0.5
 """Pictures of a camera are shown no more often (ours)."""
 _QUALITY: Final = 70
 
 
-class LiveView:
+class LiveView(WatcherProcess):
     """Serves the page; use it in a ``with``.
 
     Raises:
@@ -36,43 +29,11 @@ class LiveView:
 
     def __init__(self, at: str = "127.0.0.1:8080") -> None:
         require_extra("the page needs", "viser")
-        host, port = host_and_port(at)
-        ours, far = socket.socketpair()
-        context = get_context("spawn")
-        self._process = context.Process(target=_serve, args=(far, host, port), daemon=True)
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Ctrl-C is the run's
-        try:
-            self._process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        far.close()
-        ours.settimeout(_START_S)
-        try:
-            said = json.loads(ours.makefile("rb").readline() or "{}")
-        except OSError:
-            said = {}
-        self.url = str(said.get("url", ""))
+        super().__init__(_serve, *host_and_port(at), fault=f"--view-at {at}")
+        self.url = str(self.said["url"])
         """To be opened in a browser; holds the token where one is asked for."""
-        if not self.url:
-            self._process.kill()
-            raise InputError(f"--view-at {at}: {said.get('fault', 'the page did not start')}")
-        self._end = RunEnd(ours)
         self._picture: bytes | None = None
         self._picture_s = -math.inf
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._end.close(0.5)
-        self._process.join(_END_S)
-        if self._process.is_alive():
-            self._process.kill()
 
     held = True
     """The page has no dead man's button."""
@@ -104,10 +65,6 @@ class LiveView:
         if whole:
             shown = base64.b64encode(data.tobytes()).decode()
             self._picture = json.dumps({"time_s": time_s, "jpeg": shown}).encode()
-
-    def on_button(self, path: Path) -> None:
-        """Take the run's stop button, which the page presses."""
-        self._end.add("/button", json.dumps({"path": str(path)}).encode())
 
 
 @contextmanager

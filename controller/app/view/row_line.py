@@ -1,9 +1,9 @@
-"""The line between a run and its page: rows of the log one way, requests the other.
+"""The line between a run and a watcher, its page for one: rows of the log one way, requests back.
 
 The run never waits: what does not fit the socket stays here, of each kind of measurement only the
-newest row, and it is sent when the page asks for it. A page that is slow, stopped or dead is simply
-not sent anything. A request is a line of text: an empty one asks for the newest rows, any other is
-a command of whoever holds the page, such as ``frequency_hz=0.4``.
+newest row, and it is sent when the watcher asks for it. A watcher that is slow, stopped or dead is
+simply not sent anything. A request is a line of text: an empty one asks for the newest rows, any
+other is a command of whoever holds the page, such as ``frequency_hz=0.4``, or of a ROS graph.
 """
 
 import json
@@ -15,11 +15,12 @@ from typing import Any, Final
 
 KEPT: Final = frozenset({"/config", "/path", "/event", "/button", "/gait"})
 """Topics of which every row is sent, in order; of others the newest."""
-SENT: Final = KEPT | {"/cycle", "/shadow", "/pose", "/slow", "/picture"}
+SENT: Final = KEPT | {"/cycle", "/shadow", "/pose", "/slow", "/imu", "/picture"}
 _KEPT_MAX: Final = 1000
 _COMMANDS_MAX: Final = 100
 """Commands that wait for the run; of more the oldest are dropped."""
-_LINE_BYTES: Final = 4096
+_LINE_BYTES: Final = 1 << 20
+_RECEIVE_BYTES: Final = 1 << 18
 _HEAD: Final = 4
 _END: Final = b"\n"
 
@@ -49,14 +50,14 @@ class RunEnd:
             self.pump()
 
     def pump(self) -> None:
-        """Send what the page can take now; never waits."""
+        """Send what the watcher can take now; never waits."""
         try:
             self._receive()
             while self._next():
                 self._out = self._out[self._line.send(self._out) :]
         except BlockingIOError:
             return
-        except OSError:  # the page is gone: the run goes on
+        except OSError:  # the watcher is gone: the run goes on
             self._kept.clear()
             self._newest.clear()
             self._out = memoryview(b"")
@@ -70,7 +71,7 @@ class RunEnd:
         return taken
 
     def close(self, patience_s: float) -> None:
-        """Send the last rows, waiting for a slow page no longer than ``patience_s``; then close."""
+        """Send the last rows, for no longer than ``patience_s`` to a slow watcher; then close."""
         self._ready = True
         self._line.settimeout(patience_s)
         while self._next():
@@ -95,7 +96,7 @@ class RunEnd:
 
     def _receive(self) -> None:
         with suppress(BlockingIOError):
-            *lines, self._in = (self._in + self._line.recv(_LINE_BYTES)).split(_END)
+            *lines, self._in = (self._in + self._line.recv(_RECEIVE_BYTES)).split(_END)
             self._in = self._in[-_LINE_BYTES:]
             for line in lines:
                 if line:
@@ -104,8 +105,8 @@ class RunEnd:
                     self._ready = True
 
 
-class PageEnd:
-    """The page's end of the line."""
+class WatcherEnd:
+    """The watcher's end of the line."""
 
     def __init__(self, line: socket.socket) -> None:
         self._line = line

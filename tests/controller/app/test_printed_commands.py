@@ -65,6 +65,8 @@ NOT_RUN = {
     "--live": "needs keys of a terminal: tests/controller/app/test_gait_command.py",
     "--view": "serves a page until it is closed: tests/controller/app/view",
     "view": "serves a page until it is closed: tests/controller/app/view",
+    "ros": "holds a robot until it is stopped: tests/controller/app/ros",
+    "--ros": "needs the extra ros and a graph: tests/controller/app/ros",
     "camera calibrate 0": "needs a camera: tests/controller/app/test_camera_command.py",
     "plan mine/run.toml --robot mine/found.toml": FOUND,
     "run mine/run.toml --robot mine/found.toml": FOUND,

@@ -20,6 +20,7 @@ from snakewalk.controller.app.cli.options import (
     Force,
     Json,
     Robot,
+    Ros,
     RunFolder,
     RunPort,
     Set,
@@ -80,6 +81,7 @@ def run_gait(
     shadow: Shadow = False,
     view: View = False,
     view_at: ViewAt = VIEW_AT,
+    ros: Ros = False,
     film: Film = True,
     out: RunFolder = None,
     force: Force = False,
@@ -87,17 +89,17 @@ def run_gait(
     as_json: Json = False,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
+    from snakewalk.controller.app.cli.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.app.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_gait, with_compliance  # noqa: PLC0415
-    from snakewalk.controller.app.view.live_view import open_view  # noqa: PLC0415
     from snakewalk.controller.metrics.displacement import gait_displacement  # noqa: PLC0415
 
     if by not in {"blend", "cpg"}:
         raise InputError(f"--by {by}: expected blend or cpg")
     with ExitStack() as stack:
-        page = stack.enter_context(open_view(view, view_at))
-        hands = _hands(stack, live, gamepad, page)
+        watchers = stack.enter_context(watched(view, view_at, ros))
+        hands = _hands(stack, live, gamepad, None if watchers is None else watchers.page)
         prepared = prepare_gait(
             name,
             robot=robot,
@@ -116,14 +118,14 @@ def run_gait(
         run = prepared.run
         folder = stack.enter_context(run_folder(f"gait-{run.name}-{prepared.robot.name}", out))
         bar = stack.enter_context(TimeBar(run.name, seconds, _names(prepared, hands)))
-        paced = (view or prepared.make_operator is not None) and port is None
+        paced = (watchers is not None or prepared.make_operator is not None) and port is None
         on_progress = in_real_time(bar.on_progress) if paced else bar.on_progress
         finished = execute(
             prepared,
             folder,
             port,
             force=force,
-            view=page,
+            view=watchers,
             shadow=shadow,
             stop_requested=lambda: None if hands is None else hands.torque_off(),
             on_progress=on_progress,

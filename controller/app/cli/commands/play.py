@@ -12,6 +12,7 @@ from snakewalk.controller.app.cli.options import (
     Force,
     Json,
     Robot,
+    Ros,
     RunFolder,
     RunPort,
     Set,
@@ -45,16 +46,17 @@ def play(
     port: RunPort = None,
     view: View = False,
     view_at: ViewAt = VIEW_AT,
+    ros: Ros = False,
     film: Film = True,
     out: RunFolder = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
+    from snakewalk.controller.app.cli.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.app.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_playback  # noqa: PLC0415
-    from snakewalk.controller.app.view.live_view import open_view  # noqa: PLC0415
 
     prepared = prepare_playback(
         track,
@@ -67,7 +69,7 @@ def play(
     )
     with (
         run_folder(f"play-{prepared.run.name}", out) as folder,
-        open_view(view, view_at) as page,
+        watched(view, view_at, ros) as watchers,
         TimeBar(prepared.run.name, prepared.duration_s) as bar,
     ):
         finished = execute(
@@ -75,8 +77,8 @@ def play(
             folder,
             port,
             force=force,
-            view=page,
-            on_progress=in_real_time(bar.on_progress) if view and not port else bar.on_progress,
+            view=watchers,
+            on_progress=in_real_time(bar.on_progress) if watchers and not port else bar.on_progress,
             on_event=bar.on_event,
         )
     artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)

@@ -18,6 +18,7 @@ from snakewalk.controller.app.cli.options import (
     Look,
     Motion,
     Robot,
+    Ros,
     RunFolder,
     RunName,
     RunPort,
@@ -65,12 +66,14 @@ def run(
     shadow: Shadow = False,
     view: View = False,
     view_at: ViewAt = VIEW_AT,
+    ros: Ros = False,
     film: Film = True,
     look: Look = "servos",
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
+    from snakewalk.controller.app.cli.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.app.progress import PathBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.recordings.body_look import check_look  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
@@ -79,7 +82,6 @@ def run(
         with_compliance,
         with_map,
     )
-    from snakewalk.controller.app.view.live_view import open_view  # noqa: PLC0415
 
     check_look(look)
     prepared = prepare_job(
@@ -96,7 +98,7 @@ def run(
     name = "-".join(parts)
     with (
         run_folder(name, out) as folder,
-        open_view(view, view_at) as page,
+        watched(view, view_at, ros) as watchers,
         PathBar(prepared.path.length_m, len(prepared.run.waypoints_m)) as bar,
     ):
         finished = execute(
@@ -104,10 +106,10 @@ def run(
             folder,
             port,
             force=force,
-            view=page,
+            view=watchers,
             shadow=shadow,
             confirm=_confirm if sys.stdin.isatty() else None,
-            on_progress=in_real_time(bar.on_progress) if view and not port else bar.on_progress,
+            on_progress=in_real_time(bar.on_progress) if watchers and not port else bar.on_progress,
             on_event=bar.on_event,
         )
     outcome = finished.outcome

@@ -25,7 +25,7 @@ from snakewalk.controller.app.view.gait_panel import GaitPanel
 from snakewalk.controller.app.view.live_page import _LivePage
 from snakewalk.controller.app.view.live_view import LiveView
 from snakewalk.controller.app.view.page_server import open_page
-from snakewalk.controller.app.view.row_line import PageEnd, RunEnd
+from snakewalk.controller.app.view.row_line import RunEnd, WatcherEnd
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
@@ -73,7 +73,7 @@ class View:
         self._picture: bytes | None = None
         self._picture_s = -1.0
         server, _ = open_page("127.0.0.1", 0)
-        self.page = _LivePage(server, PageEnd(far))
+        self.page = _LivePage(server, WatcherEnd(far))
 
     def on_row(self, topic: str, row: bytes) -> None:
         LiveView.on_row(self, topic, row)  # type: ignore[arg-type]

@@ -5,14 +5,14 @@ import socket
 
 import pytest
 
-from snakewalk.controller.app.view.row_line import PageEnd, RunEnd
+from snakewalk.controller.app.view.row_line import RunEnd, WatcherEnd
 
 CYCLE = b'{"k":%d,"values":"' + b"1.234567," * 800 + b'"}'
 
 
-def ends() -> tuple[RunEnd, PageEnd, socket.socket]:
+def ends() -> tuple[RunEnd, WatcherEnd, socket.socket]:
     ours, far = socket.socketpair()
-    return RunEnd(ours), PageEnd(far), far
+    return RunEnd(ours), WatcherEnd(far), far
 
 
 def cycle(run: RunEnd, k: int) -> None:
@@ -58,11 +58,16 @@ def test_orders_reach_the_run_whole_whatever_pieces_they_come_in() -> None:
         page.command(str(k))
         run.pump()
     assert run.commands() == [str(k) for k in range(200, 300)]  # the newest hundred
-    far.sendall(b"x" * 100_000)
+    far.sendall(b"7" * 100_000)  # a trajectory is as long
     assert run.commands() == []
+    far.sendall(b"\n")
+    assert run.commands() == ["7" * 100_000]
+    for _ in range(20):  # a line without an end
+        far.sendall(b"x" * 100_000)
+        run.pump()
+    assert len(run._in) <= 1 << 20
     far.close()
     run.commands()
-    assert len(run._in) <= 4096
 
 
 def test_what_does_not_fit_the_socket_goes_on_where_it_stopped() -> None:

@@ -12,6 +12,7 @@ from snakewalk.controller.app.cli.options import (
     Force,
     Json,
     Robot,
+    Ros,
     RunFolder,
     RunPort,
     Set,
@@ -50,6 +51,7 @@ def play_actions(
     port: RunPort = None,
     view: View = False,
     view_at: ViewAt = VIEW_AT,
+    ros: Ros = False,
     film: Film = True,
     picture: Annotated[
         Path | None, typer.Option(help="draw wanted and measured speed and turn")
@@ -65,11 +67,11 @@ def play_actions(
     import numpy as np  # noqa: PLC0415  --help stays quick
 
     from snakewalk.config.playback import ScheduleConfig  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.app.cli.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.app.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415
     from snakewalk.controller.app.runs.factory import prepare_schedule  # noqa: PLC0415
     from snakewalk.controller.app.runs.schedule_run import ScheduleMotion, read_schedule  # noqa: PLC0415
-    from snakewalk.controller.app.view.live_view import open_view  # noqa: PLC0415
 
     given = {"speed_m_s": speed, "turn_rad_s": turn, "duration_s": seconds}
     changes = {key: value for key, value in given.items() if value is not None}
@@ -89,7 +91,7 @@ def play_actions(
     )
     with (
         run_folder(f"actions-{prepared.run.name}", out) as folder,
-        open_view(view, view_at) as page,
+        watched(view, view_at, ros) as watchers,
         TimeBar(prepared.run.name, prepared.config.duration_s) as bar,
     ):
         finished = execute(
@@ -97,8 +99,8 @@ def play_actions(
             folder,
             port,
             force=force,
-            view=page,
-            on_progress=in_real_time(bar.on_progress) if view and not port else bar.on_progress,
+            view=watchers,
+            on_progress=in_real_time(bar.on_progress) if watchers and not port else bar.on_progress,
             on_event=bar.on_event,
         )
     assert isinstance(finished.source, ScheduleMotion), "a schedule's run has no other motion"

@@ -1,0 +1,31 @@
+"""Where in a ROS graph a robot is, and what it takes from there."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from snakewalk.controller.motion.command import TIMEOUT_S
+
+_RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_SAYS_WHERE: Final = (_RANGE, "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
+
+
+@dataclass(frozen=True, slots=True)
+class RosOptions:
+    """Where in a ROS graph a robot is."""
+
+    domain: int | None = None
+    """None: as ``ROS_DOMAIN_ID`` says, or 0."""
+    namespace: str = ""
+    network: bool = False
+    """Whether other machines see it; else only this one, unless the environment says where."""
+    commands: bool = False
+    """Whether it takes commands; the stop service is there in any case."""
+    timeout_s: float = TIMEOUT_S
+    """Commands with an older stamp are refused."""
+
+    def environ(self, given: Mapping[str, str]) -> dict[str, str]:
+        """Return what the environment of the node's process has in addition."""
+        if self.network:
+            return {_RANGE: "SUBNET"}
+        return {} if any(given.get(name) for name in _SAYS_WHERE) else {_RANGE: "LOCALHOST"}

@@ -1,0 +1,52 @@
+"""What another program may command the joints of a robot to do."""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.gaits.gait import Gait
+
+TIMEOUT_S: Final = 1.0
+"""How long joints go on towards goals that nobody renews (ours)."""
+POINTS_MAX: Final = 500
+"""Of a trajectory, which is splined and checked within a cycle."""
+
+
+class JointGoals(NamedTuple):
+    """Go to these angles as fast as the limits allow; joints not named keep their goals."""
+
+    joints: Sequence[str]
+    position_rad: Sequence[float]
+
+
+class JointTrajectory(NamedTuple):
+    """Go through these points at these times; joints not named stop where they are."""
+
+    joints: Sequence[str]
+    time_s: Floats
+    """(N,) from the start, growing."""
+    position_rad: Floats
+    """(N, K) for the K joints named."""
+    velocity_rad_s: Floats | None = None
+    """(N, K)"""
+    acceleration_rad_s2: Floats | None = None
+    """(N, K), with velocities only."""
+
+
+class StartGait(NamedTuple):
+    """Move by this gait until another command."""
+
+    gait: Gait
+
+
+class HoldStill(NamedTuple):
+    """Come to rest where the joints are."""
+
+
+class Refused(NamedTuple):
+    """A command that could not be read."""
+
+    why: str
+
+
+Command = JointGoals | JointTrajectory | StartGait | HoldStill | Refused

@@ -1,0 +1,257 @@
+"""Joints that another program commands while they move: goals, trajectories, gaits, hold.
+
+Whatever comes is checked whole before a joint follows it, and refused whole. From one command to
+the next the joints go on from the angles and the speeds that they have.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Final, Protocol
+
+import numpy as np
+from scipy.interpolate import PPoly
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Gait, Needs
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.blend import Blend
+from snakewalk.controller.motion.command import (
+    TIMEOUT_S,
+    Command,
+    HoldStill,
+    JointGoals,
+    JointTrajectory,
+    StartGait,
+)
+from snakewalk.controller.motion.gait_motion import GaitMotion
+from snakewalk.controller.motion.rate_limiter import RateLimiter
+from snakewalk.controller.motion.source import HEADROOM, Pace
+from snakewalk.controller.motion.trajectory import (
+    JointLimits,
+    JointsNow,
+    spline_through,
+)
+
+_GAIN_PER_S: Final = 20.0
+_REACHED_RAD: Final = 1e-3
+_QUIET_S: Final = 1.0
+"""The same refusal is told again after so long."""
+
+
+class _Mode(Protocol):
+    """What moves the joints now."""
+
+    def now(self) -> JointsNow:
+        """Angles and speeds."""
+        ...
+
+    def step(self, dt_s: float, view: BodyView) -> None:
+        """Go on by ``dt_s``."""
+        ...
+
+
+class _Follow:
+    """Joints go to their goals, and stay."""
+
+    def __init__(self, now: JointsNow, limits: JointLimits) -> None:
+        """Come to rest as soon as the limits allow."""
+        self._acceleration_rad_s2 = HEADROOM * limits.acceleration_rad_s2
+        speed_rad_s = HEADROOM * limits.speed_rad_s
+        self._limiter = RateLimiter(
+            now.angle_rad, speed_rad_s, self._acceleration_rad_s2, _GAIN_PER_S
+        )
+        self._limiter.speed_rad_s = np.array(now.speed_rad_s)
+        self._most_rad = limits.angle_rad
+        self.left_s: float | None = None
+        """Until the goals are out of date; None: they never are."""
+        self.goal_rad = now.angle_rad
+        self.stop()
+
+    @property
+    def arrived(self) -> bool:
+        """Whether every joint is at its goal."""
+        return bool(np.abs(self.goal_rad - self._limiter.angle_rad).max() < _REACHED_RAD)
+
+    def stop(self) -> None:
+        """Come to rest as soon as the limits allow."""
+        speed = self._limiter.speed_rad_s
+        brake_rad = speed * np.abs(speed) / self._acceleration_rad_s2
+        goal_rad = self._limiter.angle_rad + brake_rad
+        self.goal_rad = np.clip(goal_rad, -self._most_rad, self._most_rad)
+        self.left_s = None
+
+    def now(self) -> JointsNow:
+        return JointsNow(self._limiter.angle_rad, self._limiter.speed_rad_s)
+
+    def step(self, dt_s: float, view: BodyView) -> None:
+        if self.left_s is not None:
+            self.left_s -= dt_s
+        self._limiter.step(dt_s, self.goal_rad)
+
+
+class _Through:
+    """Joints go along a spline in time."""
+
+    def __init__(self, spline: PPoly, end_s: float) -> None:
+        self._spline, self._end_s, self._now_s = spline, end_s, 0.0
+
+    @property
+    def over(self) -> bool:
+        """Whether its end is reached."""
+        return self._now_s >= self._end_s
+
+    def now(self) -> JointsNow:
+        return JointsNow(self._spline(self._now_s), self._spline(self._now_s, 1))
+
+    def step(self, dt_s: float, view: BodyView) -> None:
+        self._now_s = min(self._now_s + dt_s, self._end_s)
+
+
+class _ByGait:
+    """Joints move by a gait, joined to what they did before."""
+
+    def __init__(self, blend: Blend) -> None:
+        self._blend = blend
+
+    def now(self) -> JointsNow:
+        return JointsNow(self._blend.goal_rad(), self._blend.velocity_rad_s())
+
+    def step(self, dt_s: float, view: BodyView) -> None:
+        self._blend.step(dt_s, view)
+
+
+class Commanded:
+    """A motion source that holds the pose it finds until another program commands it."""
+
+    needs = Needs()
+    done = False
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        joints: Sequence[str],
+        commands: Callable[[], Iterable[Command]],
+        on_event: Callable[[str, str], None],
+        *,
+        timeout_s: float = TIMEOUT_S,
+        gait: Gait | None = None,
+    ) -> None:
+        """Put ``commands`` in charge of a robot.
+
+        Args:
+            robot: its limits are kept.
+            joints: J names by which commands call its joints, head first.
+            commands: what has come since the last call, the oldest first; returns at once.
+            on_event: takes ("command", text) of what is begun or done, ("refused", text) and
+                ("stale", text).
+            timeout_s: after so long the joints stop on their way to goals that nobody renews;
+                infinite: they never do.
+            gait: to begin with; None: hold.
+
+        """
+        self._robot, self._commands, self._on_event = robot, commands, on_event
+        self._limits = JointLimits.of(robot, joints)
+        self._timeout_s = timeout_s
+        self._first = gait
+        rest = np.zeros(robot.joint_count)
+        self._mode: _Mode = _Follow(JointsNow(rest, rest), self._limits)
+        self._time_s = 0.0
+        self._refused, self._refused_s = "", 0.0
+
+    def start_at(self, joint_rad: Floats) -> None:
+        """Begin from joints at these angles (J,), held within their limits."""
+        most = self._limits.angle_rad
+        held = np.clip(joint_rad, -most, most)
+        self._mode = _Follow(JointsNow(held, np.zeros(len(held))), self._limits)
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return self._mode.now().angle_rad
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        return self._mode.now().speed_rad_s
+
+    def pace(self) -> Pace:
+        """The robot's limits: what will be commanded is not known."""
+        return Pace.limit(self._robot)
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Take what has been commanded, then go on by ``dt_s``."""
+        self._time_s += dt_s
+        if self._first is not None:
+            self._take(StartGait(self._first))
+            self._first = None
+        for command in self._commands():
+            self._take(command)
+        self._mode.step(dt_s, view)
+        mode = self._mode
+        if isinstance(mode, _Through) and mode.over:
+            self._follow()
+            self._on_event("command", "the trajectory is done")
+        elif isinstance(mode, _Follow) and mode.left_s is not None:
+            if mode.arrived:
+                mode.left_s = None
+            elif mode.left_s <= 0.0:
+                mode.stop()
+                text = f"no joint goals for {self._timeout_s:g} s: the joints hold where they are"
+                self._on_event("stale", text)
+        return self.goal_rad()
+
+    def _take(self, command: Command) -> None:
+        try:
+            if isinstance(command, JointGoals):
+                self._go_to(command)
+            elif isinstance(command, JointTrajectory):
+                spline, end_s = spline_through(command, self._mode.now(), self._limits)
+                self._mode = _Through(spline, end_s)
+                points = len(command.time_s)
+                self._on_event("command", f"a trajectory of {points} points, {end_s:.2f} s")
+            elif isinstance(command, StartGait):
+                self._move_by(command.gait)
+            elif isinstance(command, HoldStill):
+                self._follow().stop()
+                self._on_event("command", "hold")
+            else:
+                raise InputError(command.why)
+        except InputError as error:
+            self._refuse(error.faults[0])
+
+    def _refuse(self, why: str) -> None:
+        if why != self._refused or self._time_s - self._refused_s >= _QUIET_S:
+            self._on_event("refused", why)
+            self._refused_s = self._time_s
+        self._refused = why
+
+    def _follow(self) -> _Follow:
+        """Go on to the goals that the joints have, or else to a stop."""
+        if not isinstance(self._mode, _Follow):
+            self._mode = _Follow(self._mode.now(), self._limits)
+        return self._mode
+
+    def _go_to(self, command: JointGoals) -> None:
+        joints = self._limits.numbers(command.joints, "joint goals")
+        angle_rad = np.asarray(command.position_rad, dtype=float)
+        if angle_rad.shape != joints.shape:
+            raise InputError(
+                f"joint goals: {len(joints)} names and {angle_rad.size} positions; give a position "
+                "for each name"
+            )
+        self._limits.check_angles(angle_rad[None], joints, "joint goals")
+        follow = self._follow()
+        follow.goal_rad = np.array(follow.goal_rad)
+        follow.goal_rad[joints] = angle_rad
+        follow.left_s = self._timeout_s
+
+    def _move_by(self, gait: Gait) -> None:
+        if gait.p_gain is not None:
+            raise InputError(
+                f"gait {gait.name}: takes soft servos (P gain {gait.p_gain}), which are set up "
+                "before a run: snakewalk gait run"
+            )
+        gait.check(self._robot)
+        now, motion = self._mode.now(), GaitMotion(gait, self._robot)
+        limit = Pace.limit(self._robot)
+        self._mode = _ByGait(Blend(now.angle_rad, now.speed_rad_s, motion, limit))
+        self._on_event("command", f"gait {gait.name}")
