@@ -168,10 +168,13 @@ class TerrainPlanner:
                     lambda wider: not len(self._unsafe(wider, points[0], relief)),
                 )
             corners = _denser(corners, path, bad)
-        x, y = path.position(float(bad[0]))
+        points = path.position(bad)
+        worst = points[int(np.argmax(relief.risk(*points.T)))]
+        x, y = (round(float(at), 2) + 0.0 for at in worst)  # no -0.00
         raise InputError(
-            f"path: no smooth way over safe ground near ({x:.2f}, {y:.2f}); "
-            "move a waypoint or allow more slope or variance"
+            f"path: no smooth way over safe ground: ({x:.2f}, {y:.2f}) "
+            f"{_unsafe_because(relief, worst)}; move a waypoint, or allow more by "
+            "world.planner.slope_limit_rad or world.planner.variance_limit_m2"
         )
 
     def _unsafe(self, path: SplinePath, start: Floats, relief: Relief) -> Floats:
@@ -217,23 +220,27 @@ def _fault(planner: TerrainPlanner, k: int, point: Floats) -> list[str]:
     if node is None:
         return [f"{_name(k, point)}: this world has no safe ground at all"]
     x, y = graph.nodes_m[node]
+    why = _unsafe_because(relief, point)
+    return [f"{_name(k, point)} {why}; the nearest safe point is ({x:.2f}, {y:.2f})"]
+
+
+def _unsafe_because(relief: Relief, point: Floats) -> str:
+    """What is wrong with a place (2,), in words."""
     if not relief.ground.contains(*point):
         w, h = relief.ground.size_m
-        why = f"is outside the world, {w:.1f} m by {h:.1f} m around (0, 0)"
-    elif not relief.within(*point):
-        why = f"is within {relief.config.edge_margin_m:g} m of the world's border"
-    elif not relief.known(*point):
+        return f"is outside the world, {w:.1f} m by {h:.1f} m around (0, 0)"
+    if not relief.within(*point):
+        return f"is within {relief.config.edge_margin_m:g} m of the world's border"
+    if not relief.known(*point):
         reach = relief.config.slope_window_m
-        why = f"is within {reach:g} m of ground that the world's map does not know"
-    else:
-        slope = np.degrees(float(relief.slope_rad(*point)))
-        variance, most = float(relief.variance_m2(*point)), relief.config.variance_limit_m2
-        limit = np.degrees(relief.config.slope_limit_rad)
-        why = (
-            f"is on unsafe ground: slope {slope:.1f} deg (limit {limit:.1f}), elevation variance "
-            f"{variance:.2g} m2 (limit {most:.2g})"
-        )
-    return [f"{_name(k, point)} {why}; the nearest safe point is ({x:.2f}, {y:.2f})"]
+        return f"is within {reach:g} m of ground that the world's map does not know"
+    slope = np.degrees(float(relief.slope_rad(*point)))
+    variance, most = float(relief.variance_m2(*point)), relief.config.variance_limit_m2
+    limit = np.degrees(relief.config.slope_limit_rad)
+    return (
+        f"is on unsafe ground: slope {slope:.1f} deg (limit {limit:.1f}), elevation variance "
+        f"{variance:.2g} m2 (limit {most:.2g})"
+    )
 
 
 def _name(k: int, point: Floats) -> str:
