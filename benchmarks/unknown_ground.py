@@ -14,6 +14,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.camera import MappingConfig
+from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.runs.execute import Finished, execute
@@ -23,7 +24,7 @@ from snakewalk.controller.mapping.growing_map import GrowingMap
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.sim.physics.plant import MujocoPlant
 
-WORLDS = ("jacksboro-gentle", "random-10")
+WORLDS = ("jacksboro-gentle", "random-10", "jacksboro-basin")
 ROBOT = "alternating16-stereo"
 LEAST_M, MOST_M, BORDER_M, LIMIT_S = 2.4, 3.0, 1.6, 45.0
 BESIDE_M = 0.6
@@ -62,7 +63,7 @@ def places(world: WorldConfig, planner: TerrainPlanner, seed: int) -> tuple[Floa
         try:
             if planner.plan(ends).length_m <= 1.4 * apart_m:
                 return ends[0], ends[1]
-        except ValueError:
+        except InputError:
             continue
 
 

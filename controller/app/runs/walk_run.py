@@ -285,6 +285,10 @@ class WalkRun(PathRun):
                 f"{self.path.length_m / pulse_m_s:.0f} s at least, but time_limit_s is "
                 f"{self.run.time_limit_s:g}: it will not be walked to its end"
             )
+        if self.run.mapping is not None:
+            lines.append(
+                "the ground is not known before the run: the plan on paper is that of a level floor"
+            )
         if self.run.motion == "serpenoid":
             return tuple(lines)
         if self.run.behaviour.curvature is None and self.library.curvature > 1.0:

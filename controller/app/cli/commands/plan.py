@@ -97,7 +97,7 @@ def plan(
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts
     warnings = prepared.warnings
-    if prepared.ground is not None:
+    if prepared.ground_ahead is not None:
         relief = path_relief(prepared.planner, prepared.path)
         found["slope_median_deg"] = _deg(relief.median_slope_rad)
         found["slope_max_deg"] = _deg(relief.max_slope_rad)

@@ -1,5 +1,6 @@
 """A stereo head on the robot: the ground of its pictures, and a run over ground it did not know."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.mapping.growing_map import GrowingMap
 from snakewalk.sim.physics.plant import MujocoPlant
+from tests.helpers.in_process import snakewalk
 
 ROBOT = load_robot("alternating16-stereo")
 HILLS = load_world("random-10").model_copy(
@@ -127,6 +129,14 @@ def test_before_the_run_nothing_of_the_true_ground_is_used() -> None:
     assert one.start_heading_rad == two.start_heading_rad
     np.testing.assert_array_equal(one.check_plan().path_m, two.check_plan().path_m)
     np.testing.assert_array_equal(one.initial_pose().joint_rad, two.initial_pose().joint_rad)
+
+
+def test_a_plan_on_paper_says_that_it_knows_no_ground() -> None:
+    words = ["plan", "random-10", "--robot", ROBOT.name, "--motion", "serpenoid", "--json"]
+    done = snakewalk(*words, "--set", "run.mapping.period_s=1", "--set", "run.time_limit_s=2")
+    found = json.loads(done.stdout)
+    assert "is not known before the run" in "; ".join(found["warnings"])
+    assert "slope_max_deg" not in found
 
 
 @pytest.mark.parametrize(
