@@ -1,20 +1,30 @@
 """A robot for other programs: URDF and MJCF text with the masses and the kinematics of ours."""
 
+from collections.abc import Mapping
+from typing import Final, Literal
 from xml.etree import ElementTree as ET
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.drivers.protocol.control_table import load_control_table
+
+Ros2Control = Literal["topic", "dynamixel"]
+"""What ros2_control drives: our ROS node, or the servos themselves."""
+_DEVICE: Final = "/dev/ttyUSB0"
+_POSITION_MODE: Final = 3
 
 
-def urdf_text(robot: RobotConfig) -> str:
+def urdf_text(robot: RobotConfig, ros2_control: Ros2Control | None = None) -> str:
     """URDF of a robot; link 0 is the head, whose frame is its centre; x forward, z up.
 
     Joint j turns what is behind it, so the axis of a yaw joint points down: a positive angle bends
     the head side to the left. Inertia is a solid cylinder's.
 
+    With ``ros2_control`` it has that tag as well.
+
     Raises:
-        InputError: the robot has legs.
+        InputError: the robot has legs, or what the tag cannot say.
 
     """
     if robot.limbs:
@@ -60,8 +70,92 @@ def urdf_text(robot: RobotConfig) -> str:
             velocity=repr(robot.joint_speed_limit_rad_s),
         )
         ET.SubElement(hinge, "dynamics", damping=repr(robot.gear_drags_n_m_s[joint]), friction="0")
+    if ros2_control is not None:
+        _add_ros2_control(root, robot, ros2_control)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _add_ros2_control(root: ET.Element, robot: RobotConfig, kind: Ros2Control) -> None:
+    """Add the tag ``ros2_control`` to a URDF."""
+    system = ET.SubElement(root, "ros2_control", name=robot.name, type="system")
+    hardware = ET.SubElement(system, "hardware")
+    plugin = ET.SubElement(hardware, "plugin")
+    if kind == "topic":
+        plugin.text = "joint_state_topic_hardware_interface/JointStateTopicSystem"
+        topics = {
+            "joint_commands_topic": "/robot_joint_command",
+            "joint_states_topic": "/robot_joint_states",
+        }
+        _add_params(hardware, topics)
+    else:
+        plugin.text = "dynamixel_hardware_interface/DynamixelHardware"
+        _add_params(hardware, _dynamixel_params(robot))
+    rows = zip(
+        robot.limit_rad, robot.servo_ids, robot.servo_models, robot.position_p_gains, strict=True
+    )
+    for joint, (limit, number, model, gain) in enumerate(rows):
+        senses = "Present Current" in load_control_table(model).registers
+        each = ET.SubElement(system, "joint", name=f"joint{joint}")
+        command = ET.SubElement(each, "command_interface", name="position")
+        _add_params(command, {"min": repr(-limit), "max": repr(limit)})
+        for what in ("position", "velocity", *(("effort",) if senses else ())):
+            ET.SubElement(each, "state_interface", name=what)
+        if kind == "topic":
+            continue
+        servo = ET.SubElement(system, "gpio", name=f"dxl{number}")
+        _add_params(servo, {"type": "dxl", "ID": str(number)})
+        ET.SubElement(servo, "command_interface", name="Goal Position")
+        current = ("Present Current",) if senses else ()
+        for what in ("Present Position", "Present Velocity", *current):
+            ET.SubElement(servo, "state_interface", name=what)
+        settings = {"Operating Mode": _POSITION_MODE, "Position P Gain": gain}
+        _add_params(servo, {key: str(value) for key, value in settings.items()})
+
+
+def _dynamixel_params(robot: RobotConfig) -> dict[str, str]:
+    """Parameters of ROBOTIS's plugin; it knows signs of joints, but no zero of theirs.
+
+    Raises:
+        InputError: the robot has zeros, or several ports.
+
+    """
+    for joint, zero in enumerate(robot.zeros_rad):
+        if zero:
+            raise InputError(
+                f"{robot.name}: {robot.joint_name(joint)} has zero_rad {zero:g}, which "
+                "dynamixel_hardware_interface does not know: write it into Homing Offset "
+                "(snakewalk calibrate), or give --ros2-control topic"
+            )
+    if len(robot.ports) > 1:
+        raise InputError(
+            f"{robot.name}: its segments are on {len(robot.ports)} ports; "
+            "dynamixel_hardware_interface drives one: give --ros2-control topic"
+        )
+    count = robot.joint_count
+    signs = [[robot.signs[j] if j == k else 0 for k in range(count)] for j in range(count)]
+    matrix = ", ".join(str(value) for row in signs for value in row)
+    return {
+        "port_name": robot.ports[0].port if robot.ports else _DEVICE,
+        "baud_rate": str(robot.servo.baud),
+        "dynamixel_model_folder": "/param/dxl_model",
+        "number_of_joints": str(count),
+        "number_of_transmissions": str(count),
+        "disable_torque_at_init": "true",
+        "error_timeout_ms": "500",
+        "transmission_to_joint_matrix": matrix,
+        "joint_to_transmission_matrix": matrix,
+        "dynamixel_state_pub_msg_name": "dynamixel_hardware_interface/dxl_state",
+        "get_dynamixel_data_srv_name": "dynamixel_hardware_interface/get_dxl_data",
+        "set_dynamixel_data_srv_name": "dynamixel_hardware_interface/set_dxl_data",
+        "reboot_dxl_srv_name": "dynamixel_hardware_interface/reboot_dxl",
+        "set_dxl_torque_srv_name": "dynamixel_hardware_interface/set_dxl_torque",
+    }
+
+
+def _add_params(parent: ET.Element, values: Mapping[str, str]) -> None:
+    for name, value in values.items():
+        ET.SubElement(parent, "param", name=name).text = value
 
 
 def mjcf_text(robot: RobotConfig) -> str:

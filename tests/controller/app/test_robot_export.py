@@ -2,6 +2,8 @@
 
 import json
 from pathlib import Path
+from typing import Literal
+from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
@@ -123,3 +125,73 @@ def test_show_tells_each_link_where_links_differ(tmp_path: Path) -> None:
     assert [link["length_m"] for link in shown["each_link"]] == list(UNEVEN.link_lengths_m)
     assert shown["mass_kg"] == 1.21
     assert "none" in CliRunner().invoke(app, words).stdout
+
+
+def system(robot: RobotConfig, kind: Literal["topic", "dynamixel"]) -> ET.Element:
+    root = ET.fromstring(urdf_text(robot, kind))
+    found = root.find("ros2_control")
+    assert found is not None
+    assert found.get("type") == "system"
+    return found
+
+
+def params(of: ET.Element | None) -> dict[str, str]:
+    assert of is not None
+    return {each.get("name", ""): each.text or "" for each in of.findall("param")}
+
+
+def test_ros2_control_drives_our_node_by_its_topics() -> None:
+    robot = load_robot("alternating16")
+    tag = system(robot, "topic")
+    hardware = tag.find("hardware")
+    assert hardware is not None
+    assert hardware.findtext("plugin") == (
+        "joint_state_topic_hardware_interface/JointStateTopicSystem"
+    )
+    assert params(hardware) == {
+        "joint_commands_topic": "/robot_joint_command",
+        "joint_states_topic": "/robot_joint_states",
+    }
+    joints = tag.findall("joint")
+    assert [each.get("name") for each in joints] == [f"joint{k}" for k in range(16)]
+    for joint, limit in zip(joints, robot.limit_rad, strict=True):
+        asked = joint.find("command_interface")
+        assert asked is not None
+        assert asked.get("name") == "position"
+        assert params(asked) == {"min": repr(-limit), "max": repr(limit)}
+        states = [each.get("name") for each in joint.findall("state_interface")]
+        assert states == ["position", "velocity", "effort"]
+    assert not tag.findall("gpio")
+    assert mujoco.MjModel.from_xml_string(urdf_text(robot, "topic")).nq == 16
+
+
+def test_ros2_control_drives_the_servos_themselves_with_their_signs(tmp_path: Path) -> None:
+    file = tmp_path / "two.toml"
+    joints = '[[joints]]\naxis = "y"\nid = 9\nsign = -1\n[[joints]]\naxis = "p"\nid = 4\n'
+    file.write_text(f'name = "two"\n{joints}')
+    tag = system(load_robot(str(file)), "dynamixel")
+    own = params(tag.find("hardware"))
+    assert own["baud_rate"] == "1000000"
+    assert own["number_of_joints"] == own["number_of_transmissions"] == "2"
+    # row by row, split at commas, as the plugin reads it
+    assert [float(v) for v in own["transmission_to_joint_matrix"].split(",")] == [-1, 0, 0, 1]
+    assert own["joint_to_transmission_matrix"] == own["transmission_to_joint_matrix"]
+    servos = tag.findall("gpio")
+    assert [params(each)["ID"] for each in servos] == ["9", "4"]
+    assert {params(each)["type"] for each in servos} == {"dxl"}
+    for servo in servos:
+        asked = [each.get("name") for each in servo.findall("command_interface")]
+        assert asked == ["Goal Position"]
+    file.write_text(f'name = "two"\n{joints}zero_rad = 0.1\n')
+    with pytest.raises(InputError, match=r"zero_rad 0\.1.*--ros2-control topic"):
+        urdf_text(load_robot(str(file)), "dynamixel")
+
+
+def test_ros2_control_is_a_part_of_a_urdf(tmp_path: Path) -> None:
+    words = ["robot", "export", "yaw16", "--ros2-control", "topic"]
+    alone = CliRunner().invoke(app, [*words, "--mjcf", str(tmp_path / "a.xml")]).exception
+    assert isinstance(alone, InputError)
+    assert "give --urdf FILE" in str(alone)
+    file = tmp_path / "a.urdf"
+    assert CliRunner().invoke(app, [*words, "--urdf", str(file)]).exit_code == 0
+    assert "/robot_joint_command" in file.read_text()

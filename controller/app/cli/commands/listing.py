@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.table import Table
@@ -144,6 +144,14 @@ def export_robot(
     mjcf: Annotated[
         Path | None, typer.Option(help="write a MuJoCo model here, on a level floor")
     ] = None,
+    ros2_control: Annotated[
+        Literal["topic", "dynamixel"] | None,
+        typer.Option(
+            help="with a tag for ros2_control in the URDF: topic drives snakewalk ros, dynamixel "
+            "the servos without it",
+            show_default=False,
+        ),
+    ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -154,12 +162,17 @@ def export_robot(
 
     if urdf is None and mjcf is None:
         raise InputError("say what to write: --urdf FILE, --mjcf FILE, or both")
+    if ros2_control is not None and urdf is None:
+        raise InputError(f"--ros2-control {ros2_control}: is a part of a URDF: give --urdf FILE")
     refuse_to_overwrite([urdf, mjcf], force)
     robot = load_robot(name)
+    texts = {}
+    if urdf is not None:
+        texts[urdf] = urdf_text(robot, ros2_control)
     if mjcf is not None:
         require_extra("MuJoCo models need", "mujoco")
-    for path, text in ((urdf, urdf_text), (mjcf, mjcf_text)):
-        if path is not None:
-            with atomic_write(path) as part:
-                part.write_text(text(robot), encoding="utf-8")
+        texts[mjcf] = mjcf_text(robot)
+    for path, text in texts.items():
+        with atomic_write(path) as part:
+            part.write_text(text, encoding="utf-8")
     show({"robot": robot.name, "urdf": urdf and str(urdf), "mjcf": mjcf and str(mjcf)}, as_json)
