@@ -118,8 +118,8 @@ def test_workers_are_started_in_one_place_and_every_process_is_spawned() -> None
     names = ("multiprocessing", "ProcessPoolExecutor", "os.fork")
     texts = {p.relative_to(root).as_posix(): p.read_text() for p in sources}
     starters = {p: text for p, text in texts.items() if any(name in text for name in names)}
-    # no workers: they draw what they are sent
-    drawing = {"controller/app/cli/live_table.py", "controller/app/view/live_view.py"}
+    # no workers: they show what they are sent
+    drawing = {"controller/app/cli/live_table.py", "controller/app/view/watcher.py"}
     assert set(starters) == {"controller/app/studies/pool.py", *drawing}
     for drawer in drawing:
         contexts = starters[drawer].count("get_context(")
