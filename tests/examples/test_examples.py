@@ -3,6 +3,7 @@
 import ast
 import runpy
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,8 @@ NAMES = (
     "sweep",
     "learn_wave",
 )
+WITH_TORCH = "learn_policy"
+"""Trains with packages that are no extra of ours; that it ran is told in docs/policies.md."""
 ALLOWED = {"snakewalk", "numpy", "pytest", "gymnasium"} | set(sys.stdlib_module_names)
 
 
@@ -32,7 +35,20 @@ def shown_help(path: Path, monkeypatch: pytest.MonkeyPatch, out: pytest.CaptureF
 
 
 def test_these_are_the_examples() -> None:
-    assert {file.stem for file in FOLDER.glob("*.py")} == set(NAMES)
+    assert {file.stem for file in FOLDER.glob("*.py")} == {*NAMES, WITH_TORCH}
+
+
+def test_what_the_training_takes_of_the_library_is_there() -> None:
+    tree = ast.parse((FOLDER / f"{WITH_TORCH}.py").read_text(encoding="utf-8"))
+    taken = [
+        (node.module, each.name)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("snakewalk")
+        for each in node.names
+    ]
+    assert taken
+    for module, name in taken:
+        assert hasattr(import_module(str(module)), name)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -20,6 +20,7 @@ from snakewalk.controller.app.result_files import LOG
 
 if TYPE_CHECKING:
     from snakewalk.controller.app.report.artifacts import Artifacts
+    from snakewalk.controller.app.runs.execute import Finished
     from snakewalk.controller.metrics.summary import RunSummary
     from snakewalk.controller.runlog.record import RunRecord
 
@@ -258,3 +259,14 @@ def write_artifacts(
     for line in made.notes:
         LOGGER.warning("%s", line)
     return made
+
+
+def show_run(
+    finished: "Finished", folder: Path, facts: Mapping[str, object], as_json: bool, *, film: bool
+) -> None:
+    """Make the report and the film, and show a run's facts and files; exit 1 if safety tripped."""
+    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
+    files = {"log": str(finished.log), "summary": str(folder / "summary.json")}
+    show({**facts, **files, **artifacts.to_dict()}, as_json)
+    if finished.outcome.tripped is not None:
+        raise SystemExit(1)

@@ -29,8 +29,7 @@ from snakewalk.controller.app.cli.options import (
     ViewAt,
     World,
     key_values,
-    show,
-    write_artifacts,
+    show_run,
 )
 from snakewalk.controller.app.result_files import run_folder
 
@@ -131,7 +130,6 @@ def run_gait(
             on_progress=on_progress,
             on_event=bar.on_event,
         )
-    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     result: dict[str, object] = {
         "gait": prepared.config.name,
         "robot": prepared.robot.name,
@@ -159,13 +157,8 @@ def run_gait(
         "mechanical_cost_of_transport": finished.summary.mechanical_cost_of_transport,
         "peak_current_a": finished.summary.peak_current_a,
         "peak_temperature_c": finished.summary.peak_temperature_c,
-        "log": str(finished.log),
-        "summary": str(folder / "summary.json"),
-        **artifacts.to_dict(),
     }
-    show(result, as_json)
-    if finished.outcome.tripped is not None:
-        raise SystemExit(1)
+    show_run(finished, folder, result, as_json, film=film)
 
 
 class _Hands:

@@ -20,8 +20,7 @@ from snakewalk.controller.app.cli.options import (
     ViewAt,
     World,
     key_values,
-    show,
-    write_artifacts,
+    show_run,
 )
 from snakewalk.controller.app.result_files import run_folder
 
@@ -81,7 +80,6 @@ def play(
             on_progress=in_real_time(bar.on_progress) if watchers and not port else bar.on_progress,
             on_event=bar.on_event,
         )
-    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     result: dict[str, object] = {
         "recording": track,
         "robot": prepared.robot.name,
@@ -92,13 +90,8 @@ def play(
         "duration_s": round(finished.outcome.duration_s, 2),
         "tripped": finished.outcome.tripped,
         "peak_current_a": finished.summary.peak_current_a,
-        "log": str(finished.log),
-        "summary": str(folder / "summary.json"),
-        **artifacts.to_dict(),
     }
-    show(result, as_json)
-    if finished.outcome.tripped is not None:
-        raise SystemExit(1)
+    show_run(finished, folder, result, as_json, film=film)
 
 
 def _speed(text: str) -> float | None:

@@ -30,8 +30,7 @@ from snakewalk.controller.app.cli.options import (
     World,
     console,
     key_values,
-    show,
-    write_artifacts,
+    show_run,
 )
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite, run_folder
 
@@ -114,7 +113,6 @@ def run_policy(
             on_progress=in_real_time(bar.on_progress) if view and not port else bar.on_progress,
             on_event=bar.on_event,
         )
-    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     result: dict[str, object] = {
         "policy": name,
         "robot": prepared.robot.name,
@@ -125,13 +123,8 @@ def run_policy(
         "travelled_m": finished.summary.travelled_m,
         "electrical_energy_j": finished.summary.electrical_energy_j,
         "peak_current_a": finished.summary.peak_current_a,
-        "log": str(finished.log),
-        "summary": str(folder / "summary.json"),
-        **artifacts.to_dict(),
     }
-    show(result, as_json)
-    if finished.outcome.tripped is not None:
-        raise SystemExit(1)
+    show_run(finished, folder, result, as_json, film=film)
 
 
 def learn_policy(

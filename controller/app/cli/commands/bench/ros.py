@@ -19,8 +19,7 @@ from snakewalk.controller.app.cli.options import (
     ViewAt,
     World,
     key_values,
-    show,
-    write_artifacts,
+    show_run,
 )
 from snakewalk.controller.app.result_files import run_folder
 
@@ -112,19 +111,11 @@ def ros(
                 on_progress=bar.on_progress if port else in_real_time(bar.on_progress),
                 on_event=bar.on_event,
             )
-    artifacts = write_artifacts(finished.record, folder, finished.summary, film=False)
-    show(
-        {
-            "robot": prepared.robot.name,
-            "world": prepared.world.name,
-            "duration_s": round(finished.outcome.duration_s, 2),
-            "tripped": finished.outcome.tripped,
-            "peak_current_a": finished.summary.peak_current_a,
-            "log": str(finished.log),
-            "summary": str(folder / "summary.json"),
-            **artifacts.to_dict(),
-        },
-        as_json,
-    )
-    if finished.outcome.tripped is not None:
-        raise SystemExit(1)
+    facts = {
+        "robot": prepared.robot.name,
+        "world": prepared.world.name,
+        "duration_s": round(finished.outcome.duration_s, 2),
+        "tripped": finished.outcome.tripped,
+        "peak_current_a": finished.summary.peak_current_a,
+    }
+    show_run(finished, folder, facts, as_json, film=False)

@@ -20,8 +20,7 @@ from snakewalk.controller.app.cli.options import (
     ViewAt,
     World,
     key_values,
-    show,
-    write_artifacts,
+    show_run,
 )
 from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite, run_folder
 
@@ -105,7 +104,6 @@ def play_actions(
         )
     assert isinstance(finished.source, ScheduleMotion), "a schedule's run has no other motion"
     played = finished.source.played
-    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     names = [segment.name for segment in prepared.repertoire.segments]
     result: dict[str, object] = {
         "repertoire": str(file),
@@ -130,7 +128,4 @@ def play_actions(
 
             plots.draw_schedule(prepared, played, picture)
             result["picture"] = str(picture)
-    result |= {"log": str(finished.log), "summary": str(folder / "summary.json")}
-    show(result | artifacts.to_dict(), as_json)
-    if finished.outcome.tripped is not None:
-        raise SystemExit(1)
+    show_run(finished, folder, result, as_json, film=film)
