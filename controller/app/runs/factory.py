@@ -133,7 +133,7 @@ def prepare_job(
     options = {key: value for key, value in changes.items() if value is not None}
     options.setdefault("track", track_beside(run.track, beside))
     run = checked(RunConfig, run.model_dump() | options, "command line")
-    run = _with_keys_of("run", run, keys)
+    run = with_keys_of("run", run, keys)
     if run.motion == "kp" and not on_paper:
         raise InputError(
             f"run {run.name}: kp is a motion on paper: snakewalk synthesise RUN --motion kp "
@@ -151,9 +151,9 @@ def prepare_job(
     if run.motion == "source":
         raise InputError(f"run {run.name}: a source of your own is run by prepare_source")
     robot = run.walk.pitch.set_up(load_robot(run.robot, beside))
-    robot = _with_keys_of("robot", robot, keys)
+    robot = with_keys_of("robot", robot, keys)
     _check_servos(run, robot)
-    world = _with_keys_of("world", load_world(run.world, beside), keys)
+    world = with_keys_of("world", load_world(run.world, beside), keys)
     if run.motion == "gait":
         if changes.get("track") is not None:
             raise InputError(f"run {run.name}: moves by a gait: leave --track out")
@@ -209,7 +209,23 @@ def _in_rad(key: str, value: object) -> tuple[str, object]:
     return f"{key.removesuffix('_deg')}_rad", value
 
 
-def _with_keys_of(file: str, config: C, keys: Mapping[str, object]) -> C:
+def gait_keys(keys: Mapping[str, object] | None) -> dict[str, object]:
+    """Return keys of run, robot and world that a gait's run takes, angles in rad.
+
+    Raises:
+        InputError: a key is of none of the files, or has an option of its own; one line each.
+
+    """
+    return _checked_keys(keys, _OF_A_GAIT)
+
+
+def with_keys_of(file: str, config: C, keys: Mapping[str, object]) -> C:
+    """Replace values of the run's, the robot's or the world's file by their keys.
+
+    Raises:
+        InputError: one line per fault.
+
+    """
     own = {k.removeprefix(f"{file}."): v for k, v in keys.items() if k.startswith(f"{file}.")}
     return with_keys(config, own, f"{file} {config.name}") if own else config
 
@@ -264,7 +280,7 @@ def prepare_gait(
     """
     if make_operator is not None and (then or by == "cpg"):
         raise InputError("--live changes gaits by keys and joins: leave out --then and --by cpg")
-    keys = _checked_keys(keys, _OF_A_GAIT)
+    keys = gait_keys(keys)
     gait, known = gait_by_name(name, parameters)
     if known is not None:
         robot, world = robot or known.robot, world or known.world
@@ -272,7 +288,7 @@ def prepare_gait(
     gaits = [gait, *(other for _, other in changes)]
     pitch = any(each.needs.pitch for each in gaits)
     own = robot or fitting_robot(each.needs for each in gaits)
-    body = _with_keys_of("robot", load_robot(own), keys)
+    body = with_keys_of("robot", load_robot(own), keys)
     for each in gaits:
         each.check(body)
     run = checked(
@@ -300,11 +316,11 @@ def prepare_gait(
         },
         "command line",
     )
-    run = _with_keys_of("run", run, keys)
+    run = with_keys_of("run", run, keys)
     _check_servos(run, body)
     soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
     body = _with_gains(body, pitch=pitch, soft=soft)
-    ground = _with_keys_of("world", load_world(run.world), keys)
+    ground = with_keys_of("world", load_world(run.world), keys)
     return GaitRun(run, body, ground, make_operator)
 
 
@@ -358,7 +374,7 @@ def prepare_playback(
 
     """
     keys = _checked_keys(keys, _OF_A_RECORDING)
-    body = _with_keys_of("robot", load_robot(robot or "yaw16"), keys)
+    body = with_keys_of("robot", load_robot(robot or "yaw16"), keys)
     fields = {
         "name": Path(track).stem,
         "robot": body.name,
@@ -367,10 +383,10 @@ def prepare_playback(
         "motion": "playback",
         "playback": {"speed": speed, "scale": scale, "clip": clip},
     }
-    run = _with_keys_of("run", checked(RunConfig, fields, "command line"), keys)
+    run = with_keys_of("run", checked(RunConfig, fields, "command line"), keys)
     _refuse_legs(body)
     _check_servos(run, body)
-    prepared = PlaybackRun(run, body, _with_keys_of("world", load_world(run.world), keys))
+    prepared = PlaybackRun(run, body, with_keys_of("world", load_world(run.world), keys))
     Recorded(body, *prepared.joint_track).needs.check(body, "this recording")
     if "run.time_limit_s" in keys:
         return prepared
@@ -398,7 +414,7 @@ def prepare_schedule(
     """
     keys = _checked_keys(keys, _OF_A_SCHEDULE)
     recorded = load_repertoire(file)
-    body = _with_keys_of("robot", load_robot(robot or recorded.robot), keys)
+    body = with_keys_of("robot", load_robot(robot or recorded.robot), keys)
     fields = {
         "name": file.stem,
         "robot": body.name,
@@ -408,9 +424,9 @@ def prepare_schedule(
         "time_limit_s": schedule.duration_s + 30.0,
         "repertoire": schedule.model_dump() | {"file": str(file), "patience": patience},
     }
-    run = _with_keys_of("run", checked(RunConfig, fields, "command line"), keys)
+    run = with_keys_of("run", checked(RunConfig, fields, "command line"), keys)
     _check_servos(run, body)
-    prepared = ScheduleRun(run, body, _with_keys_of("world", load_world(run.world), keys))
+    prepared = ScheduleRun(run, body, with_keys_of("world", load_world(run.world), keys))
     prepared.check_plan()
     return prepared
 
@@ -436,7 +452,7 @@ def prepare_source(
 
     """
     keys = _checked_keys(keys, _OF_A_SOURCE)
-    body = _with_keys_of("robot", load_robot(robot or "yaw16"), keys)
+    body = with_keys_of("robot", load_robot(robot or "yaw16"), keys)
     needs = make(body).needs
     needs.check(body, "the motion source")
     fields = {
@@ -447,9 +463,9 @@ def prepare_source(
         "seed": seed,
         "time_limit_s": seconds,
     }
-    run = _with_keys_of("run", checked(RunConfig, fields, "prepare_source"), keys)
+    run = with_keys_of("run", checked(RunConfig, fields, "prepare_source"), keys)
     _check_servos(run, body)
-    ground = _with_keys_of("world", load_world(run.world), keys)
+    ground = with_keys_of("world", load_world(run.world), keys)
     return SourceRun(run, _with_gains(body, pitch=needs.pitch), ground, make)
 
 
@@ -500,7 +516,7 @@ def prepare_commanded(
 
     """
     keys = _checked_keys(keys, _OF_A_SOURCE)
-    body = _with_keys_of("robot", load_robot(robot or "yaw16"), keys)
+    body = with_keys_of("robot", load_robot(robot or "yaw16"), keys)
     fields = {
         "name": name,
         "robot": body.name,
@@ -508,9 +524,9 @@ def prepare_commanded(
         "motion": "source",
         "time_limit_s": seconds,
     }
-    run = _with_keys_of("run", checked(RunConfig, fields, "command line"), keys)
+    run = with_keys_of("run", checked(RunConfig, fields, "command line"), keys)
     _check_servos(run, body)
-    ground = _with_keys_of("world", load_world(run.world), keys)
+    ground = with_keys_of("world", load_world(run.world), keys)
     return CommandedRun(run, _with_gains(body, pitch=bool(len(body.pitch_joints))), ground, make)
 
 

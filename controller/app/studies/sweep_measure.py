@@ -61,6 +61,7 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
             parameters=dict(point.parameters),
             seconds=point.seconds,
             seed=point.seed,
+            keys=dict(point.keys),
         )
         if vary is not None:
             prepared = varied(prepared, np.random.default_rng(vary))

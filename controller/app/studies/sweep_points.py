@@ -1,5 +1,6 @@
 """Points of a sweep: a Sobol sequence over the parameters of gaits, as far as robots allow them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,9 @@ from scipy.stats import qmc
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.loader import load_robot
+from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.app.runs.factory import gait_keys, with_keys_of
 from snakewalk.controller.gaits.gait import Gait, Range, ranges
 from snakewalk.controller.gaits.registry import GAITS
 
@@ -32,12 +34,15 @@ class Point:
     seed: int
     seconds: float
     parameters: dict[str, Any] = field(default_factory=dict)
+    keys: tuple[tuple[str, Any], ...] = ()
+    """Values of run, robot and world that are replaced, as of ``prepare_gait``."""
 
     @property
     def key(self) -> tuple[str, ...]:
         """What tells it from other points of a table, as text."""
         place = (self.gait, self.robot, self.world)
-        return (*place, str(self.number), str(self.seed), f"{self.seconds:g}")
+        replaced = " ".join(f"{key}={value}" for key, value in self.keys)
+        return (*place, replaced, str(self.number), str(self.seed), f"{self.seconds:g}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,10 +84,12 @@ def points_of(
     seed: int,
     seconds: float,
     file: str | None = None,
+    keys: Mapping[str, Any] | None = None,
 ) -> tuple[list[Point], int]:
     """Return up to ``count`` points that the robot's joints allow, and how many they did not.
 
-    ``file`` is where the robot stands if it is not shipped: a worker loads it again.
+    ``file`` is where the robot stands if it is not shipped: a worker loads it again, with ``keys``,
+    which ``robot`` has already.
 
     Raises:
         InputError: the robot lacks joints that the gait needs.
@@ -91,7 +98,8 @@ def points_of(
     gait().check(robot)
     space = Space.of(gait)
     place = (gait.name, file or robot.name, gait.world)
-    found = [Point(*place, 0, seed, seconds)]
+    replaced = tuple((keys or {}).items())
+    found = [Point(*place, 0, seed, seconds, keys=replaced)]
     refused = 0
     sobol = qmc.Sobol(
         len(space.spans), rng=np.random.default_rng([seed, crc32(gait.name.encode())])
@@ -107,7 +115,7 @@ def points_of(
             refused += 1
             continue
         number = len(found)
-        found.append(Point(*place, number, seed, seconds, values))
+        found.append(Point(*place, number, seed, seconds, values, replaced))
     return found, refused
 
 
@@ -135,26 +143,32 @@ def plan_sweep(
     *,
     seed: int,
     seconds: float,
+    keys: Mapping[str, Any] | None = None,
 ) -> Planned:
-    """Draw the points.
+    """Draw the points; ``keys`` as of ``prepare_gait``.
 
     Raises:
-        InputError: unknown gaits or robots, or nothing that fits.
+        InputError: unknown gaits, robots or keys, or nothing that fits.
 
     """
+    keys = gait_keys(keys)
     unknown = [name for name in gaits or () if name not in GAITS]
     if unknown:
         raise InputError(
             [f"{name}: no such gait; there are {', '.join(GAITS)}" for name in unknown]
         )
-    bodies = [(load_robot(name), robot_file(name)) for name in robots or ROBOTS]
+    bodies = [
+        (with_keys_of("robot", load_robot(name), keys), robot_file(name))
+        for name in robots or ROBOTS
+    ]
     points: list[Point] = []
     left_out: list[str] = []
     for name in gaits or GAITS:
         for body, file in bodies:
             try:
+                with_keys_of("world", load_world(GAITS[name].world), keys)
                 some, refused = points_of(
-                    GAITS[name], body, count, seed=seed, seconds=seconds, file=file
+                    GAITS[name], body, count, seed=seed, seconds=seconds, file=file, keys=keys
                 )
             except InputError as error:
                 left_out.append(error.faults[0])

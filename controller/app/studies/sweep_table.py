@@ -14,7 +14,7 @@ from snakewalk.controller.app.studies.table import CsvTable, read_csv_table
 from snakewalk.controller.gaits.gait import Aim
 from snakewalk.controller.gaits.registry import GAITS
 
-_PLACE = ("gait", "robot", "world", "number", "seed", "seconds")
+_PLACE = ("gait", "robot", "world", "keys", "number", "seed", "seconds")
 _MEASURED = tuple(field.name for field in fields(Measurement))
 _PARAMETERS = tuple(sorted({key for gait in GAITS.values() for key in gait.model.model_fields}))
 COLUMNS = (*_PLACE, *_MEASURED, *_PARAMETERS)
@@ -69,6 +69,8 @@ class GaitDigest:
 
     gait: str
     robot: str
+    keys: str
+    """Values that were replaced, ``KEY=VALUE KEY=VALUE``."""
     points: int
     tripped: int
     """Points that did not run to their end."""
@@ -88,16 +90,18 @@ class GaitDigest:
 
 
 def digest(rows: list[dict[str, str]]) -> list[GaitDigest]:
-    """Return one row a gait and robot, in the order in which they appear."""
+    """Return one row a gait, robot and set of replaced values, as they appear."""
     found: list[GaitDigest] = []
-    for gait, robot in dict.fromkeys((row["gait"], row["robot"]) for row in rows):
-        some = [row for row in rows if (row["gait"], row["robot"]) == (gait, robot)]
+    cases = [(row["gait"], row["robot"], row["keys"]) for row in rows]
+    for gait, robot, keys in dict.fromkeys(cases):
+        some = [row for row, case in zip(rows, cases, strict=True) if case == (gait, robot, keys)]
         ran = [row for row in some if row["cycles"] and row["ended"] == "ran to its end"]
         first = next((row for row in ran if row["number"] == "0"), None)
         found.append(
             GaitDigest(
                 gait=gait,
                 robot=robot,
+                keys=keys,
                 points=len(some),
                 tripped=len(some) - len(ran),
                 default_bl_cycle=_round(math.nan if first is None else distance_bl(first), 3),

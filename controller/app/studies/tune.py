@@ -5,7 +5,7 @@ keeps to the box of the parameters' ranges, and its generations run side by side
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
@@ -15,7 +15,8 @@ from scipy.optimize import Bounds, differential_evolution
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.loader import load_robot
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.controller.app.runs.factory import gait_keys, with_keys_of
 from snakewalk.controller.app.studies.pool import process_pool
 from snakewalk.controller.app.studies.sweep_measure import Measurement, measure
 from snakewalk.controller.app.studies.sweep_points import Point, Space, robot_file
@@ -125,19 +126,25 @@ def tune(
     seconds: float,
     seed: int,
     workers: int,
+    keys: Mapping[str, Any] | None = None,
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> Tuned:
     """Search with about ``budget`` runs, then compare with the defaults on ``seeds`` other grounds.
+
+    ``keys`` replace values of run, robot and world, as of ``prepare_gait``.
 
     Raises:
         InputError: no such gait or robot, or they do not fit.
 
     """
-    body = load_robot(robot)
+    keys = gait_keys(keys)
+    body = with_keys_of("robot", load_robot(robot), keys)
     kind = type(make_gait(gait))
+    with_keys_of("world", load_world(kind.world), keys)
     kind().check(body)
     space = Space.of(kind)
-    start = Point(gait, robot_file(robot) or body.name, kind.world, 0, seed, seconds)
+    place = (gait, robot_file(robot) or body.name, kind.world)
+    start = Point(*place, 0, seed, seconds, keys=tuple(keys.items()))
     default = kind().params.model_dump()
     with process_pool(workers) as pool:
         first = measure(start)

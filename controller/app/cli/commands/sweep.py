@@ -11,7 +11,7 @@ from rich.table import Table
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli import completion
-from snakewalk.controller.app.cli.options import Force, Json, console
+from snakewalk.controller.app.cli.options import Force, Json, Set, console, key_values
 from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
@@ -42,6 +42,7 @@ def sweep(
             autocompletion=completion.ROBOTS,
         ),
     ] = None,
+    set_: Set = None,
     points: Annotated[int, typer.Option(min=1, max=100_000, help="of each gait and robot")] = 30,
     seconds: Annotated[float, typer.Option(min=4.0, max=3600.0, help="of each run")] = 12.0,
     seed: Annotated[int, typer.Option(min=0, help="of the choice of points")] = 0,
@@ -62,6 +63,7 @@ def sweep(
     check_picture(picture)
     refuse_to_overwrite([picture], force)
     refuse_to_overwrite([out], force=True)  # a table grows
+    keys = key_values("--set", set_)
 
     from snakewalk.controller.app.progress import show_progress  # noqa: PLC0415
     from snakewalk.controller.app.studies.pool import each  # noqa: PLC0415
@@ -71,7 +73,7 @@ def sweep(
     from snakewalk.controller.app.studies.sweep_table import digest, read_table  # noqa: PLC0415
 
     require_extra("a sweep needs", "mujoco" if dask is None else "distributed")
-    planned = plan_sweep(gaits, robot, points, seed=seed, seconds=seconds)
+    planned = plan_sweep(gaits, robot, points, seed=seed, seconds=seconds, keys=keys)
     for line in () if as_json else planned.left_out:
         console.print(f"left out: {line}", style="dim")
     table = Sweep(out)
@@ -113,6 +115,6 @@ def _show(out: Path, rows: list[dict[str, Any]]) -> None:
     for key, head in _HEADS.items():
         grid.add_column(head, justify="left" if key == "pace" else "right", no_wrap=True)
     for one in rows:
-        named = f"{one['gait']} {one['robot']}"
+        named = f"{one['gait']} {one['robot']} {one['keys']}".rstrip()
         grid.add_row(named, *["" if one[key] is None else str(one[key]) for key in _HEADS])
     console.print(grid)

@@ -9,7 +9,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli import completion
-from snakewalk.controller.app.cli.options import Json, Robot, show
+from snakewalk.controller.app.cli.options import Json, Robot, Set, key_values, show
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
 
@@ -21,6 +21,7 @@ def tune(
         Literal["speed", "efficiency"], typer.Option("--for", help="what to make better")
     ] = "speed",
     robot: Robot = None,
+    set_: Set = None,
     budget: Annotated[int, typer.Option(min=16, help="runs of the search")] = 120,
     seeds: Annotated[int, typer.Option(min=1, help="other grounds to compare on")] = 5,
     seconds: Annotated[float, typer.Option(min=4.0, help="of each run")] = 10.0,
@@ -36,6 +37,7 @@ def tune(
     if out is not None and out.suffix != ".toml":
         raise InputError(f"{out}: a set of parameters ends in .toml")
     refuse_to_overwrite([out], force)
+    keys = key_values("--set", set_)
 
     from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
     from snakewalk.controller.app.studies import tune as search  # noqa: PLC0415  heavy; --help stays quick
@@ -56,6 +58,7 @@ def tune(
             seconds=seconds,
             seed=seed,
             workers=workers,
+            keys=keys,
             on_progress=bar.update,
         )
         bar.update(budget)
@@ -73,6 +76,7 @@ def tune(
     if out is not None:
         lines = [
             f"# tuned for {aim}: {result.margin:+.0%} on {seeds} grounds",
+            *(f"# with {key} = {json.dumps(value)}" for key, value in keys.items()),
             f"name = {json.dumps(out.stem, ensure_ascii=False)}",
         ]
         lines += [f"gait = {json.dumps(gait)}", f"robot = {json.dumps(body)}", "", "[parameters]"]

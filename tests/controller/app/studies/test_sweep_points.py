@@ -30,6 +30,25 @@ def test_points_are_in_range_and_within_the_joints(name: str) -> None:
     assert len({tuple(p.parameters.items()) for p in points}) == 30
 
 
+def test_replaced_values_go_with_each_point_into_its_run() -> None:
+    pytest.importorskip("mujoco")
+    keys = {"world.friction.across": 0.35, "robot.yaw_limit_rad": 0.7, "run.cycle_hz": 40}
+    planned = plan_sweep(["lateral-undulation"], ["yaw16"], 2, seed=0, seconds=4.0, keys=keys)
+    plain = plan_sweep(["lateral-undulation"], ["yaw16"], 2, seed=0, seconds=4.0)
+    narrow, wide = planned.points[1], plain.points[1]
+    assert narrow.parameters != wide.parameters  # its joints bend less
+    assert planned.points[0].key != plain.points[0].key
+    slick, usual = measure(planned.points[0]), measure(plain.points[0])
+    assert slick.ended == usual.ended == "ran to its end"
+    assert slick.speed_m_s is not None
+    assert usual.speed_m_s is not None
+    assert slick.speed_m_s < 0.95 * usual.speed_m_s
+    with pytest.raises(InputError, match="did you mean"):
+        plan_sweep(None, None, 1, seed=0, seconds=4.0, keys={"wrld.friction.across": 1})
+    with pytest.raises(InputError, match="--param"):
+        plan_sweep(None, None, 1, seed=0, seconds=4.0, keys={"run.gait.name": "rolling"})
+
+
 def test_a_robot_of_ones_own_is_loaded_again_in_another_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

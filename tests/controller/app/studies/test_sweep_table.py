@@ -73,6 +73,19 @@ def test_other_seeds_are_other_points(tmp_path: Path) -> None:
     assert Table(tmp_path / "t.csv").missing([POINTS[0], other]) == [other]
 
 
+def test_other_replaced_values_are_other_points_and_a_row_of_their_own(tmp_path: Path) -> None:
+    table = tmp_path / "t.csv"
+    keys = (("world.friction.across", 0.4), ("run.seed", 3))
+    other = replace(POINTS[0], keys=keys)
+    with Table(table) as rows:
+        rows.add(POINTS[0], row(0.1))
+        rows.add(other, row(0.2))
+    assert Table(table).missing([POINTS[0], other]) == []
+    assert Table(table).missing([replace(other, keys=keys[:1])]) != []
+    told = [one.keys for one in digest(read_table(table))]
+    assert told == ["", "world.friction.across=0.4 run.seed=3"]
+
+
 def test_another_file_is_not_touched(tmp_path: Path) -> None:
     path = tmp_path / "mine.csv"
     path.write_text("a,b\n1,2\n")
