@@ -19,7 +19,7 @@ $(STAMP): pyproject.toml
 	$(PY) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
 	$(PY) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --no-warn-conflicts --editable '.[dev]'
+	$(BIN)/pip install --quiet --no-compile --no-warn-conflicts --editable '.[dev]'
 	$(BIN)/pip install --quiet --no-deps $(CLIENTS) || echo "tests of other clients are skipped"
 	$(BIN)/pip install --quiet --no-deps --target $(VENV)/clients $(ASIDE) || echo "as above"
 	rm -rf $(VENV)/clients/dynamixel_sdk
@@ -31,7 +31,7 @@ loops: setup
 	PYTHONDONTWRITEBYTECODE= $(BIN)/python .ci/loops
 
 run: loops
-	$(BIN)/snakewalk run
+	PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk run
 
 # The types are checked while the loops are compiled and the tests collected: neither fills two cores.
 test: setup lint
