@@ -241,31 +241,28 @@ def light(installed: Installed, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return folder
 
 
-def test_the_fixture_needs_no_more_than_the_page_says(light: Path, tmp_path: Path) -> None:
-    (tmp_path / "test_light.py").write_text(LIGHT_TEST)
-    done = subprocess.run(
-        # without the environment's own packages
-        [sys.executable, "-S", "-m", "pytest", "-q", "-p", "no:cacheprovider"],
-        cwd=tmp_path,
+def lightly(light: Path, folder: Path, *words: str) -> "subprocess.CompletedProcess[str]":
+    """Run Python on the light install, without the environment's own packages."""
+    return subprocess.run(
+        [sys.executable, "-S", *words],
+        cwd=folder,
         env={"PYTHONPATH": str(light), "PATH": ""},
         capture_output=True,
         text=True,
         timeout=120,
         check=False,
     )
+
+
+def test_the_fixture_needs_no_more_than_the_page_says(light: Path, tmp_path: Path) -> None:
+    (tmp_path / "test_light.py").write_text(LIGHT_TEST)
+    done = lightly(light, tmp_path, "-m", "pytest", "-q", "-p", "no:cacheprovider")
     assert "9 passed" in done.stdout, done.stdout + done.stderr
 
 
 def test_what_needs_more_says_what_to_install(light: Path, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-S", "-c", "from snakewalk.controller.app.cli.main import main; main()"],
-        cwd=tmp_path,
-        env={"PYTHONPATH": str(light), "PATH": ""},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    command = "from snakewalk.controller.app.cli.main import main; main()"
+    done = lightly(light, tmp_path, "-c", command)
     assert done.returncode == 2
     assert done.stderr == (
         "snakewalk: this needs typer, which a light install leaves out: pip install snakewalk\n"

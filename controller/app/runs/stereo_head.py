@@ -74,7 +74,8 @@ class StereoHead:
         self._random = np.random.default_rng([run.seed, 1])
         self._coming: deque[_Seen] = deque()
         self._next_s = -np.inf
-        self._before: tuple[float, CameraFrame] | None = None
+        self._before: tuple[float, Floats] | None = None
+        """Time and qpos (7 + J,) of the last call."""
 
     def observe(self, now_s: float, pose: BodyPose, joint_rad: Floats) -> None:
         """Take a picture if one is due; add those to the map that are matched by now.
@@ -85,13 +86,13 @@ class StereoHead:
             joint_rad: (J,) as measured.
 
         """
-        frame = self._true_frame()
+        qpos = np.array(self._qpos())
         if now_s >= self._next_s - 1e-9:
             self._next_s = now_s + self._mapping.period_s
             body = body_in_world(self._robot, pose, joint_rad)
-            points_m, error_m = self._look(now_s, frame, body)
+            points_m, error_m = self._look(now_s, qpos, body)
             self._coming.append(_Seen(now_s + self._mapping.latency_s, now_s, points_m, error_m))
-        self._before = now_s, frame
+        self._before = now_s, qpos
         self.fuse(now_s)
 
     def fuse(self, now_s: float) -> None:
@@ -104,10 +105,10 @@ class StereoHead:
         """Free the frame buffer."""
         self._view.close()
 
-    def _look(self, now_s: float, frame: CameraFrame, body: BodyView) -> tuple[Floats, Floats]:
+    def _look(self, now_s: float, qpos: Floats, body: BodyView) -> tuple[Floats, Floats]:
         """(n, 3) points of the ground in the world as the run believes it, and their errors."""
         config = self._config
-        left, right = self._view.taken(self._exposed(now_s, frame), self._qpos())
+        left, right = self._view.taken(self._exposed(now_s, qpos), qpos)
         matrix = self._view.camera_matrix
         pair = RectifiedPair(
             left,
@@ -129,9 +130,8 @@ class StereoHead:
         free = ~self._is_body(points_m, body)
         return points_m[free], error_m[near][free]
 
-    def _true_frame(self) -> CameraFrame:
-        """Where the left camera is."""
-        q = self._qpos()
+    def _true_frame(self, q: Floats) -> CameraFrame:
+        """Where the left camera is with the body at ``q`` (7 + J,)."""
         turned = Rotation.from_quat(q[3:7], scalar_first=True).as_matrix()
         body = body_in_world(self._robot, BodyPose(0.0, q[:3], turned), q[7:])
         return self._frame(body)
@@ -143,12 +143,13 @@ class StereoHead:
         at_m = body.link_m[config.link] + carrier @ mount_m
         return CameraFrame(at_m, tilted(config.tilt_rad, carrier))
 
-    def _exposed(self, now_s: float, frame: CameraFrame) -> list[CameraFrame]:
+    def _exposed(self, now_s: float, qpos: Floats) -> list[CameraFrame]:
         """Instants of the exposure, up to now: more of them, the more the camera moves in it."""
+        frame = self._true_frame(qpos)
         if self._before is None or now_s <= self._before[0]:
             return [frame]
         share = self._config.exposure_s / (now_s - self._before[0])
-        before = self._before[1]
+        before = self._true_frame(self._before[1])
         turn = Rotation.from_matrix(before.axes @ frame.axes.T).as_rotvec() * share
         moved_m = (before.at_m - frame.at_m) * share
         blur_px = self._config.focal_px * float(np.linalg.norm(turn))

@@ -19,7 +19,7 @@ from snakewalk.controller.app.runs.factory import prepare_job
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.capture.readers.keypoints import choice_of
 from snakewalk.controller.capture.readers.load import load_keypoints
-from tests.helpers.in_process import snakewalk
+from tests.helpers.command import snakewalk
 from tests.oracles.tracked_animal import NOISE, table, tracked
 
 TRACKER_FILES = Path(__file__).parents[2] / "oracles" / "tracked_lizard.zip"

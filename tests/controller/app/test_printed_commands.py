@@ -37,7 +37,8 @@ from snakewalk.controller.capture.capture import load_capture
 from snakewalk.controller.capture.corrections import Corrections
 from tests.controller.app.test_robot_import import SWIMMER
 from tests.docs.test_commands_in_pages import PAGES, ROOT, printed
-from tests.helpers.in_process import snakewalk, work_in_this_process
+from tests.helpers.command import snakewalk
+from tests.helpers.in_process import work_in_this_process
 from tests.oracles.rendered_snake import SnakeScene, film
 from tests.oracles.tracked_animal import table
 

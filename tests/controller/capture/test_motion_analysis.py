@@ -16,7 +16,7 @@ from snakewalk.controller.capture.track import Track, track_from_points
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.synthesis import Behaviour, synthesise
-from tests.helpers.in_process import snakewalk
+from tests.helpers.command import snakewalk
 
 N = np.arange(100)
 

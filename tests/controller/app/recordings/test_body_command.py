@@ -22,7 +22,7 @@ from snakewalk.controller.capture.mesh.skin_file import Y_UP
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.drivers.types import BodyPose
-from tests.helpers.in_process import snakewalk
+from tests.helpers.command import snakewalk
 from tests.oracles.gltf_player import GltfPlayer
 
 

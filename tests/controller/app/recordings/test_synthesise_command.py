@@ -19,7 +19,7 @@ from snakewalk.controller.capture.mesh.body_model import read_silhouettes
 from snakewalk.controller.capture.mesh.rig import posed_m, spine_rig
 from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.sim.rendering.looks import dressed_model
-from tests.helpers.in_process import snakewalk
+from tests.helpers.command import snakewalk
 
 BEHAVIOUR = """
 name = "mine"

@@ -24,7 +24,8 @@ from snakewalk.sim.physics.split_plant import SplitPlant
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import parse_chain
 from snakewalk.sim.serve.pty import PtyServer
-from tests.helpers.in_process import Done, leave_out_pages, snakewalk
+from tests.helpers.command import Ended, snakewalk
+from tests.helpers.in_process import leave_out_pages
 from tests.helpers.pty_port import PtyPort, ServedClock
 
 
@@ -46,7 +47,7 @@ class Bench:
         monkeypatch.setattr(backend, "open_port", open_port)
         leave_out_pages(monkeypatch)
 
-    def run(self, folder: Path, port: str, *words: str) -> Done:
+    def run(self, folder: Path, port: str, *words: str) -> Ended:
         return snakewalk(
             *("gait", "run", "lateral-undulation", "--port", port, "--seconds", "1", "--no-film"),
             *("--out", str(folder), *words),

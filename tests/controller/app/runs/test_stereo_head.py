@@ -20,7 +20,7 @@ from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.mapping.growing_map import GrowingMap
 from snakewalk.sim.physics.plant import MujocoPlant
-from tests.helpers.in_process import snakewalk
+from tests.helpers.command import snakewalk
 
 ROBOT = load_robot("alternating16-stereo")
 HILLS = load_world("random-10").model_copy(

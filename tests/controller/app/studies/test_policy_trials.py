@@ -8,7 +8,8 @@ import pytest
 
 from snakewalk.controller.app.runs.factory import prepare_policy
 from snakewalk.controller.app.studies.policy_trials import PolicyTrial, _is_set, _prepare
-from tests.helpers.in_process import snakewalk, work_in_this_process
+from tests.helpers.command import snakewalk
+from tests.helpers.in_process import work_in_this_process
 
 
 def test_a_seed_moves_the_start_of_all_motions_alike() -> None:

@@ -25,7 +25,7 @@ from snakewalk.controller.capture.mesh.mesh_files import write_mesh
 from snakewalk.controller.capture.mesh.skin_texture import unroll
 from snakewalk.controller.mechanics.ground_step import GroundStep, half_heights_m
 from snakewalk.sim.rendering.looks import dressed_model
-from tests.helpers.in_process import snakewalk
+from tests.helpers.command import snakewalk
 
 LINE = np.stack([90.0 - np.linspace(0.0, 80.0, 41), np.full(41, 20.0)], axis=-1)  # head at right
 WIDTH = 4.0 + 2.0 * np.sin(np.linspace(0.0, np.pi, 41))
