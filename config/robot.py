@@ -275,6 +275,33 @@ class PortConfig(Strict):
     )
 
 
+class PowerConfig(Strict):
+    """Cables from servo to servo, and where leads of the supply end (docs/bus.md)."""
+
+    inject_ids: tuple[int, ...] = Field(
+        (), description="servos at which a lead of the supply ends; default: the first of the chain"
+    )
+    cable_ohm: float = Field(
+        0.055,
+        gt=0.0,
+        le=100.0,
+        description="of a cable between neighbours, both conductors and all four contacts: 180 mm "
+        "of AWG 21, and contacts of 10 milliohm, the most that new ones have",
+    )
+    cables_ohm: tuple[float, ...] = Field(
+        (), description="of each cable from the head, where they differ"
+    )
+    lead_ohm: float = Field(
+        0.02, gt=0.0, le=100.0, description="of a lead from the supply, there and back"
+    )
+
+    @model_validator(mode="after")
+    def _resistances_are_positive(self) -> Self:
+        if any(not 0.0 < each <= 100.0 for each in self.cables_ohm):
+            raise ValueError("cables_ohm: each over 0 and at most 100")
+        return self
+
+
 class LimbsConfig(Strict):
     """A pair of legs at one link of the spine, mirror images: left, then right.
 
@@ -365,6 +392,9 @@ class RobotConfig(Strict):
     imu: ImuConfig | None = Field(None, description="a table [imu]; default: there is none")
     stereo_head: StereoHeadConfig | None = Field(
         None, description="a table [stereo_head]; default: there is none"
+    )
+    power: PowerConfig | None = Field(
+        None, description="a table [power]; default: the cables between servos take nothing"
     )
     ports: tuple[PortConfig, ...] = Field(
         (),
@@ -472,6 +502,23 @@ class RobotConfig(Strict):
         if self.stereo_head is not None and self.stereo_head.link >= self.link_count:
             raise ValueError(
                 f"stereo_head: link {self.stereo_head.link} of {self.link_count}: 0 is the head"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _power_is_for_the_chain(self) -> Self:
+        if self.power is None:
+            return self
+        for each, count in Counter(self.power.inject_ids).items():
+            if each not in self.servo_ids:
+                raise ValueError(f"power: inject_ids: ID {each} is not of this robot")
+            if count > 1:
+                raise ValueError(f"power: inject_ids: ID {each} is named twice")
+        cables = len(self.power.cables_ohm)
+        if cables not in (0, self.joint_count - 1):
+            raise ValueError(
+                f"power: cables_ohm: {cables} of them; {self.joint_count} servos have "
+                f"{self.joint_count - 1} cables between them"
             )
         return self
 

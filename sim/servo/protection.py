@@ -13,18 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V, Alarm
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.motor import MotorColumns
-from snakewalk.sim.servo.motor_output import MotorOutput
+from snakewalk.sim.servo.motor_output import AT_LIMIT, MotorOutput
 from snakewalk.sim.servo.servo_loops import (
     count_blocked,
     out_of_range,
     supply_current_a,
     warm_up,
 )
-from snakewalk.sim.servo.supply import Supply
+from snakewalk.sim.servo.supply import Cabling, Supply, servo_voltages
 
 SLICE_S = 0.05
 """Period of the checks."""
@@ -60,6 +61,16 @@ class SupplyAndAmbient:
     Servos of one voltage share a cable.
     """
     ambient_c: float = 25.0
+    cabling: Cabling | None = None
+    """Cables between the servos, which are then all on one source; None: they take nothing."""
+
+    @staticmethod
+    def of(robot: RobotConfig) -> "SupplyAndAmbient":
+        """Supply of a robot, as its file says."""
+        power = robot.power
+        return SupplyAndAmbient(
+            robot.servo.supply_v, cabling=None if power is None else Cabling.of(robot, power)
+        )
 
 
 class Protection:
@@ -95,6 +106,7 @@ class Protection:
             for rows in (np.flatnonzero(volts == each) for each in np.unique(volts))
         ]
         """Rows of the servos on a cable, and what they draw at rest, A."""
+        self._standby_a = motor.standby_a
 
     def alarms(self, row: int) -> Mapping[str, int]:
         """Errors that a servo can detect, and their bits."""
@@ -156,7 +168,29 @@ class Protection:
 
     def _sag(self, pwm: Floats) -> None:
         current_a = self._motor_output.current_a()
+        if self._around.cabling is not None:
+            self._sag_along(self._around.cabling, pwm, current_a)
+            return
         for rows, standby_a in self._cables:
             drawn_a = float(supply_current_a(pwm[rows], current_a[rows])) + standby_a
             self._drop_v[rows] = self._around.supply_ohm * drawn_a
         self._supply.feed(self._drive.supply_v, self._drop_v)
+
+    def _sag_along(self, cabling: Cabling, pwm: Floats, current_a: Floats) -> None:
+        """Let the voltage sag along the chain; output and shaft speed stay as they are now.
+
+        A bridge draws more at more volts, by ``pwm^2 / R``, unless something limits its current: so
+        the voltages are those of the whole chain at once, also where cables take most of them.
+        """
+        drive = self._drive
+        drives = (pwm * current_a > 0.0) & (np.abs(current_a) < AT_LIMIT * drive.current_limit_a)
+        slope_s = pwm * pwm / drive.resistance_ohm * drives
+        at_zero_a = np.abs(pwm * current_a) - slope_s * drive.supply_v + self._standby_a
+        source_v = self._supply.source_v
+        cables_ohm, leads_ohm = cabling.cable_ohm, cabling.lead_ohm
+        around_ohm = self._around.supply_ohm
+        servo_voltages(
+            source_v, around_ohm, at_zero_a, slope_s, cables_ohm, leads_ohm, self._drop_v
+        )
+        self._drop_v[:] = source_v - np.maximum(self._drop_v, 0.0)
+        self._supply.feed(drive.supply_v, self._drop_v)

@@ -1,9 +1,16 @@
-"""The voltage that feeds the servos of a chain, and where some of them get another."""
+"""The voltage that feeds the servos of a chain: source, leads, cables between neighbours."""
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats, Indices
+from snakewalk.config.robot import PowerConfig, RobotConfig
+from snakewalk.drivers.compiling import compiled, readonly_array
+
+_ROW = readonly_array(layout="C")
 
 
 class Supply:
@@ -14,6 +21,11 @@ class Supply:
         self._volts = self.usual_v.copy()
         self._override_v = np.full(servos, np.nan)
         self._overridden = False
+
+    @property
+    def source_v(self) -> float:
+        """Voltage of the one source that feeds them all."""
+        return float(self._volts[0])
 
     def change(self, volts: float | None, rows: Indices | None = None) -> None:
         """Set another voltage for the chain, or for ``rows`` alone; None: what it was before."""
@@ -29,3 +41,93 @@ class Supply:
         if self._overridden:
             own = ~np.isnan(self._override_v)
             supply_v[own] = self._override_v[own]
+
+
+@dataclass(frozen=True, slots=True)
+class Cabling:
+    """How power reaches S servos in the order of the chain.
+
+    A cable's resistance is that of both its conductors and all contacts, there and back.
+    """
+
+    cable_ohm: Floats
+    """(S - 1,) of the cable behind each servo but the last."""
+    lead_ohm: Floats
+    """(S,) of the source's lead that ends at each servo; infinite where none does."""
+
+    @staticmethod
+    def of(robot: RobotConfig, power: PowerConfig) -> "Cabling":
+        """Cables and leads of a robot, as ``power`` describes them."""
+        ids = robot.servo_ids
+        cables_ohm = power.cables_ohm or (power.cable_ohm,) * (len(ids) - 1)
+        fed = power.inject_ids or ids[:1]
+        lead_ohm = [power.lead_ohm if each in fed else math.inf for each in ids]
+        return Cabling(np.array(cables_ohm, dtype=np.float64), np.array(lead_ohm))
+
+    def servo_v(
+        self, source_v: float, source_ohm: float, drawn_a: ArrayLike, slope_s: ArrayLike = 0.0
+    ) -> Floats:
+        """(S,) voltage at the servos.
+
+        Args:
+            source_v: of the source without load.
+            source_ohm: of what all leads share.
+            drawn_a: (S,) what each servo draws at 0 V, ampere, if it went on as its slope says.
+            slope_s: (S,) how much more it draws for each volt, siemens; 0: as much at any voltage.
+
+        """
+        servos = len(self.lead_ohm)
+        drawn = np.ascontiguousarray(np.broadcast_to(drawn_a, servos), dtype=np.float64)
+        slope = np.ascontiguousarray(np.broadcast_to(slope_s, servos), dtype=np.float64)
+        out = np.empty(servos)
+        servo_voltages(source_v, source_ohm, drawn, slope, self.cable_ohm, self.lead_ohm, out)
+        return out
+
+    def cable_a(self, servo_v: Floats) -> Floats:
+        """(S - 1,) current through each cable, positive away from the first servo."""
+        return np.asarray((servo_v[:-1] - servo_v[1:]) / self.cable_ohm)
+
+
+@compiled(f"void(float64, float64, {_ROW}, {_ROW}, {_ROW}, {_ROW}, float64[::1])")
+def servo_voltages(
+    source_v: float,
+    source_ohm: float,
+    drawn_a: Floats,
+    slope_s: Floats,
+    cable_ohm: Floats,
+    lead_ohm: Floats,
+    out: Floats,
+) -> None:
+    """Voltage at each servo of a ladder, into ``out``; arguments as of ``Cabling.servo_v``.
+
+    Kirchhoff's law at each servo is a row of a tridiagonal system, which one sweep there and one
+    back solve (Thomas). What the leads share couples all rows by the one rail voltage, in which the
+    servos' voltages are linear: the sweep runs for a rail of 0 V and for each volt of it.
+    """
+    servos = len(out)
+    upper = np.empty(servos)
+    per_volt = np.empty(servos)
+    for k in range(servos):
+        lead_s = 1.0 / lead_ohm[k]
+        before_s = 1.0 / cable_ohm[k - 1] if k > 0 else 0.0
+        behind_s = 1.0 / cable_ohm[k] if k + 1 < servos else 0.0
+        pivot = lead_s + before_s + behind_s + slope_s[k]
+        at_zero, at_volt = -drawn_a[k], lead_s
+        if k > 0:
+            pivot -= before_s * upper[k - 1]
+            at_zero += before_s * out[k - 1]
+            at_volt += before_s * per_volt[k - 1]
+        upper[k] = behind_s / pivot
+        out[k] = at_zero / pivot
+        per_volt[k] = at_volt / pivot
+    drawn_0, drawn_v = 0.0, 0.0  # of all servos at a rail of 0 V, and for each volt of it
+    for back in range(servos):
+        k = servos - 1 - back
+        if back > 0:
+            out[k] += upper[k] * out[k + 1]
+            per_volt[k] += upper[k] * per_volt[k + 1]
+        drawn_0 += drawn_a[k] + slope_s[k] * out[k]
+        drawn_v += slope_s[k] * per_volt[k]
+    rail_v = (source_v - source_ohm * drawn_0) / (1.0 + source_ohm * drawn_v)
+    for k in range(servos):
+        out[k] += rail_v * per_volt[k]

@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from snakewalk.controller.app.cli.commands.analyse import analyse
+from snakewalk.controller.app.cli.commands.bench.cable_drop import power
 from snakewalk.controller.app.cli.commands.bench.calibrate import calibrate
 from snakewalk.controller.app.cli.commands.bench.doctor import doctor
 from snakewalk.controller.app.cli.commands.bench.ros import ros
@@ -491,13 +492,17 @@ policy_app.command(
     ),
 )(policy_trials)
 
-robot_app = _App(no_args_is_help=True, help="A robot: show it, export it, import one.")
+robot_app = _App(no_args_is_help=True, help="A robot: show it, its power, export it, import one.")
 
 app.add_typer(robot_app, name="robot", rich_help_panel=_JOB)
 
 robot_app.command("show", epilog=_examples("robot show alternating16", "robot show my.toml"))(
     show_robot
 )
+
+robot_app.command(
+    "power", epilog=_examples("robot power alternating16", "robot power my.toml --current 0.5")
+)(power)
 
 robot_app.command(
     "export", epilog=_examples("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml")

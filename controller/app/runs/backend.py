@@ -84,7 +84,7 @@ def simulated(
         plant,
         baud=servo.baud,
         mounting=deviation.mounting(robot),
-        supply_and_ambient=SupplyAndAmbient(supply_v=servo.supply_v),
+        supply_and_ambient=SupplyAndAmbient.of(robot),
         imu=plant_imu(robot, plant, servo.baud, run.seed),
     )
     chain = ServoChain(

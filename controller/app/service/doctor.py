@@ -97,7 +97,7 @@ def examine(
     findings.append(adapter.wire(robot_budget(robot, baud, fast=fast), rate_hz))
     if wiggle and worst(findings) != "fail":
         on_progress("supply under load")
-        findings.append(supply_under_load(bus, robot, safety))
+        findings += supply_under_load(bus, robot, safety)
     return findings
 
 

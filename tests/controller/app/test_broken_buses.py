@@ -28,6 +28,7 @@ from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 from snakewalk.sim.servo.protection import SupplyAndAmbient
+from snakewalk.sim.servo.supply import Cabling
 
 ROBOT = RobotConfig(name="four", joint_axes="ypyp")
 PAGE = Path(__file__).parents[3] / "docs" / "driver.md"
@@ -112,6 +113,12 @@ def heat(celsius: float) -> Plant:
         line.firmware.protection.temperature_c[1] = celsius
 
     return plant
+
+
+def cables(*ohm: float) -> SupplyAndAmbient:
+    """Power comes in at the first servo of four."""
+    leads = Cabling(np.array(ohm), np.array([0.02, np.inf, np.inf, np.inf]))
+    return SupplyAndAmbient(12.0, cabling=leads)
 
 
 @dataclass(frozen=True)
@@ -209,6 +216,23 @@ KINDS = [
         "it sags by",
         "fail",
         {"supply_and_ambient": SupplyAndAmbient(supply_ohm=4.0)},
+        wiggle=True,
+    ),
+    Kind(
+        "a bad plug between two servos",
+        lambda line: None,
+        "cables",
+        "the one between servos 2 and 3 has",
+        "fail",
+        {"supply_and_ambient": cables(0.05, 5.0, 0.05)},
+        wiggle=True,
+    ),
+    Kind(
+        "cables too thin for the chain",
+        lambda line: None,
+        "cables",
+        "voltage falls from",
+        line={"supply_and_ambient": cables(2.0, 2.0, 2.0)},
         wiggle=True,
     ),
     Kind("a servo too hot", heat(75.0), "temperature", "servo 2 is the warmest: 75 C", "fail"),

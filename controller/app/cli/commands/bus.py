@@ -192,13 +192,19 @@ def _robot_line(name: str, baud: int | None) -> "SimLine":
     from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
     from snakewalk.sim.plant import Mounting  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
+    from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
     robot = load_robot(name)
     rate = baud or robot.servo.baud
     bank = ServoBank(robot.servo_ids, robot.servo_models, rate)
     plant = MujocoPlant(robot, load_world("flat"))
     return SimLine(
-        bank, plant, baud=rate, mounting=Mounting.of(robot), imu=plant_imu(robot, plant, rate)
+        bank,
+        plant,
+        baud=rate,
+        mounting=Mounting.of(robot),
+        supply_and_ambient=SupplyAndAmbient.of(robot),
+        imu=plant_imu(robot, plant, rate),
     )
 
 
