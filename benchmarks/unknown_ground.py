@@ -98,7 +98,7 @@ def judged(finished: Finished, planner: TerrainPlanner) -> Crossing:
         error_m = found.ground_map.errors_m(planner.relief.ground)
         covered = coverage(found.ground_map, pose.centre_m[::10, :2])
     return Crossing(
-        finished.outcome.complete(1),
+        finished.outcome.complete,
         finished.outcome.duration_s,
         float(np.hypot(*np.diff(pose.centre_m[:, :2], axis=0).T).sum()),
         float(steps[unsafe].sum()),

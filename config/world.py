@@ -213,6 +213,10 @@ class PoleObstacle(Strict):
     at_m: tuple[float, float] = Field((0.5, 0.0), description="x and y of its middle")
     friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
 
+    def stands_at(self, x_m: float, y_m: float) -> bool:
+        """Whether no body can be at this place of the floor."""
+        return self.upright and math.dist(self.at_m, (x_m, y_m)) <= self.radius_m
+
 
 class PipeObstacle(Strict):
     """A round pipe to climb or creep through inside; the body starts in its middle."""
@@ -223,6 +227,10 @@ class PipeObstacle(Strict):
     upright: bool = Field(True, description="from the floor up; otherwise along x, off the floor")
     at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of its middle")
     friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
+
+    def stands_at(self, x_m: float, y_m: float) -> bool:
+        """Whether no body comes to this place of the floor: from outside nothing comes in."""
+        return self.upright and math.dist(self.at_m, (x_m, y_m)) <= self.radius_m
 
 
 class PegsObstacle(Strict):
@@ -259,6 +267,14 @@ class PegsObstacle(Strict):
                 found.append((x_m, self.at_m[1] + along * self.spacing_m))
         return tuple(found)
 
+    def stands_at(self, x_m: float, y_m: float) -> bool:
+        """Whether a peg is at this place of the floor."""
+        return any(math.dist(peg_m, (x_m, y_m)) <= self.radius_m for peg_m in self.places_m())
+
+
+WALL_M = 0.04
+"""Thickness of a corridor's wall."""
+
 
 class CorridorObstacle(Strict):
     """Two upright walls along x with a way between them."""
@@ -269,6 +285,12 @@ class CorridorObstacle(Strict):
     height_m: float = Field(0.15, gt=0.01, le=5.0, description="over z = 0")
     at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of its middle")
     friction: float = Field(0.3, ge=0.0, le=5.0, description="the same in all directions")
+
+    def stands_at(self, x_m: float, y_m: float) -> bool:
+        """Whether a wall is at this place of the floor."""
+        along_m, across_m = abs(x_m - self.at_m[0]), abs(y_m - self.at_m[1])
+        inner_m = 0.5 * self.width_m
+        return along_m <= 0.5 * self.length_m and inner_m <= across_m <= inner_m + WALL_M
 
 
 class PlannerConfig(Strict):

@@ -101,16 +101,15 @@ class RunBar(ProgressBar):
 class PathBar(RunBar):
     """How far along the path, which waypoint, how fast."""
 
-    def __init__(self, path_m: float, waypoints: int) -> None:
+    def __init__(self, path_m: float) -> None:
         super().__init__("ramp", path_m)
-        self._waypoints = waypoints
 
     def on_progress(self, progress: RunProgress) -> None:
         """Update, not in every cycle."""
         if self._is_due(progress):
             self.update(
                 progress.along_m,
-                description=f"waypoint {progress.reached}/{self._waypoints}",
+                description=f"waypoint {progress.reached}/{progress.waypoints}",
                 note=f"{progress.time_s:5.1f} s  {progress.speed_m_s:5.2f} m/s",
             )
 

@@ -17,7 +17,9 @@ def waypoint_times_s(pose: PoseTable, plan: PlanSummary) -> Floats:
     """Find the times (k,) at which the centre of mass came to the waypoints, in order, k <= w."""
     times: list[float] = []
     first = 0
-    for waypoint in plan.waypoints_m:
+    for k, waypoint in enumerate(plan.waypoints_m):
+        if plan.set_s is not None:
+            first = max(first, int(np.searchsorted(pose.time_s, plan.set_s[k])))
         far = np.hypot(*(pose.centre_m[first:, :2] - waypoint).T)
         inside = np.flatnonzero(far <= plan.waypoint_radius_m + _ROUNDING_M)
         if len(inside) == 0:

@@ -67,6 +67,16 @@ class PathProgress(Protocol):
         ...
 
 
+@runtime_checkable
+class OpenWaypoints(Protocol):
+    """A motion along a path may offer this: somebody sets its waypoints while it is on its way."""
+
+    @property
+    def waypoints_m(self) -> Floats:
+        """(w, 2) in force, those reached first; another array when they change."""
+        ...
+
+
 class NoPath:
     """Progress of a motion that follows no path."""
 

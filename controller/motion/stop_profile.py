@@ -1,4 +1,7 @@
-"""Stop profile: a motion comes to rest where it is, because its own time slows down to a stop."""
+"""Stop profile: a motion comes to rest where it is, because its own time slows down to a stop.
+
+It goes on from there, or from half-way, as it slowed down.
+"""
 
 from snakewalk.controller.kinematics.smoothstep import cubic
 
@@ -10,7 +13,8 @@ class StopProfile:
 
     def __init__(self) -> None:
         self._since_stop_s: float | None = None
-        """Time since ``stop``."""
+        """Time since ``stop``; it runs backwards after ``go_on``."""
+        self._goes_on = False
 
     @property
     def begun(self) -> bool:
@@ -33,13 +37,23 @@ class StopProfile:
 
     def stop(self) -> None:
         """Slow down from now on."""
+        self._goes_on = False
         if self._since_stop_s is None:
             self._since_stop_s = 0.0
+
+    def go_on(self) -> None:
+        """Come back to full rate from now on."""
+        self._goes_on = self._since_stop_s is not None
 
     def step(self, dt_s: float) -> float:
         """Go on by ``dt_s``; returns by how much the motion goes on."""
         if self._since_stop_s is None:
             return dt_s
         before = self.rate
-        self._since_stop_s += dt_s
+        if self._goes_on:
+            self._since_stop_s = min(self._since_stop_s, STOP_S) - dt_s
+            if self._since_stop_s <= 0.0:
+                self._since_stop_s, self._goes_on = None, False
+        else:
+            self._since_stop_s += dt_s
         return 0.5 * (before + self.rate) * dt_s

@@ -42,9 +42,11 @@ class PlanSummary:
     path_m: Floats
     """(n, 2) or (n, 3) points of the path that the run starts with."""
     waypoints_m: Floats
-    """(w, 2)"""
+    """(w, 2); of a run whose waypoints were set on the way, those in force at its end."""
     waypoint_radius_m: float
     predicted_speed_m_s: float = float("nan")
+    set_s: Floats | None = None
+    """(w,) times since when each waypoint was in force; None: all from the start."""
     states: Mapping[str, int] | None = None
     """Counts of the state library, e.g. ``{"recorded": 40, "random": 160, "refused": 71}``."""
 
@@ -241,11 +243,17 @@ class RunRecord:
     imu: ImuTable
     paths: tuple[tuple[float, Floats], ...]
     """Paths in force from a time on; the first is the plan's, at 0."""
+    waypoints: tuple[tuple[float, Floats], ...]
+    """The same of waypoints (w, 2)."""
     events: tuple[Event, ...]
     complete: bool
     """Whether the file was closed properly."""
     note: str
     """What is missing, if it was not; empty otherwise."""
+
+    def waypoints_at(self, time_s: float) -> Floats:
+        """Waypoints (w, 2) in force at a time."""
+        return [points_m for since_s, points_m in self.waypoints if since_s <= time_s][-1]
 
     @property
     def period_s(self) -> float:

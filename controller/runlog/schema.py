@@ -90,6 +90,10 @@ TOPICS: Final[dict[str, Json]] = {
         "target": _of("integer", "index of the next waypoint"),
     },
     "/path": {"time_s": _TIME, "points_m": _of("array", "(n, 2 or 3) a path laid again")},
+    "/waypoints": {
+        "time_s": _TIME,
+        "waypoints_m": _of("array", "(w, 2) in force from now on, those reached first"),
+    },
     "/walk": {
         "time_s": _TIME,
         "state": _of("integer", "index into the library"),

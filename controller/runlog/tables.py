@@ -1,6 +1,8 @@
 """Rows to tables: lists of JSON objects become arrays with one entry a row."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -45,8 +47,13 @@ def record_of(
     replanned = tuple(
         (float(r["time_s"]), _floats([r], "points_m")[0]) for r in rows.get("/path", ())
     )
+    changed = tuple(
+        (float(r["time_s"]), _array(r["waypoints_m"]).reshape(-1, 2))
+        for r in rows.get("/waypoints", ())
+    )
+    waypoints = ((0.0, header.plan.waypoints_m), *changed)
     return RunRecord(
-        header=header,
+        header=_with_waypoints(header, waypoints) if changed else header,
         cycle=_cycle(rows.get("/cycle", ()), joints),
         slow=_slow(rows.get("/slow", ()), joints),
         pose=_pose(rows.get("/pose", ()), header.robot.link_count),
@@ -55,6 +62,7 @@ def record_of(
         shadow=_shadow(rows.get("/shadow", ()), joints),
         imu=_imu(rows.get("/imu", ())),
         paths=((0.0, header.plan.path_m), *replanned),
+        waypoints=waypoints,
         events=tuple(
             Event(float(r["time_s"]), r["level"], r["kind"], r["text"])
             for r in rows.get("/event", ())
@@ -62,6 +70,18 @@ def record_of(
         complete=complete,
         note=note,
     )
+
+
+def _with_waypoints(header: Header, waypoints: Sequence[tuple[float, Floats]]) -> Header:
+    """Return a header whose plan has the last waypoints, and since when each was in force."""
+    set_s = [0.0] * len(waypoints[0][1])
+    for (_, before_m), (time_s, after_m) in pairwise(waypoints):
+        same = 0
+        while same < min(len(before_m), len(after_m)) and (before_m[same] == after_m[same]).all():
+            same += 1
+        set_s = set_s[:same] + [time_s] * (len(after_m) - same)
+    plan = replace(header.plan, waypoints_m=waypoints[-1][1], set_s=np.array(set_s))
+    return replace(header, plan=plan)
 
 
 def _header(row: Row) -> Header:

@@ -221,6 +221,11 @@ class RunLog:
         """Log a path (n, 2) or (n, 3) that replaces the plan's."""
         self._add("/path", time_s, {"time_s": time_s, "points_m": floats(points_m)})
 
+    def waypoints_changed(self, time_s: float, waypoints_m: ArrayLike) -> None:
+        """Log waypoints (w, 2), those reached first, that replace those in force."""
+        row = {"time_s": time_s, "waypoints_m": floats(waypoints_m)}
+        self._add("/waypoints", time_s, row)
+
     def walk(
         self,
         time_s: float,

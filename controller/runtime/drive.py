@@ -13,7 +13,7 @@ from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.kinematics.smoothstep import QUINTIC_BEND_MAX, QUINTIC_SLOPE_MAX, quintic
 from snakewalk.controller.motion.compliance import Compliance
-from snakewalk.controller.motion.path_progress import path_progress
+from snakewalk.controller.motion.path_progress import OpenWaypoints, path_progress
 from snakewalk.controller.motion.source import MotionSource, StartsAnywhere
 from snakewalk.controller.runlog.record import MotorEnergy
 from snakewalk.controller.runlog.writer import RunLog
@@ -63,6 +63,8 @@ class Progress(NamedTuple):
     """Arc length on the path; NaN where there is no path."""
     done: bool
     """Whether the motion has come to its end and rests."""
+    waypoints: int = 0
+    """How many are in force."""
 
 
 OnProgress = Callable[[Progress], None]
@@ -79,12 +81,15 @@ class Outcome:
     duration_s: float
     alarms: int
     tripped: str | None
+    waypoints: int
+    """How many there were, those among them that were set on the way."""
     least_rate: float = 1.0
     """Lowest rate to which derating slowed the motion."""
 
-    def complete(self, waypoints: int) -> bool:
+    @property
+    def complete(self) -> bool:
         """Whether every waypoint was reached without a trip."""
-        return self.reached == waypoints and self.tripped is None
+        return self.reached == self.waypoints and self.tripped is None
 
 
 class CycleObserver(Protocol):
@@ -122,6 +127,8 @@ class Drive:
         self._observer = observer
         self._link, self._clock, self._pose = link, clock, pose
         self._motion, self._path = motion, path_progress(motion)
+        self._open = motion if isinstance(motion, OpenWaypoints) else None
+        self._waypoints_m = None if self._open is None else self._open.waypoints_m
         self._log, self._robot, self._run = log, robot, run
         self._gain = gain
         self._slip_monitor = SlipMonitor(robot.length_m, gain, run.safety.advance_fraction)
@@ -136,6 +143,12 @@ class Drive:
         self._speed_m_s = 0.0
         self._last: BodyView | None = None
         self._displacement_m = 0.0
+        self._end_s = 0.0
+
+    @property
+    def _waypoints(self) -> int:
+        """How many are in force."""
+        return len(self._run.waypoints_m if self._waypoints_m is None else self._waypoints_m)
 
     def run(self) -> Outcome:
         """Enable, ramp to the first shape, follow the path, settle, disable."""
@@ -158,8 +171,8 @@ class Drive:
             start_s = clock.now_s()
             log.event(start_s, "start", f"torque on; ramp of {ramp.duration_s:.1f} s to the shape")
             walk_s = start_s + ramp.duration_s + _SETTLE_S
-            end_s = walk_s + self._run.time_limit_s
-            for tick in ticks(clock, period_s, end_s):
+            self._end_s = walk_s + self._run.time_limit_s
+            for tick in ticks(clock, period_s, lambda: self._end_s):
                 try:
                     state = self._link.read()
                 except SafetyTrippedError:
@@ -188,14 +201,21 @@ class Drive:
                 log.event(clock.now_s(), "trip", tripped, "error")
         if not self._run.waypoints_m:
             end = "the motion came to its end" if motion.done else "the motion was cut off"
-        elif path.reached == len(self._run.waypoints_m):
+        elif path.reached == self._waypoints:
             end = "every waypoint reached"
         else:
             end = f"{path.reached} waypoints reached"
         log.event(clock.now_s(), "stop", f"torque off; {end}")
         duration_s = clock.now_s() - start_s
-        least = self._derating.least
-        return Outcome(path.reached, path.missed, duration_s, self._alarms, tripped, least)
+        return Outcome(
+            path.reached,
+            path.missed,
+            duration_s,
+            self._alarms,
+            tripped,
+            self._waypoints,
+            self._derating.least,
+        )
 
     def _tell_roll(self, view: BodyView) -> None:
         text = self._roll_monitor.update(view, self._clock.now_s())
@@ -211,6 +231,10 @@ class Drive:
         path, log, now_s = self._path, self._log, self._clock.now_s()
         reached, missed = path.reached, path.missed
         goal = self._motion.step(period_s, view)
+        if self._open is not None and self._open.waypoints_m is not self._waypoints_m:
+            self._waypoints_m = self._open.waypoints_m
+            self._end_s = now_s + self._run.time_limit_s
+            log.waypoints_changed(now_s, self._waypoints_m)
         if path.reached > reached:
             log.event(now_s, "waypoint", f"waypoint {path.reached} reached")
         if path.replanned is not None:
@@ -281,7 +305,14 @@ class Drive:
         )
         self._last = view
         self._on_progress(
-            Progress(tick.deadline_s, self._speed_m_s, path.reached, along_m, self._motion.done)
+            Progress(
+                tick.deadline_s,
+                self._speed_m_s,
+                path.reached,
+                along_m,
+                self._motion.done,
+                self._waypoints,
+            )
         )
 
     def _measure_speed(self) -> None:

@@ -1,6 +1,6 @@
 """The control loop: absolute deadlines, a late cycle is skipped and never made up in a burst."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from snakewalk.drivers.clock import Clock
@@ -16,8 +16,10 @@ class Tick(NamedTuple):
     skipped: int
 
 
-def ticks(clock: Clock, period_s: float, until_s: float) -> Iterator[Tick]:
+def ticks(clock: Clock, period_s: float, until_s: float | Callable[[], float]) -> Iterator[Tick]:
     """Yield at ``start + n period`` until ``until_s``; after a stall go on at the next deadline.
+
+    An end that may be put off is a function, asked in every turn.
 
     Raises:
         ValueError: the period is not positive.
@@ -28,9 +30,10 @@ def ticks(clock: Clock, period_s: float, until_s: float) -> Iterator[Tick]:
     start_s = clock.now_s()
     number = 0
     skipped = 0
+    end_s = until_s if callable(until_s) else lambda: until_s
     while True:
         deadline_s = start_s + number * period_s
-        if deadline_s > until_s:
+        if deadline_s > end_s():
             return
         clock.sleep_until_s(deadline_s)
         yield Tick(number, deadline_s, clock.now_s() - deadline_s, skipped)

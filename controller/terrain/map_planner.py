@@ -47,7 +47,12 @@ class MapPlanner:
         self._on = _Knowledge(ground, self._config)
 
     def __call__(
-        self, points_m: ArrayLike, heading_rad: float | None = None, *, avoid_m: ArrayLike = ()
+        self,
+        points_m: ArrayLike,
+        heading_rad: float | None = None,
+        *,
+        avoid_m: ArrayLike = (),
+        number: int = 1,
     ) -> SplinePath:
         """Plan through (n, 2) points in order, or through the first of them and on.
 
@@ -62,7 +67,7 @@ class MapPlanner:
         for within_m in _WITHIN_M:
             corners = self._on.corners(points, within_m)
             try:
-                return self._on.cautious(corners, heading_rad, avoid_m=avoid_m)
+                return self._on.cautious(corners, heading_rad, avoid_m=avoid_m, number=number)
             except InputError as error:  # no smooth way: not so far
                 faults = error.faults
         raise InputError(faults)

@@ -35,6 +35,7 @@ class TerrainPlanner:
         self._waypoint_turns = WaypointTurns(
             self._turn_cost_per_m, self._least_per_m, self._all_safe, config.bend_radius_m
         )
+        self._number = 1
         self._planned: tuple[Floats, SplinePath] | None = None
         """Points and path of the last plan that began in any direction."""
 
@@ -44,6 +45,7 @@ class TerrainPlanner:
         heading_rad: float | None = None,
         turn_radius_m: float = 0.5,
         avoid_m: ArrayLike = (),
+        number: int = 1,
     ) -> SplinePath:
         """Plan a path from where the body is, on good ground or bad, through (n, 2) waypoints.
 
@@ -57,12 +59,14 @@ class TerrainPlanner:
             turn_radius_m: least radius with which the body turns.
             avoid_m: (k, 2) places where the body could not go on; paths keep off them by a
                 footprint where another way exists.
+            number: of the first waypoint, in what is said of it.
 
         Raises:
             InputError: a waypoint is off the world or on unsafe ground, or no safe way leads to it.
 
         """
         points, avoid = np.asarray(points_m, float), np.asarray(avoid_m, float).reshape(-1, 2)
+        self._number = number
         if heading_rad is None:
             path = self._waypoint_turns(self._base(points, avoid), points[1:], any_start=True)
             self._planned = points, path
@@ -79,7 +83,7 @@ class TerrainPlanner:
         graph = self.graph and self.graph.avoiding(avoid)
         if self.relief is None or graph is None:
             return SplinePath(points)
-        faults = [f for k in range(1, len(points)) for f in _fault(self, k, points[k])]
+        faults = [f for k in range(1, len(points)) for f in self._fault(k, points[k])]
         if faults:
             raise InputError(faults)
         return self._spline(self._polygon(points, graph), points, self.relief)
@@ -121,7 +125,8 @@ class TerrainPlanner:
 
         """
         points = np.asarray(points_m, float)
-        faults = [f for k in range(len(points)) for f in _fault(self, k, points[k])]
+        self._number = 1
+        faults = [f for k in range(len(points)) for f in self._fault(k, points[k])]
         if faults:
             raise InputError(faults)
         return self(points)
@@ -189,10 +194,30 @@ class TerrainPlanner:
         assert self.relief is not None
         config = self.relief.config
         return (
-            f"{_name(k, points[k])} cannot be reached from {_name(k - 1, points[k - 1])}: no way "
+            f"{self._name(k, points[k])} cannot be reached from "
+            f"{self._name(k - 1, points[k - 1])}: no way "
             f"stays under a slope of {np.degrees(config.slope_limit_rad):.1f} deg and an elevation "
             f"variance of {config.variance_limit_m2:.2g} m2"
         )
+
+    def _fault(self, k: int, point: Floats) -> list[str]:
+        """Return what is wrong with the k-th point; 0 is the start."""
+        relief, graph = self.relief, self.graph
+        if relief is None or graph is None or relief.safe(*point):
+            return []
+        node = graph.nearest(point)
+        if node is None:
+            return [f"{self._name(k, point)}: this world has no safe ground at all"]
+        x, y = graph.nodes_m[node]
+        why = _unsafe_because(relief, point)
+        return [f"{self._name(k, point)} {why}; the nearest safe point is ({x:.2f}, {y:.2f})"]
+
+    def _name(self, k: int, point: Floats) -> str:
+        """Of the k-th point: 0 is the start, or where a path begins to later waypoints."""
+        where = f"({point[0]:.2f}, {point[1]:.2f})"
+        if k == 0:
+            return f"start {where}" if self._number == 1 else where
+        return f"waypoint {self._number + k - 1} {where}"
 
 
 def _denser(points: Floats, path: SplinePath, bad_s_m: Floats) -> Floats:
@@ -209,19 +234,6 @@ def _denser(points: Floats, path: SplinePath, bad_s_m: Floats) -> Floats:
             out.append((before + point) / 2)
         out.append(point)
     return np.array(out)
-
-
-def _fault(planner: TerrainPlanner, k: int, point: Floats) -> list[str]:
-    """Return what is wrong with the k-th point; 0 is the start."""
-    relief, graph = planner.relief, planner.graph
-    if relief is None or graph is None or relief.safe(*point):
-        return []
-    node = graph.nearest(point)
-    if node is None:
-        return [f"{_name(k, point)}: this world has no safe ground at all"]
-    x, y = graph.nodes_m[node]
-    why = _unsafe_because(relief, point)
-    return [f"{_name(k, point)} {why}; the nearest safe point is ({x:.2f}, {y:.2f})"]
 
 
 def _unsafe_because(relief: Relief, point: Floats) -> str:
@@ -241,10 +253,6 @@ def _unsafe_because(relief: Relief, point: Floats) -> str:
         f"is on unsafe ground: slope {slope:.1f} deg (limit {limit:.1f}), elevation variance "
         f"{variance:.2g} m2 (limit {most:.2g})"
     )
-
-
-def _name(k: int, point: Floats) -> str:
-    return f"{'start' if k == 0 else f'waypoint {k}'} ({point[0]:.2f}, {point[1]:.2f})"
 
 
 _REACH = 14  # nodes a straight piece may skip; also the whole leg at once is tried

@@ -2,7 +2,7 @@
 
 A waypoint counts when the body's centre is near it. Where the body passes by one, is half its
 length off the path, or stands still, another path is planned from its head, in its direction, off
-the places where it stood still.
+the places where it stood still. Other waypoints may be set while the body is on its way.
 """
 
 import math
@@ -36,11 +36,12 @@ class PathPlanner(Protocol):
     """Plans paths."""
 
     def __call__(
-        self, points_m: Floats, heading_rad: float | None, *, avoid_m: Floats
+        self, points_m: Floats, heading_rad: float | None, *, avoid_m: Floats, number: int = 1
     ) -> SplinePath:
         """Plan through (n, 2) points in order, from a heading where one is given.
 
-        The path keeps off places ``avoid_m`` (k, 2) where another way exists.
+        The path keeps off places ``avoid_m`` (k, 2) where another way exists. ``number`` is that of
+        the second point, a waypoint, for what is said of it.
         """
         ...
 
@@ -289,6 +290,40 @@ class Course:
         if best is not None and best.path is not path:
             self.path, self._passed_m, self.replanned = best.path, best.passed_m, why
 
+    def lead_to(self, left_m: Floats, heading_rad: Callable[[], float]) -> None:
+        """Go on to waypoints (k, 2) instead of those that are left.
+
+        Where they begin with those, the path goes on from its end; else it begins at the head.
+
+        Args:
+            left_m: in order; none to end here.
+            heading_rad: of the body; asked only for a path from the head.
+
+        Raises:
+            InputError: as the planner; nothing has changed then.
+
+        """
+        before = self.waypoints_m, self._goals_m
+        kept = self.waypoints_m[self.reached :]
+        if np.array_equal(kept, left_m):
+            return
+        goes_on = 0 < len(kept) < len(left_m) and np.array_equal(kept, left_m[: len(kept)])
+        self.waypoints_m = np.vstack([self.waypoints_m[: self.reached], left_m])
+        self._goals_m = self.waypoints_m.tolist()
+        try:
+            if goes_on:
+                onward = self._onward(self.path.length_m)
+                self.path, self._passed_m = onward.path, onward.passed_m
+            elif len(left_m):
+                self._lay(self._followers_m[1].copy(), heading_rad())
+                self._missed_before = -1
+                self._replan_after = self._travel + _REPLAN_AFTER_BODIES * self._per_body
+            else:
+                self._passed_m = self._passed_m[: self.reached]
+        except InputError:
+            self.waypoints_m, self._goals_m = before
+            raise
+
     def _onward(self, join_m: float) -> "_Onward":
         """Keep the path up to ``join_m``, and plan from there.
 
@@ -306,9 +341,10 @@ class Course:
         points_m = np.vstack([kept_m[-1], left_m])
         avoid_m = np.array(self._stalls_m).reshape(-1, 2)
         heading = path.heading_rad(max(join_m - 0.05, 0.0))
-        more = self._plan(points_m, None, avoid_m=avoid_m)
+        number = len(behind) + 1
+        more = self._plan(points_m, None, avoid_m=avoid_m, number=number)
         if abs(wrap(more.heading_rad(0.05) - heading)) > _BEND_RAD:
-            more = self._plan(points_m, heading, avoid_m=avoid_m)
+            more = self._plan(points_m, heading, avoid_m=avoid_m, number=number)
         more_m = more.piece_m(0.0, more.length_m)
         passes = [at + join_m for at in self._passes(more, left_m)]
         gaps_m = [more_m[-1], *left_m[np.isinf(passes)]]
@@ -351,7 +387,8 @@ class Course:
         """Plan from a point, with the body's heading, through the waypoints that are left."""
         points_m = np.vstack([from_m, self.waypoints_m[self.reached :]])
         stalls_m = np.array(self._stalls_m).reshape(-1, 2)
-        self.path = self._plan(points_m, heading_rad, avoid_m=stalls_m)
+        number = self.reached + 1
+        self.path = self._plan(points_m, heading_rad, avoid_m=stalls_m, number=number)
         self._gained_m, self._gained_at = 0.0, self._travel
         self._along_m[:] = 0.0
         left_m = self.waypoints_m[self.reached :]

@@ -233,6 +233,8 @@ class Pilot(OnCourse):
             self._chooser.think(lambda: self.path_pose(view))
         if self.course.complete:
             self._time_law.stop()
+        else:
+            self._time_law.go_on()
         self._time_law.advance(dt_s)
         goal_rad = self._on_ground(self._time_law.goal_rad(), dt_s, view)
         return goal_rad if self._roll is None else self._roll(goal_rad, view, dt_s)

@@ -121,6 +121,8 @@ class SteeredGait(OnCourse):
         course.follow(centre_m, view.link_m[0, :2], lambda: heading_rad, self.cycles)
         if course.complete:
             self._stop_profile.stop()
+        else:
+            self._stop_profile.go_on()
         aim = aim_rad(course.path, centre_m, course.along_m, self._carrot_m)
         wanted = TURN_PER_RAD * float(wrap(aim - heading_rad))
         part_s = self._stop_profile.step(dt_s)

@@ -55,6 +55,10 @@ class TimeLaw:
         """Slow down to rest from now on."""
         self._stopping = True
 
+    def go_on(self) -> None:
+        """Come back to the cruise speed from now on."""
+        self._stopping = False
+
     def advance(self, dt_s: float) -> float:
         """Move on by ``dt_s``; returns the head, never beyond what is known of the track."""
         if self.joints.grow():

@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import (
+    WALL_M,
     CorridorObstacle,
     PegsObstacle,
     PipeObstacle,
@@ -33,8 +34,6 @@ TAIL_UP_M = 0.01
 """Of the lowest link above the floor at the start."""
 COIL_MIN_RAD = 2.0
 """A body that goes less far round its own axis is no coil."""
-WALL_M = 0.04
-"""Thickness of a wall."""
 START_DEPTH_M = 0.005
 """How deep in an obstacle a body may start: contacts are soft, and it is pushed out at once."""
 OBSTACLE = "obstacle"

@@ -1,10 +1,10 @@
 """Carry out a prepared run: folder, log, link, loop, summary."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -24,7 +24,7 @@ from snakewalk.controller.app.runs.backend import (
 )
 from snakewalk.controller.app.runs.map_provider import MapProvider, map_faults, map_provider
 from snakewalk.controller.app.runs.pose_provider import PoseProvider, pose_faults, pose_provider
-from snakewalk.controller.app.runs.prepared_run import PreparedRun, pose_with
+from snakewalk.controller.app.runs.prepared_run import PathRun, PreparedRun, pose_with
 from snakewalk.controller.app.shadow.diagnosis import check_level
 from snakewalk.controller.app.shadow.run_shadow import RunShadow
 from snakewalk.controller.metrics.summary import RunSummary, summary
@@ -34,6 +34,8 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import InitialPose, RunRecord, Winding
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outcome
+from snakewalk.controller.walk.course import OnCourse
+from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.priority import raised_priority
 from snakewalk.drivers.safety.limits import SafetyLimits
@@ -73,6 +75,7 @@ def execute(
     shadow: bool = False,
     confirm: Callable[[str], bool] | None = None,
     stop_requested: Callable[[], str | None] = lambda: None,
+    waypoint_commands: Callable[[], Iterable[str]] | None = None,
     on_progress: OnProgress = lambda progress: None,
     on_event: OnEvent = lambda kind, text: None,
 ) -> Finished:
@@ -88,6 +91,8 @@ def execute(
     ``on_event`` tell what differs.
     ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``);
     ``stop_requested``, asked in every read and write, why torque goes off, or None;
+    ``waypoint_commands``, asked in every cycle, what a person sets of the waypoints, as
+    ``LiveCourse`` takes it: the run then holds at the last one until it is ended;
     ``on_progress`` is called after each cycle, ``on_event`` with what the motion decides by itself:
     a slower rate, an operator's change.
 
@@ -154,6 +159,8 @@ def execute(
             map_provider(prepared, backend, pose.measure, folder, log_event) as mapped,
         ):
             source = prepared.make_source(log_event)
+            if waypoint_commands is not None:
+                source = _live(prepared, source, waypoint_commands, log_event)
             link = SafeLink(
                 backend.chain,
                 SafetyLimits.from_config(robot, safety),
@@ -187,6 +194,23 @@ def execute(
     LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
     record, numbers = _read_back(log_path)
     return Finished(outcome, log_path, record, numbers, pose, mapped, source)
+
+
+def _live(
+    prepared: PreparedRun,
+    source: MotionSource,
+    commands: Callable[[], Iterable[str]],
+    on_event: OnEvent,
+) -> LiveCourse:
+    """Put a person in charge of the waypoints.
+
+    Raises:
+        InputError: the motion goes along no course.
+
+    """
+    if not isinstance(prepared, PathRun) or not isinstance(source, OnCourse):
+        raise InputError(f"run {prepared.run.name}: its motion has no waypoints that can be set")
+    return LiveCourse(cast(MotionOnCourse, source), commands, prepared.check_waypoint, on_event)
 
 
 @contextmanager

@@ -7,11 +7,12 @@ from typing import Protocol
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.config.world import WorldConfig
+from snakewalk.config.world import FlatGround, WaterGround, WorldConfig
 from snakewalk.controller.kinematics.links import mean_heading_rad
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
@@ -129,6 +130,28 @@ class PathRun(GroundedRun):
     def path(self) -> SplinePath:
         """Through the start and the waypoints."""
         return self.planner.plan(np.vstack([self.run.start_m, self.run.waypoints_m]))
+
+    def check_waypoint(self, point_m: Floats) -> None:
+        """Refuse a point (2,) off the ground, or in an obstacle; whether a path leads is not asked.
+
+        Raises:
+            InputError: says what is there.
+
+        """
+        x_m, y_m = (float(at) for at in point_m)
+        where, ground = f"waypoint ({x_m:.2f}, {y_m:.2f})", self.world.ground
+        if isinstance(ground, FlatGround | WaterGround):
+            inside, wide_m = max(abs(x_m), abs(y_m)) <= 0.5 * ground.size_m, (ground.size_m,) * 2
+        else:
+            assert self.ground is not None
+            inside, wide_m = bool(self.ground.contains(x_m, y_m)), self.ground.size_m
+        if not inside:
+            raise InputError(
+                f"{where} is outside the world, {wide_m[0]:.1f} m by {wide_m[1]:.1f} m"
+            )
+        obstacle = self.world.obstacle
+        if obstacle is not None and obstacle.stands_at(x_m, y_m):
+            raise InputError(f"{where} is in the world's obstacle, the {obstacle.kind}")
 
     @property
     def start_heading_rad(self) -> float:

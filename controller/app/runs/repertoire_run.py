@@ -162,7 +162,7 @@ class RouteRun:
     @property
     def complete(self) -> bool:
         """Whether every waypoint was reached without a trip."""
-        return self.finished.outcome.complete(len(self.job.run.waypoints_m))
+        return self.finished.outcome.complete
 
     def to_dict(self) -> dict[str, object]:
         """Numbers for a command's answer."""

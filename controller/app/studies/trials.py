@@ -213,7 +213,7 @@ def _measured(trial: Trial, prepared: WalkRun | GaitRun) -> Trial:
         finished = execute(prepared, Path(folder), stoppable=False)
         stood = ground_contact(finished.record, prepared.ground)
     numbers, outcome = finished.summary, finished.outcome
-    complete = outcome.complete(trial.waypoints)
+    complete = outcome.complete
     ended = None if complete else failure(finished.record)
     return replace(
         trial,

@@ -76,10 +76,11 @@ class Dashboard:
 
     def show_state(self, record: RunRecord, cycle: int, pose: int, text: str) -> None:
         """Show how the run is doing, in words."""
-        waypoints, where = len(self._run.waypoints_m), record.pose
-        facts = [f"{record.cycle.time_s[cycle]:.1f} s"]
+        where, time_s = record.pose, float(record.cycle.time_s[cycle])
+        waypoints, reached = len(record.waypoints_at(time_s)), int(where.target[pose])
+        facts = [f"{time_s:.1f} s"]
         if waypoints:
-            facts.append(f"waypoint {min(int(where.target[pose]) + 1, waypoints)} of {waypoints}")
+            facts.append(f"waypoint {min(reached + 1, waypoints)} of {waypoints}")
         if np.isfinite(where.speed_m_s[pose]):
             facts.append(f"{where.speed_m_s[pose]:.2f} m/s")
         self._state.content = (

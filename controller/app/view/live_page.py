@@ -18,6 +18,7 @@ from snakewalk.controller.app.view.gait_panel import GaitPanel
 from snakewalk.controller.app.view.page_server import StopPanel, open_page
 from snakewalk.controller.app.view.row_line import WatcherEnd
 from snakewalk.controller.app.view.scene import BodyScene
+from snakewalk.controller.app.view.waypoint_panel import WaypointPanel
 from snakewalk.controller.runlog.record import Header, RunRecord
 from snakewalk.controller.runlog.tables import record_of
 from snakewalk.drivers.clock import WallClock
@@ -65,6 +66,8 @@ class _LivePage:
         self._dashboard: Dashboard | None = None
         self._gait_panel: GaitPanel | None = None
         self._gait: dict[str, Any] | None = None
+        self._waypoint_panel: WaypointPanel | None = None
+        self._takes_waypoints = False
         self._over = False
         self._asked_s = self._told_s = self._servos_s = self._curves_s = -1.0
 
@@ -75,9 +78,8 @@ class _LivePage:
             self._clock.sleep_until_s(self._asked_s + _PERIOD_S)
             self._asked_s = self._clock.now_s()
             self._end.ask()
-            if self._gait_panel is not None:
-                for command in self._gait_panel.commands(self._asked_s):
-                    self._end.command(command)
+            for command in self._commands():
+                self._end.command(command)
         for topic, row in self._end.rows(_PERIOD_S):
             self._take(topic, row)
             if topic == "/pose":
@@ -91,6 +93,15 @@ class _LivePage:
             elif self._told_s > 0.0 and not self._over:
                 self._stop.show(f"no news of the run for {now_s - self._told_s:.0f} s")
 
+    def _commands(self) -> list[str]:
+        """What was set in the page since the last call."""
+        found = []
+        if self._gait_panel is not None:
+            found += self._gait_panel.commands(self._asked_s)
+        if self._waypoint_panel is not None:
+            found += self._waypoint_panel.commands()
+        return found
+
     def _take(self, topic: str, row: dict[str, Any]) -> None:
         if topic == "/button":
             self._button = PressedButton(Path(row["path"]))
@@ -103,6 +114,7 @@ class _LivePage:
                 self._scene.first_camera(self._server)
                 self._dashboard = Dashboard(self._server, self._header)
             self._show_gait()
+            self._take_waypoints()
             return
         if topic == "/picture":
             if self._dashboard is not None:
@@ -112,13 +124,23 @@ class _LivePage:
             self._gait = row
             self._show_gait()
             return
+        if topic == "/course":
+            self._takes_waypoints = True
+            self._take_waypoints()
+            return
+        if topic == "/waypoints":
+            self._header = self._record({topic: [row]}).header
+            return
         self._rows[topic].append(row)
         if topic == "/event":
             if row["kind"] in ("trip", "interrupt") or (row["kind"] == "stop" and not self._over):
                 self._over = True
                 self._stop.ended(row["text"])
             if self._dashboard is not None:
-                self._dashboard.show_events(self._record(events=True).events)
+                events = {topic: list(self._rows[topic])}
+                self._dashboard.show_events(self._record(events).events)
+            if self._waypoint_panel is not None:
+                self._waypoint_panel.show(row["kind"], row["text"])
 
     def _show_gait(self) -> None:
         """Show what an operator runs, once the page knows the robot; a run without one has none."""
@@ -128,11 +150,17 @@ class _LivePage:
             self._gait_panel = GaitPanel(self._server, self._dashboard.tabs, self._header.robot)
         self._gait_panel.show(self._gait["name"], self._gait["parameters"])
 
+    def _take_waypoints(self) -> None:
+        """Take clicks on the ground, once there is one; of a run whose waypoints may be set."""
+        if self._takes_waypoints and self._scene is not None and self._dashboard is not None:
+            self._waypoint_panel = WaypointPanel(self._server, self._dashboard.tabs, self._scene)
+
     def _draw(self) -> None:
         scene, dashboard, now_s = self._scene, self._dashboard, self._told_s
         if scene is None or dashboard is None:
             return
-        now = self._record(newest=True)
+        newest = {topic: list(self._rows[topic])[-1:] for topic in ("/cycle", "/pose", "/slow")}
+        now = self._record(newest)
         with self._server.atomic():
             follow = dashboard.follow.value
             if not follow:
@@ -144,20 +172,13 @@ class _LivePage:
                 dashboard.show_servos(now, -1, -1 if len(now.slow.time_s) else None)
             if now_s - self._curves_s >= _CURVES_S:
                 self._curves_s = now_s
-                past = self._record()
+                past = self._record({topic: list(each) for topic, each in self._rows.items()})
                 dashboard.show_curves(past, len(past.cycle.time_s) - 1, len(past.pose.time_s) - 1)
                 scene.show_paths(past.paths, float(past.cycle.time_s[-1]))
                 scene.show_trail(past.pose.centre_m)
 
-    def _record(self, *, newest: bool = False, events: bool = False) -> RunRecord:
-        """What is known: the past, the newest cycle alone, or the events alone."""
-        if events:
-            rows = {"/event": list(self._rows["/event"])}
-        elif newest:
-            topics = ("/cycle", "/pose", "/slow")
-            rows = {topic: list(self._rows[topic])[-1:] for topic in topics}
-        else:
-            rows = {topic: list(each) for topic, each in self._rows.items()}
+    def _record(self, rows: dict[str, list[dict[str, Any]]]) -> RunRecord:
+        """What is known, of rows by topic."""
         return record_of(rows, complete=False, note="", header=self._header)
 
     def _press(self, who: str) -> str:

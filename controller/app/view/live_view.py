@@ -39,13 +39,17 @@ class LiveView(WatcherProcess):
     """The page has no dead man's button."""
 
     def pressed(self) -> list[str]:
-        """What was set in the page since the last call, as an ``Operator`` takes it."""
+        """What was set in the page since the last call, for an ``Operator`` or a ``LiveCourse``."""
         return self._end.commands()
 
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:
         """Take the gait that an operator runs: the page then has its sliders."""
         row = {"name": name, "parameters": parameters}
         self._end.add("/gait", json.dumps(row).encode())
+
+    def on_course(self) -> None:
+        """Take it that the run's waypoints may be set: the page then takes clicks."""
+        self._end.add("/course", b"{}")
 
     def on_row(self, topic: str, row: bytes) -> None:
         """Take a row of the log; returns at once."""

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any, Final
 
-KEPT: Final = frozenset({"/config", "/path", "/event", "/button", "/gait"})
+KEPT: Final = frozenset({"/config", "/path", "/waypoints", "/event", "/button", "/gait", "/course"})
 """Topics of which every row is sent, in order; of others the newest."""
 SENT: Final = KEPT | {"/cycle", "/shadow", "/pose", "/slow", "/imu", "/picture"}
 _KEPT_MAX: Final = 1000

@@ -1,5 +1,6 @@
 """The body on its ground in 3-D: links and their goals, path, waypoints, and where the body was."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final
 
@@ -8,7 +9,7 @@ import trimesh
 import viser
 from scipy.spatial.transform import Rotation
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.config.world import PoleObstacle
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
@@ -35,6 +36,8 @@ _LINE: Final = 3.0
 _FLOOR_M: Final = 12.0
 """Side of the piece of a flat floor that is drawn (ours)."""
 _TRAIL_POINTS: Final = 400
+_SEEN_M, _RAY_STEP_M = 60.0, 0.02
+"""How far a click reaches, and in what steps the ground is looked for (ours)."""
 
 
 class BodyScene:
@@ -51,10 +54,11 @@ class BodyScene:
         self._frame = self._scene.add_frame(self._root, show_axes=False)
         self._paths = 0
         self._reached = -1
+        self._waypoints_m: Floats = np.zeros((0, 2))
+        self._waypoints: list[viser.IcosphereHandle] = []
         self._scene.set_up_direction("+z")
         self._draw_ground()
         self._draw_obstacle()
-        self._waypoints = self._draw_waypoints()
         links = self._robot.link_count
         colors = [_LINKS[number % 2][k % 2] for k in range(links)]
         self._colors = np.array([_HEAD, *colors[1:]], dtype=float)
@@ -84,11 +88,9 @@ class BodyScene:
             _place(self._goals, body_in_world(self._robot, head, sent), self._goal_above_m)
         if follow:
             self._frame.position = tuple(self.aside_m - [*measured.centre_m[:2], 0.0])
-        reached = int(where.target[pose])
-        if reached != self._reached:
-            self._reached = reached
-            for number, sphere in enumerate(self._waypoints):
-                sphere.color = _REACHED if number < reached else _WAYPOINT
+        self._show_waypoints(
+            record.waypoints_at(float(rows.time_s[cycle])), int(where.target[pose])
+        )
 
     def show_paths(self, paths: tuple[tuple[float, Floats], ...], time_s: float) -> None:
         """Draw the path in force at a time, and those that were laid before it in grey."""
@@ -110,6 +112,29 @@ class BodyScene:
         step = max(1, len(known) // _TRAIL_POINTS)
         if len(known) > step:
             self._line(f"{self._root}/trail", known[::step, :2], _TRAIL, 2.0)
+
+    def ground_m(
+        self, origin_m: Sequence[float], direction: Sequence[float]
+    ) -> tuple[float, float] | None:
+        """X and y of the drawn ground where a ray of the page meets it; None where it does not."""
+        at_m = np.asarray(origin_m, float) - self._frame.position
+        along = np.asarray(direction, float) / max(float(np.linalg.norm(direction)), 1e-9)
+        points_m = at_m + np.arange(0.0, _SEEN_M, _RAY_STEP_M)[:, None] * along
+        above_m = points_m[:, 2] - self._height_m(points_m[:, :2])
+        below = np.flatnonzero((above_m <= 0.0) & self._is_drawn(points_m[:, :2]))
+        if not len(below) or below[0] == 0:
+            return None
+        before, behind = above_m[below[0] - 1 : below[0] + 1]
+        if before <= 0.0:  # from below, or through the border
+            return None
+        found = points_m[below[0]] - along * _RAY_STEP_M * behind / (behind - before)
+        return float(found[0]), float(found[1])
+
+    def _is_drawn(self, points_m: Floats) -> Bools:
+        """Which of points (n, 2) lie on the ground that is drawn."""
+        if self._ground is None:
+            return np.asarray((np.abs(points_m) <= 0.5 * _FLOOR_M).all(axis=1))
+        return self._ground.contains(points_m[:, 0], points_m[:, 1])
 
     def release(self) -> None:
         """Put the ground back where it is: the camera no longer follows."""
@@ -187,22 +212,32 @@ class BodyScene:
             position=(*obstacle.at_m, height_m),
         )
 
-    def _draw_waypoints(self) -> list[viser.IcosphereHandle]:
-        plan = self._header.plan
-        spheres = []
-        heights_m = self._height_m(plan.waypoints_m)
-        for number, (point_m, z_m) in enumerate(zip(plan.waypoints_m, heights_m, strict=True)):
+    def _show_waypoints(self, waypoints_m: Floats, reached: int) -> None:
+        """Draw those in force, (w, 2), and which of them are reached."""
+        if waypoints_m is not self._waypoints_m:
+            self._waypoints_m = waypoints_m
+            self._reached = -1
+            self._draw_waypoints()
+        if reached != self._reached:
+            self._reached = reached
+            for number, sphere in enumerate(self._waypoints):
+                sphere.color = _REACHED if number < reached else _WAYPOINT
+
+    def _draw_waypoints(self) -> None:
+        for sphere in self._waypoints:
+            sphere.remove()
+        self._waypoints = []
+        radius_m = self._header.plan.waypoint_radius_m
+        heights_m = self._height_m(self._waypoints_m)
+        for number, (point_m, z_m) in enumerate(zip(self._waypoints_m, heights_m, strict=True)):
             at = (float(point_m[0]), float(point_m[1]), float(z_m))
             name = f"{self._root}/waypoints/{number}"
-            spheres.append(
+            self._waypoints.append(
                 self._scene.add_icosphere(
-                    name, plan.waypoint_radius_m, color=_WAYPOINT, opacity=0.35, position=at
+                    name, radius_m, color=_WAYPOINT, opacity=0.35, position=at
                 )
             )
-            self._scene.add_label(
-                f"{name}/label", str(number + 1), position=(0.0, 0.0, plan.waypoint_radius_m)
-            )
-        return spheres
+            self._scene.add_label(f"{name}/label", str(number + 1), position=(0.0, 0.0, radius_m))
 
     def _line(self, name: str, points_m: Floats, color: tuple[int, int, int], width: float) -> None:
         flat = points_m[:, :2]

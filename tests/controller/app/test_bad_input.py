@@ -78,6 +78,7 @@ ROWS = [
     ("bus sniff empty", "empty: holds no exchange"),
     ("bus sniff noise.bin", "noise.bin: holds no packet in 400 bytes"),
     ("trials flat-slalom --robot nosuch --seeds 1", "nosuch: no such robot"),
+    ("run flat-square --live", "--live: waypoints are set in the page: add --view"),
     ("run flat-square --set run.seed", "--set run.seed: expected KEY=VALUE"),
     ("run flat-square --set run.seed=-1", "run flat-square: seed: "),
     ("run flat-square --set run.seed=1e999", "run flat-square: seed: "),

@@ -36,8 +36,8 @@ def test_the_bar_of_a_run_that_changes_its_gait_names_the_one_that_moves(
 
 
 def _run(cycles: int, error: OSError | None) -> None:
-    with suppress(OSError), PathBar(2.0, 1) as bar:
+    with suppress(OSError), PathBar(2.0) as bar:
         for cycle in range(cycles):
-            bar.on_progress(Progress(0.02 * cycle, 0.1, 0, 0.2, done=cycle == cycles - 1))
+            bar.on_progress(Progress(0.02 * cycle, 0.1, 0, 0.2, cycle == cycles - 1, waypoints=1))
         if error is not None:
             raise error

@@ -74,6 +74,8 @@ def test_waypoints_count_in_their_order_only() -> None:
     ):
         plan = PlanSummary(path, np.array(points), 0.5)
         assert waypoint_times_s(pose, plan) == pytest.approx(expected, abs=0.011)
+    set_later = PlanSummary(path, np.array([[6.0, 0.0]]), 0.5, set_s=np.array([6.2]))
+    assert waypoint_times_s(pose, set_later) == pytest.approx([6.2], abs=0.011)
 
 
 def test_a_path_laid_again_counts_from_then_on(record: RunRecord) -> None:

@@ -108,7 +108,7 @@ def test_a_plan_reaches_its_waypoints_on_the_bus_though_each_action_misses_a_lit
     assert loaded.route.actions == job.route.actions
     finished = execute(loaded, tmp_path)
     outcome = finished.outcome
-    assert outcome.complete(5)
+    assert outcome.complete
     assert isinstance(finished.source, RouteMotion)
     errors = finished.source.follower.errors()
     assert 0.0 < np.median(errors[:, 0]) < 0.15

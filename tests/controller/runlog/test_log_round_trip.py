@@ -74,6 +74,32 @@ def test_the_header_says_what_ran(write: Write, tmp_path: Path) -> None:
     assert header.plan.waypoints_m.shape == (4, 2)
 
 
+def test_waypoints_that_were_set_on_the_way_are_the_plans(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    first = np.array([[1.0, 0.0], [2.0, 0.0]])
+    with RunLog(path) as log:
+        log.config(
+            load_run("flat-square"),
+            load_robot("yaw16"),
+            load_world("flat"),
+            backend="sim",
+            plan=PlanSummary(np.zeros((2, 2)), first, 0.3),
+        )
+        log.waypoints_changed(1.0, [*first, (3.0, 1.0)])
+        log.waypoints_changed(2.0, [first[0], (0.0, 4.0)])
+        log.waypoints_changed(3.0, np.zeros((0, 2)))
+        log.waypoints_changed(4.0, [first[0], (0.0, 4.0)])
+        log.waypoints_changed(5.0, [first[0], (0.0, 4.0), (1.0, 4.0)])
+    record = read_log(path)
+    np.testing.assert_array_equal(record.header.plan.waypoints_m, [[1, 0], [0, 4], [1, 4]])
+    assert record.header.plan.set_s is not None
+    assert record.header.plan.set_s.tolist() == [4.0, 4.0, 5.0]
+    assert [since_s for since_s, _ in record.waypoints] == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    np.testing.assert_array_equal(record.waypoints_at(0.9), first)
+    np.testing.assert_array_equal(record.waypoints_at(1.0), [[1, 0], [2, 0], [3, 1]])
+    assert record.waypoints_at(3.5).shape == (0, 2)
+
+
 def test_the_ground_is_thinned_in_place(write: Write, tmp_path: Path) -> None:
     ground = read_log(write(tmp_path / "run.mcap", 1)).header.ground
     assert ground is not None

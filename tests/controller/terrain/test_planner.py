@@ -117,6 +117,8 @@ def test_bad_places_are_named_with_the_nearest_safe_one() -> None:
     start, outside, steep = error.value.faults
     assert start.startswith("start (-1.90, 0.00) is within 0.3 m of the world's border")
     assert outside.startswith("waypoint 1 (5.00, 0.00) is outside the world, 4.0 m by 4.0 m")
+    with pytest.raises(InputError, match=r"^waypoint 7 \(5\.00, 0\.00\) is outside the world"):
+        planner([(0.0, 0.0), (5.0, 0.0)], number=7)
     assert "waypoint 2 (0.30, 0.20) is on unsafe ground: slope 3" in steep
     x, y = (float(number) for number in steep.rsplit("(", 1)[1].strip(")").split(","))
     assert planner.relief.safe(x, y)

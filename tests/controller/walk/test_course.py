@@ -1,4 +1,4 @@
-"""A course whose path is renewed while the body is on it, as more of the ground is known."""
+"""A course whose path is renewed while the body is on it: more ground, or other waypoints."""
 
 from collections.abc import Callable
 
@@ -19,7 +19,7 @@ class Plans:
         self.reach_m = reach_m
         self.asked: list[np.ndarray] = []
 
-    def __call__(self, points_m, heading_rad=None, *, avoid_m=()) -> SplinePath:
+    def __call__(self, points_m, heading_rad=None, *, avoid_m=(), number=1) -> SplinePath:
         points = np.asarray(points_m, float)
         self.asked.append(points)
         within = points[points[:, 0] <= self.reach_m]
@@ -86,7 +86,7 @@ def test_where_no_path_is_found_the_old_one_stays() -> None:
     walked(on, 0.5)
     path = on.path
 
-    def refuses(points_m, heading_rad=None, *, avoid_m=()) -> SplinePath:
+    def refuses(points_m, heading_rad=None, *, avoid_m=(), number=1) -> SplinePath:
         raise InputError("no way")
 
     on._plan = refuses
@@ -103,3 +103,65 @@ def test_with_the_path_over_every_waypoint_behind_there_is_nothing_to_renew() ->
     count = len(plan.asked)
     on.renew("more", lambda points: True, lambda: 0.0)
     assert len(plan.asked) == count
+
+
+def test_a_waypoint_more_goes_on_from_the_paths_end_and_keeps_what_is_before_it() -> None:
+    plan = Plans(9.0)
+    on = course(plan)
+    walked(on, 0.8)
+    before = on.path.piece_m(0.0, on.path.length_m)
+    on.lead_to(np.array([*WAYPOINTS, (5.0, 2.0)]), lambda: 0.0)
+    np.testing.assert_allclose(plan.asked[-1][[0, -1]], [WAYPOINTS[1], (5.0, 2.0)])
+    np.testing.assert_allclose(
+        on.path.piece_m(0.0, on.path.length_m)[: len(before)], before, atol=2e-2
+    )
+    np.testing.assert_allclose(on.path.position(on.path.length_m), (5.0, 2.0))
+    assert on.head_along_m == pytest.approx(0.8, abs=0.01)
+    assert len(on.waypoints_m) == 3
+    assert not on.complete
+
+
+def test_another_waypoint_instead_is_led_to_from_the_head() -> None:
+    plan = Plans(9.0)
+    on = course(plan)
+    walked(on, 2.6)  # the centre is at the first waypoint
+    assert on.reached == 1
+    on.lead_to(np.array([(1.0, 3.0)]), lambda: 0.4)
+    np.testing.assert_allclose(plan.asked[-1], [(2.6, 0.0), (1.0, 3.0)])
+    np.testing.assert_allclose(on.waypoints_m, [WAYPOINTS[0], (1.0, 3.0)])
+    on.observe(np.array([1.0, 2.9]), np.array([1.0, 3.5]))
+    assert on.complete
+
+
+def test_with_what_is_left_left_out_it_is_complete_and_another_may_follow() -> None:
+    plan = Plans(9.0)
+    on = course(plan)
+    walked(on, 0.8)
+    path = on.path
+    on.lead_to(np.zeros((0, 2)), lambda: 0.0)
+    assert on.complete
+    assert on.path is path
+    walked(on, 0.9)
+    on.lead_to(np.array([(3.0, 1.0)]), lambda: 0.0)
+    assert not on.complete
+    np.testing.assert_allclose(plan.asked[-1][0], [0.9, 0.0])
+
+
+def test_waypoints_that_no_path_leads_to_change_nothing() -> None:
+    plan = Plans(9.0)
+    on = course(plan)
+    walked(on, 0.8)
+    path, waypoints_m = on.path, on.waypoints_m
+    numbers = []
+
+    def refuses(points_m, heading_rad=None, *, avoid_m=(), number=1) -> SplinePath:
+        numbers.append(number)
+        raise InputError("no way")
+
+    on._plan = refuses
+    for left_m in ([*WAYPOINTS, (5.0, 2.0)], [(5.0, 2.0)]):
+        with pytest.raises(InputError):
+            on.lead_to(np.array(left_m), lambda: 0.0)
+        assert on.path is path
+        assert on.waypoints_m is waypoints_m
+    assert numbers == [3, 1]

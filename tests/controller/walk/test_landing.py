@@ -69,7 +69,7 @@ def test_a_run_swims_to_the_beach_and_walks_over_it(tmp_path: Path) -> None:
     )
     told: list[tuple[str, str]] = []
     finished = execute(job, tmp_path, on_event=lambda kind, text: told.append((kind, text)))
-    assert finished.outcome.complete(1)
+    assert finished.outcome.complete
     assert finished.outcome.missed == 0
     assert [kind for kind, _ in told].count("ashore") == 1
     legs = finished.record.cycle.sent_rad[:, LEGS]

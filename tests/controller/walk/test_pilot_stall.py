@@ -14,7 +14,7 @@ def test_a_body_that_stands_still_gets_a_path_that_keeps_off_the_place() -> None
     prepared = prepare_walk("jacksboro-traverse", motion="serpenoid")
     planner, asked = prepared.planner, []
 
-    def plan(points_m, heading_rad=None, *, avoid_m=()) -> SplinePath:
+    def plan(points_m, heading_rad=None, *, avoid_m=(), number=1) -> SplinePath:
         asked.append(np.array(avoid_m))
         return planner(points_m, heading_rad, avoid_m=avoid_m)
 

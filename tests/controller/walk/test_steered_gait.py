@@ -82,7 +82,7 @@ def test_a_salamander_trots_past_a_waypoint_to_another_and_rests(tmp_path: Path)
     near = job.run.model_copy(update={"waypoints_m": ((0.4, 0.1), (0.7, 0.35))})
     job = replace(job, run=near)
     finished = execute(job, tmp_path)
-    assert finished.outcome.complete(2)
+    assert finished.outcome.complete
     assert finished.outcome.missed == 0
     record = finished.record
     assert failure(record) is None

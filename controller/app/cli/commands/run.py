@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import (
     DEFAULT_RUN,
@@ -64,6 +65,14 @@ def run(
     out: RunFolder = None,
     compliance: Compliant = None,
     shadow: Shadow = False,
+    live: Annotated[
+        bool,
+        typer.Option(
+            "--live",
+            help="waypoints are set in the page as it walks (--view); at the last one it holds, "
+            "and waits for more",
+        ),
+    ] = False,
     view: View = False,
     view_at: ViewAt = VIEW_AT,
     ros: Ros = False,
@@ -84,6 +93,8 @@ def run(
     )
 
     check_look(look)
+    if live and not view:
+        raise InputError("--live: waypoints are set in the page: add --view")
     prepared = prepare_job(
         run, keys=key_values("--set", set_), seed=seed, motion=motion, robot=robot, world=world,
         track=track, pose=pose,
@@ -99,8 +110,11 @@ def run(
     with (
         run_folder(name, out) as folder,
         watched(view, view_at, ros) as watchers,
-        PathBar(prepared.path.length_m, len(prepared.run.waypoints_m)) as bar,
+        PathBar(prepared.path.length_m) as bar,
     ):
+        page = watchers.page if watchers is not None and live else None
+        if page is not None:
+            page.on_course()
         finished = execute(
             prepared,
             folder,
@@ -109,6 +123,7 @@ def run(
             view=watchers,
             shadow=shadow,
             confirm=_confirm if sys.stdin.isatty() else None,
+            waypoint_commands=None if page is None else page.pressed,
             on_progress=in_real_time(bar.on_progress) if watchers and not port else bar.on_progress,
             on_event=bar.on_event,
         )
@@ -117,7 +132,7 @@ def run(
     show(
         {
             "run": name,
-            "waypoints": len(prepared.run.waypoints_m),
+            "waypoints": outcome.waypoints,
             "waypoints_reached": outcome.reached,
             "duration_s": round(outcome.duration_s, 2),
             "tripped": outcome.tripped,
@@ -130,7 +145,7 @@ def run(
         },
         as_json,
     )
-    if not outcome.complete(len(prepared.run.waypoints_m)):
+    if not outcome.complete:
         raise SystemExit(1)
 
 

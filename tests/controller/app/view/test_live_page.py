@@ -1,5 +1,6 @@
 """The page of a run that moves servos on a pseudo-terminal, in a browser: what it shows, E-STOP."""
 
+import dataclasses
 import os
 import re
 import shutil
@@ -7,8 +8,11 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,16 +20,19 @@ import pytest
 pytest.importorskip("viser")
 
 from snakewalk.config.arrays import Image
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.app.cli.commands.gait_run import _Hands
 from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_gait
+from snakewalk.controller.app.runs.factory import prepare_gait, prepare_walk
 from snakewalk.controller.app.view.dashboard import Dashboard
 from snakewalk.controller.app.view.gait_panel import GaitPanel
 from snakewalk.controller.app.view.live_page import _LivePage
 from snakewalk.controller.app.view.live_view import LiveView
 from snakewalk.controller.app.view.page_server import open_page
 from snakewalk.controller.app.view.row_line import RunEnd, WatcherEnd
+from snakewalk.controller.app.view.scene import BodyScene
+from snakewalk.controller.app.view.waypoint_panel import WaypointPanel
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
@@ -40,28 +47,42 @@ PATIENT = ("stale_limit_s=5", "slow_stale_limit_s=20", "watchdog_s=2.5", "follow
 """Of a run whose machine also draws a page without a graphics card."""
 
 
-@pytest.fixture
-def run(
-    tmp_path: Path, servo_bus: Callable[..., ServoBus]
-) -> Iterator[tuple[subprocess.Popen[str], ServoBus]]:
-    bus = servo_bus("1-4")
-    (tmp_path / "quartet.toml").write_text(ROBOT)
-    words = ["gait", "run", "lateral-undulation", "--robot", "quartet.toml", "--seconds", "100"]
-    words += [word for key in PATIENT for word in ("--set", f"run.safety.{key}")]
-    words += ["--port", bus.path, "--live", "--no-film", "--out", "run"]
-    words += ["--view", "--view-at", "127.0.0.1:0"]
+@contextmanager
+def run(folder: Path, *words: str) -> Iterator[subprocess.Popen[str]]:
+    """A live command with a page, whose address it prints first."""
+    options = ["--live", "--no-film", "--out", "run", "--view", "--view-at", "127.0.0.1:0"]
     with subprocess.Popen(
-        [sys.executable, "-c", COMMAND, *words],
-        cwd=tmp_path,
+        [sys.executable, "-c", COMMAND, *words, *options],
+        cwd=folder,
         stdin=subprocess.DEVNULL,
-        env=os.environ
-        | {"XDG_RUNTIME_DIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)},
+        env=os.environ | {"XDG_RUNTIME_DIR": str(folder), "PYTHONPATH": os.pathsep.join(sys.path)},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
     ) as child:
-        yield child, bus
+        yield child
         child.kill()
+
+
+@contextmanager
+def browsed(child: subprocess.Popen[str], width: int = 700) -> Iterator[Any]:
+    """The page of a run in a browser."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    assert child.stderr is not None
+    line = child.stderr.readline()
+    url = re.search(r"http://127\.0\.0\.1:\d+", line)
+    assert url is not None, line + child.stderr.read()
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(
+            executable_path=CHROMIUM,
+            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+        )
+        page = browser.new_page(viewport={"width": width, "height": 500})
+        page.set_default_timeout(60_000.0)
+        page.goto(url[0])
+        page.get_by_text("torque off at once, latched").wait_for()
+        yield page
+        browser.close()
 
 
 class View:
@@ -156,6 +177,104 @@ def test_what_is_set_in_the_page_changes_the_gait(
     assert said == ["frequency_hz = 0.3"]
 
 
+def test_the_body_walks_to_where_the_ground_was_clicked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    view = View()
+    LiveView.on_course(view)  # type: ignore[arg-type]
+    at: dict[str, float] = {}
+    cycles = count()
+
+    def on_progress(progress: Progress) -> None:
+        if next(cycles) % 20 and progress.time_s > 0.5:  # each is held to the page's pace
+            return
+        view.page.step()
+        panel, scene = view.page._waypoint_panel, view.page._scene
+        assert panel is not None
+        assert scene is not None
+        if not at and progress.time_s > 1.0:
+            at["clicked"] = progress.time_s
+            clicked(panel, "waypoint", (0.4, 0.2))
+            clicked(panel, "", (2.0, 2.0))  # nothing waits for it
+            clicked(panel, "", (40.0, 0.0), "shift")
+            assert "there is no ground where you clicked" in panel._text.content
+        if progress.reached == 2 and "reached" not in at:
+            at["reached"] = progress.time_s
+            assert len(scene._waypoints) == 2
+            assert "waypoint 2 of 2" in view.shown("_state")
+        if "reached" in at and progress.time_s > at["reached"] + 1.0 and "end" not in at:
+            at["end"] = progress.time_s
+            assert "no waypoint is left: it holds" in panel._text.content
+            panel._commanding("end")(None)
+
+    finished = execute(
+        prepare_walk("flat-slalom", motion="serpenoid", waypoints_m=((0.1, 0.0),)),
+        tmp_path / "run",
+        view=view,
+        waypoint_commands=view.end.commands,
+        on_progress=on_progress,
+    )
+    view.page._server.stop()
+    assert finished.outcome.complete
+    assert finished.outcome.waypoints == 2
+    record = finished.record
+    np.testing.assert_allclose(record.header.plan.waypoints_m, [(0.1, 0.0), (0.4, 0.2)], atol=1e-3)
+    assert np.hypot(*(record.pose.centre_m[-1, :2] - (0.4, 0.2))) < 0.35
+    assert finished.summary.waypoints_reached == finished.summary.waypoints == 2
+    assert len(record.paths) == 2
+    assert 1.0 < at["end"] - at["reached"] < 1.5
+
+
+def test_on_servos_it_is_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, servo_bus: Callable[..., ServoBus]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / "quartet.toml").write_text(ROBOT)
+    robot = str(tmp_path / "quartet.toml")
+    commands = [["next=1,0.3"], ["waypoint=99,0"], *[[]] * 5, ["end"]]
+    said: list[tuple[str, str]] = []
+    finished = execute(
+        prepare_walk("flat-slalom", motion="serpenoid", robot=robot),
+        tmp_path / "run",
+        servo_bus("1-4").path,
+        waypoint_commands=lambda: commands.pop(0) if commands else [],
+        on_event=lambda kind, text: said.append((kind, text)),
+    )
+    assert [kind for kind, _ in said] == ["operator", "refused", "operator"]
+    assert finished.outcome.tripped is None
+    assert finished.record.waypoints[1][1].tolist() == [[1.0, 0.3]]
+    assert len(finished.record.paths) == 2
+    assert len(finished.record.header.plan.waypoints_m) == 0  # the end leaves out what is left
+
+
+def clicked(
+    panel: WaypointPanel, word: str, at_m: tuple[float, float], modifier: str | None = None
+) -> None:
+    """Click on a place of the floor, from above and beside it, after a button was pressed."""
+    if word:
+        panel._arming(word)(None)
+    origin_m = np.add([*at_m, 0.0], [-1.0, -2.0, 3.0])
+    panel._clicked(
+        SimpleNamespace(ray_origin=origin_m, ray_direction=(1.0, 2.0, -3.0), modifier=modifier)  # type: ignore[arg-type]
+    )
+
+
+def test_a_click_finds_the_ground_that_it_falls_on(record: RunRecord) -> None:
+    field = HeightField(np.outer(np.ones(41), np.abs(np.arange(-20, 21)) * 0.05), 0.1, -2.0, -2.0)
+    server, _ = open_page("127.0.0.1", 0)
+    scene = BodyScene(server, dataclasses.replace(record.header, ground=field))
+    assert scene.ground_m((-3.0, 0.0, 0.5), (1.0, 0.0, 0.0)) is None  # came through the border
+    assert scene.ground_m((0.0, 0.0, 0.5), (1.0, 0.0, 0.0)) == pytest.approx((1.0, 0.0), abs=1e-6)
+    assert scene.ground_m((0.0, 0.3, 5.0), (0.0, 0.0, -2.0)) == pytest.approx((0.0, 0.3), abs=1e-6)
+    assert scene.ground_m((0.0, 0.3, -5.0), (0.0, 0.0, 1.0)) is None  # from below
+    assert scene.ground_m((0.0, 0.3, 5.0), (0.0, 0.0, 1.0)) is None  # the sky
+    scene._frame.position = (1.0, 0.0, 0.0)  # the body is followed
+    assert scene.ground_m((0.0, 0.3, 5.0), (0.0, 0.0, -2.0)) == pytest.approx((-1.0, 0.3), abs=1e-6)
+    server.stop()
+
+
 def test_the_camera_of_a_run_is_shown_twice_a_second(record: RunRecord) -> None:
     cv2 = pytest.importorskip("cv2")
     view = View()
@@ -213,27 +332,23 @@ def test_a_slider_orders_its_newest_value_and_shows_what_the_run_made_of_it() ->
     server.stop()
 
 
+IN_A_BROWSER = pytest.mark.skipif(
+    CHROMIUM is None, reason="there is no Chromium to open the page with"
+)
+
+
 @pytest.mark.slow
-@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page with")
+@IN_A_BROWSER
 def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
-    run: tuple[subprocess.Popen[str], ServoBus], tmp_path: Path
+    tmp_path: Path, servo_bus: Callable[..., ServoBus]
 ) -> None:
-    playwright = pytest.importorskip("playwright.sync_api")
-    child, bus = run
-    assert child.stderr is not None
-    line = child.stderr.readline()
-    url = re.search(r"http://127\.0\.0\.1:\d+", line)
-    assert url is not None, line + child.stderr.read()
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(
-            executable_path=CHROMIUM,
-            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
-        )
-        page = browser.new_page(viewport={"width": 700, "height": 500})
-        page.set_default_timeout(60_000.0)
-        page.goto(url[0])
+    bus = servo_bus("1-4")
+    (tmp_path / "quartet.toml").write_text(ROBOT)
+    words = ["gait", "run", "lateral-undulation", "--seconds", "100"]
+    words += ["--robot", "quartet.toml", "--port", bus.path]
+    words += [word for key in PATIENT for word in ("--set", f"run.safety.{key}")]
+    with run(tmp_path, *words) as child, browsed(child) as page:
         button = page.get_by_role("button", name="E-STOP")
-        page.get_by_text("torque off at once, latched").wait_for()
         page.get_by_text("lateral-undulation").wait_for()
         page.get_by_text("joint 4 (ID 4)").wait_for()
         assert bus["Torque Enable"].tolist() == [1] * 4
@@ -246,7 +361,30 @@ def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
         page.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
         assert button.is_disabled()
         assert bus["Torque Enable"].tolist() == [0] * 4
-        browser.close()
-    assert child.wait(60.0) == 1
+        assert child.wait(60.0) == 1
     record = read_log(tmp_path / "run" / "log.mcap")
     assert [event.kind for event in record.events][-2:] == ["trip", "stop"]
+
+
+@pytest.mark.slow
+@IN_A_BROWSER
+def test_in_a_browser_a_click_on_the_ground_is_where_the_body_goes(
+    tmp_path: Path,
+) -> None:
+    pytest.importorskip("mujoco")
+    words = ["run", "flat-slalom", "--motion", "serpenoid", "--set", "run.waypoints_m=[[0.3,0]]"]
+    with run(tmp_path, *words) as child, browsed(child, width=1000) as page:
+        page.get_by_role("tab", name="walk").click()
+        page.get_by_role("button", name="add a waypoint").click()
+        page.get_by_text("now click on the ground").wait_for()
+        page.mouse.click(420, 330)
+        page.get_by_text("waypoint 2 of 2").wait_for()
+        page.get_by_text("no waypoint is left: it holds, and waits for another").wait_for()
+        page.get_by_role("button", name="end the run").click()
+        page.get_by_text("the run has ended").wait_for()
+        assert child.wait(60.0) == 0
+    record = read_log(tmp_path / "run" / "log.mcap")
+    waypoints_m = record.header.plan.waypoints_m
+    assert len(waypoints_m) == 2
+    assert np.hypot(*(record.pose.centre_m[-1, :2] - waypoints_m[1])) < 0.35
+    assert len(record.paths) >= 2  # and one where it missed its way

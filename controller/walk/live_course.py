@@ -1,0 +1,181 @@
+"""A live course: a person sets the waypoints of a motion while it is on its way.
+
+The motion is any that goes along a course. At the last waypoint it comes to rest, holds its shape
+and waits for another; it is done when the person ends it.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Final, Protocol
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.gaits.gait import Needs
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.path_progress import Decision, PathProgress
+from snakewalk.controller.motion.source import MotionSource, Pace
+from snakewalk.controller.walk.course import Course, OnCourse
+
+ADD: Final = "waypoint"
+"""``waypoint=X,Y``: go there after the waypoints that are left."""
+NEXT: Final = "next"
+"""``next=X,Y``: go there, and leave those out."""
+CLEAR: Final = "clear"
+"""Leave out those that are left."""
+END: Final = "end"
+"""Leave them out, and end the run where the motion comes to rest."""
+WAYPOINTS_MAX: Final = 1000
+"""That a run takes (ours)."""
+_APART_M: Final = 0.05
+"""Between where a path begins and where it leads (ours)."""
+
+
+class MotionOnCourse(MotionSource, PathProgress, Protocol):
+    """What a live course steers."""
+
+    @property
+    def course(self) -> Course:
+        """In force."""
+        ...
+
+
+class LiveCourse(OnCourse):
+    """A ``MotionSource`` with ``PathProgress`` and ``OpenWaypoints``."""
+
+    def __init__(
+        self,
+        motion: MotionOnCourse,
+        commands: Callable[[], Iterable[str]],
+        check: Callable[[Floats], None],
+        on_event: Callable[[str, str], None],
+    ) -> None:
+        """Go on to the waypoints that the motion's course has.
+
+        Args:
+            motion: along a course.
+            commands: set since the last call: ``ADD``, ``NEXT``, ``CLEAR``, ``END``; others are
+                ignored.
+            check: raises ``InputError`` for a point (2,) where no waypoint may be, whatever path
+                leads there.
+            on_event: takes ("operator", text) of what was done, ("refused", text) of what was not.
+
+        """
+        super().__init__(motion.course)
+        self._motion, self._commands, self._check = motion, commands, check
+        self._on_event = on_event
+        self._changed: str | None = None
+        self._ends = self._told_complete = False
+
+    @property
+    def waypoints_m(self) -> Floats:
+        """(w, 2) in force, those reached first."""
+        return self.course.waypoints_m
+
+    @property
+    def replanned(self) -> str | None:
+        """Why another path was laid in the last step, if one was."""
+        return self._changed or self.course.replanned
+
+    @property
+    def needs(self) -> Needs:
+        """Those of the motion."""
+        return self._motion.needs
+
+    @property
+    def done(self) -> bool:
+        """Whether the run was ended and the motion rests."""
+        return self._ends and self._motion.done
+
+    @property
+    def pulse_m_s(self) -> float:
+        """How fast the shape travels along the body."""
+        return self._motion.pulse_m_s
+
+    @property
+    def decision(self) -> Decision | None:
+        """Made in the last step, if one was."""
+        return self._motion.decision
+
+    def begin(self, view: BodyView) -> Floats:
+        """(J,) where the motion begins."""
+        return self._motion.begin(view)
+
+    def goal_rad(self) -> Floats:
+        """(J,) joint targets now."""
+        return self._motion.goal_rad()
+
+    def velocity_rad_s(self) -> Floats:
+        """(J,) how fast they move now."""
+        return self._motion.velocity_rad_s()
+
+    def pace(self) -> Pace:
+        """The motion's own."""
+        return self._motion.pace()
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Go on by ``dt_s``, and carry out what was set."""
+        self._changed = None
+        goal_rad = self._motion.step(dt_s, view)
+        for command in self._commands():
+            self._carry_out(command, view)
+        if self.course.complete and not self._told_complete and not self._ends:
+            self._on_event("operator", "no waypoint is left: it holds, and waits for another")
+        self._told_complete = self.course.complete
+        return goal_rad
+
+    def _carry_out(self, command: str, view: BodyView) -> None:
+        word, _, value = command.partition("=")
+        if word not in (ADD, NEXT, CLEAR, END) or self._ends:
+            return
+        left_m = self.waypoints_m[self.reached :]
+        try:
+            if word in (ADD, NEXT):
+                point_m = self._point_m(value, left_m if word == ADD else left_m[:0], view)
+                self._lead_to(np.vstack([left_m, point_m] if word == ADD else [point_m]), view)
+                text = f"waypoint {len(self.waypoints_m)} at {_shown(point_m)}"
+            else:
+                self._lead_to(left_m[:0], view)
+                self._ends = word == END
+                text = "it comes to rest, and the run ends" if self._ends else "it stops here"
+        except InputError as error:
+            self._on_event("refused", error.faults[0])
+            return
+        if word != ADD and len(left_m):
+            text += f"; waypoints left out: {len(left_m)}"
+        self._on_event("operator", text)
+
+    def _lead_to(self, left_m: Floats, view: BodyView) -> None:
+        path = self.course.path
+        self.course.lead_to(left_m, lambda: float(view.headings_rad.mean()))
+        if self.course.path is not path:
+            self._changed = "waypoints were set"
+
+    def _point_m(self, text: str, left_m: Floats, view: BodyView) -> Floats:
+        """(2,) of X,Y in metres.
+
+        Raises:
+            InputError: it is no such point, none may be there, or nothing leads on to it.
+
+        """
+        try:
+            x_m, y_m = (float(part) for part in text.split(","))
+        except ValueError:
+            x_m = y_m = math.nan
+        point_m = np.array([x_m, y_m])
+        if not np.isfinite(point_m).all():
+            raise InputError(f"waypoint {text}: expected X,Y in metres")
+        if len(self.waypoints_m) >= WAYPOINTS_MAX:
+            raise InputError(f"waypoint {_shown(point_m)}: a run takes {WAYPOINTS_MAX} at most")
+        self._check(point_m)
+        before_m = left_m[-1] if len(left_m) else view.link_m[0, :2]
+        if np.hypot(*(point_m - before_m)) < _APART_M:
+            what = "the waypoint before it" if len(left_m) else "the head"
+            raise InputError(f"waypoint {_shown(point_m)}: {what} is there")
+        return point_m
+
+
+def _shown(point_m: Floats) -> str:
+    x_m, y_m = (round(float(at), 2) + 0.0 for at in point_m)  # no -0.00
+    return f"({x_m:.2f}, {y_m:.2f})"
