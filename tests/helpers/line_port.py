@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any, Self
 from unittest import mock
 
+from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.port import network_port
 from snakewalk.sim.line.sim_line import SimLine
 
@@ -25,6 +26,12 @@ class OpenedLine(SimLine):
 
     latency_s = 0.0
     latency_timer_ms = None
+    device = "simulated line"
+
+    @property
+    def name(self) -> str:
+        """As it was opened."""
+        return self.device
 
     def __enter__(self) -> Self:
         return self
@@ -39,9 +46,11 @@ def line_port(line: OpenedLine) -> Iterator[str]:
     master, slave = os.openpty()
     device, really = os.ttyname(slave), network_port.open_port
 
-    def opened(name: str, baud: int = 1_000_000) -> Any:
+    def opened(name: str, baud: int = 1_000_000, clock: Clock | None = None) -> Any:
         if name != device:
-            return really(name, baud)
+            return really(name, baud, clock)
+        line.device = name
+        line.openPort()
         line.setBaudRate(baud)
         return line
 

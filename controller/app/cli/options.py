@@ -49,6 +49,13 @@ Port = Annotated[
         "there is"
     ),
 ]
+ChainPort = Annotated[
+    str | None,
+    typer.Option(
+        help="serial port, or a URL such as socket://host:5000; 1-8=PORT,9-16=PORT where segments "
+        "of the chain have ports of their own; default: the only USB adapter there is"
+    ),
+]
 RunPort = Annotated[
     str | None,
     typer.Option(

@@ -9,6 +9,7 @@ from snakewalk.drivers.bus.budget import WireBudget
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.byte_port import is_url
 
+WIRE_CHECK = "wire budget"
 _GOOD_LATENCY_MS = 2
 
 
@@ -61,7 +62,7 @@ def wire(budget: WireBudget, rate_hz: float) -> Finding:
         f"{budget.share(rate_hz):.0%} of the wire"
     )
     if budget.share(rate_hz) > 1.0:
-        return Finding("wire budget", "fail", found, "raise the baud rate or lower the rate")
+        return Finding(WIRE_CHECK, "fail", found, "raise the baud rate or lower the rate")
     if budget.share(rate_hz) > 0.7:
-        return Finding("wire budget", "warn", found, "little is left for retries: raise the baud")
-    return Finding("wire budget", "ok", found)
+        return Finding(WIRE_CHECK, "warn", found, "little is left for retries: raise the baud")
+    return Finding(WIRE_CHECK, "ok", found)

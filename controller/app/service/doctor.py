@@ -1,6 +1,7 @@
 """Reads a bus and puts the checks in order; writes nothing to a servo unless the joints wiggle."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
@@ -14,10 +15,13 @@ from snakewalk.controller.app.service.supply_check import supply_under_load
 from snakewalk.drivers.bus.budget import robot_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.probe import overhear
+from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import FAST_READ_FIRMWARE, ServoReport, inspect
 from snakewalk.drivers.errors import BusError, FaultCause, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.port.network_port import NetworkPort
+from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.drivers.protocol.registers import ServoUnits
 
 _MEASURED = ("Realtime Tick", "Present Temperature")
@@ -33,12 +37,14 @@ def examine(
     latency_s: float,
     latency_timer_ms: int | None,
     wiggle: bool = False,
+    on_it: Sequence[int] | None = None,
     on_progress: Callable[[str], None] = lambda step: None,
 ) -> list[Finding]:
     """Findings about the bus, worst causes first.
 
     With ``wiggle``, where nothing has failed: the chain is set up as in a run, and all joints move
-    by 0.15 rad for 2 s, to measure the supply under load.
+    by 0.15 rad for 2 s, to measure the supply under load. ``on_it`` are the servos, and the IMU,
+    that this port is to have; default: all of the robot's.
 
     Raises:
         PortError: the port vanished.
@@ -51,6 +57,10 @@ def examine(
     findings.append(line_checks.second_master(overhear(port, line_checks.OVERHEAR_S)))
     on_progress("who answers")
     expected, baud = robot.servo_ids, port.getBaudRate()
+    imu = robot.imu
+    if on_it is not None:
+        expected = tuple(each for each in expected if each in on_it)
+        imu = imu if imu is not None and imu.id in on_it else None
     answering = list(bus.find(expected))
     on_progress("duplicate IDs")
     pings = [bus.probe(i) for i in expected]
@@ -61,10 +71,10 @@ def examine(
     elsewhere = _at_other_bauds(port, missing, on_progress) if missing else {}
     findings += servos.presence(expected, found, elsewhere, baud, port.name)
     on_progress("who else is there")
-    known = (*expected, *(() if robot.imu is None else (robot.imu.id,)))
+    known = (*expected, *(() if imu is None else (imu.id,)))
     findings += [f for f in [servos.unexpected_ids(known, list(bus.scan()))] if f is not None]
-    if robot.imu is not None:
-        findings.append(imu_finding(bus, robot.imu))
+    if imu is not None:
+        findings.append(imu_finding(bus, imu))
     if not found:
         return findings
     if findings[1].grade != "fail":  # else their replies are taken for a second servo's
@@ -98,6 +108,62 @@ def examine(
     if wiggle and worst(findings) != "fail":
         on_progress("supply under load")
         findings += supply_under_load(bus, robot, safety)
+    return findings
+
+
+def examine_segments(
+    segments: Sequence[tuple[SerialPort | NetworkPort, Sequence[int]]],
+    robot: RobotConfig,
+    safety: SafetyConfig,
+    rate_hz: float,
+    *,
+    wiggle: bool = False,
+    on_progress: Callable[[str], None] = lambda step: None,
+) -> list[Finding]:
+    """Findings about the ports of a chain's segments, each with its port's name; as ``examine``.
+
+    Args:
+        segments: port and IDs of each; the ports share a clock.
+        robot: with a table ``[[ports]]`` of them.
+        safety: as of a run.
+        rate_hz: of its control cycle.
+        wiggle: all joints at once.
+        on_progress: takes the port and the step.
+
+    """
+    findings: list[Finding] = []
+    for line, ids in segments:
+        name = line.name
+
+        def show_step(step: str, name: str = name) -> None:
+            on_progress(f"{name}: {step}")
+
+        on_this = examine(
+            line,
+            robot,
+            safety,
+            rate_hz,
+            latency_s=line.latency_s,
+            latency_timer_ms=line.latency_timer_ms,
+            on_it=ids,
+            on_progress=show_step,
+        )
+        findings = [
+            each for each in findings if each.check != adapter.WIRE_CHECK
+        ]  # of the busiest port
+        findings += [
+            each
+            if each.check == adapter.WIRE_CHECK
+            else replace(each, found=f"{name}: {each.found}")
+            for each in on_this
+        ]
+    if wiggle and worst(findings) != "fail":
+        on_progress("supply under load")
+        parts = [
+            (DynamixelBus(line, robot.models_by_id, latency_s=line.latency_s), ids)
+            for line, ids in segments
+        ]
+        findings += supply_under_load(SegmentedBus(parts), robot, safety)
     return findings
 
 

@@ -13,6 +13,7 @@ from pydantic import Field
 from snakewalk.config.base import Strict
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.loader import checked
+from snakewalk.controller.app.service.port_lines import PortLines
 from snakewalk.controller.app.service.servo_settings import SettingChange, open_servo
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.errors import ChainError, ServoError
@@ -62,6 +63,27 @@ def back_up(
             ServoBackup(id=servo_id, model=bus.table.model, registers=_eeprom(bus, servo_id))
         )
     return BackupFile(servos=tuple(servos))
+
+
+def back_up_all(
+    lines: PortLines, on_progress: Callable[[str], None] = lambda step: None
+) -> BackupFile:
+    """Read every servo on every line; raises as ``back_up``.
+
+    Raises:
+        ChainError: (too) servos on two ports share an ID.
+
+    """
+    found: dict[int, tuple[str, ServoBackup]] = {}
+    for line, _ in lines.lines:
+        for servo in back_up(line, line.latency_s, on_progress).servos:
+            if servo.id in found:
+                raise ChainError(
+                    f"ID {servo.id} answers on {found[servo.id][0]} and on {line.name}: one of "
+                    "them needs another (snakewalk bus set)"
+                )
+            found[servo.id] = line.name, servo
+    return BackupFile(servos=tuple(found[servo_id][1] for servo_id in sorted(found)))
 
 
 def backup_text(backup: BackupFile) -> str:

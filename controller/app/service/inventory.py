@@ -68,12 +68,17 @@ def _state(port: BytePort, latency_s: float, found: ScanResult) -> ServoReport |
         return None
 
 
-def robot_skeleton(name: str, entries: Sequence[InventoryEntry]) -> str:
+def robot_skeleton(
+    name: str,
+    entries: Sequence[InventoryEntry],
+    segments: Sequence[tuple[str, Sequence[int]]] = (),
+) -> str:
     """A robot's file of the servos found, in the order of their IDs; axes are for a person to say.
 
     Args:
         name: of the robot.
         entries: at one baud rate, that of most servos.
+        segments: port and IDs of each segment, where there are several.
 
     Raises:
         ConfigError: these servos make no robot, such as one of Protocol 1.0.
@@ -90,7 +95,14 @@ def robot_skeleton(name: str, entries: Sequence[InventoryEntry]) -> str:
     for entry in chain:
         own = {} if entry.found.model == model else {"model": entry.found.model}
         joints.append({"axis": "y", "id": entry.found.servo_id, **own})
-    robot = checked(RobotConfig, {"name": name, "servo": servo, "joints": joints}, name)
+    chosen = {entry.found.servo_id for entry in chain}
+    ports = [
+        {"port": port, "ids": ids}
+        for port, there in segments
+        if (ids := [each for each in there if each in chosen])
+    ]
+    described = {"name": name, "servo": servo, "joints": joints}
+    robot = checked(RobotConfig, described | ({"ports": ports} if len(ports) > 1 else {}), name)
     return robot_toml(
         robot,
         f"{len(chain)} servos as snakewalk bus identify found them. Not known, and assumed:\n"

@@ -45,7 +45,7 @@ def pick_port(port: str | None) -> str:
     """
     if port is not None:
         if is_port_map(port):
-            raise PortError(f"--port {port}: one port at a time; runs and stop take several")
+            raise PortError(f"--port {port}: one port at a time: its servos are found out on one")
         return port
     there = sorted(found.device for found in list_ports.comports() if found.vid is not None)
     if len(there) == 1:

@@ -10,7 +10,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.app.service.cable_drop import cable_finding, drawn_a
 from snakewalk.controller.app.service.finding import Finding
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.chain.joint_codec import voltages_v
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import DriverError
@@ -46,7 +46,7 @@ class Wiggle:
     """What ended it early."""
 
 
-def supply_under_load(bus: DynamixelBus, robot: RobotConfig, safety: SafetyConfig) -> list[Finding]:
+def supply_under_load(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> list[Finding]:
     """Wiggle all joints, and judge what the supply does and what the cables take of it.
 
     Raises:
@@ -72,7 +72,7 @@ def supply_under_load(bus: DynamixelBus, robot: RobotConfig, safety: SafetyConfi
     return [Finding(check, "ok", found), *cables]
 
 
-def wiggle(bus: DynamixelBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
+def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
     """Set the chain up as a run does, wiggle all joints by up to 0.15 rad for 2 s, torque off.
 
     Raises:
@@ -80,14 +80,14 @@ def wiggle(bus: DynamixelBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggl
 
     """
     chain = ServoChain(bus, robot, watchdog_s=safety.watchdog_s)
-    limits, clock = SafetyLimits.from_config(robot, safety), bus.port.clock
+    limits, clock = SafetyLimits.from_config(robot, safety), chain.clock
     rest_v = np.full(robot.joint_count, np.nan)
     voltage_v: list[Floats] = []
     drawn: list[Floats] = []
     fault = None
     try:
         with (
-            StopButton("doctor", bus.port.name) as button,
+            StopButton("doctor", [part.port.name for part in bus.parts]) as button,
             SafeLink(chain, limits, clock, stop_requested=button.pressed) as link,
         ):
             start = link.enable()

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli import completion
-from snakewalk.controller.app.cli.options import Force, Json, Port, console, show
+from snakewalk.controller.app.cli.options import ChainPort, Force, Json, console, show
 from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
@@ -259,7 +259,7 @@ def _run(
 
 def bus_set(
     servo_id: Annotated[int, typer.Option("--id", help="the servo, 0 to 252")],
-    port: Port = None,
+    port: ChainPort = None,
     baud: Annotated[int, typer.Option(help="at which it answers now")] = 1_000_000,
     new_id: Annotated[int | None, typer.Option(help="0 to 252")] = None,
     new_baud: Annotated[int | None, typer.Option(help="bit/s")] = None,
@@ -275,16 +275,14 @@ def bus_set(
     as_json: Json = False,
 ) -> None:
     """Change settings of one servo that outlive its power; shows them and asks first."""
-    from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.app.service.port_lines import open_lines  # noqa: PLC0415  --help stays quick
     from snakewalk.controller.app.service.servo_settings import (  # noqa: PLC0415
         SettingsRequest,
         SettingsResult,
         apply,
-        open_servo,
         plan,
     )
     from snakewalk.drivers.errors import ControlTableError  # noqa: PLC0415
-    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
     from snakewalk.drivers.protocol.registers import BAUDS  # noqa: PLC0415
 
     if baud not in BAUDS:
@@ -300,8 +298,8 @@ def bus_set(
         voltage_max_v=voltage_max,
         return_delay_us=return_delay,
     )
-    with open_port(pick_port(port), baud) as line:
-        bus = open_servo(line, servo_id, line.latency_s)
+    with open_lines(port, baud) as lines:
+        bus = lines.open_servo(servo_id)
         changes = plan(bus, servo_id, request)
         if not as_json:
             _show(servo_id, bus.table.model, changes)
@@ -322,26 +320,25 @@ _Baud = Annotated[int, typer.Option(help="at which the servos answer")]
 
 def backup(
     out: Annotated[Path, typer.Option("--out", "-o", help="file (.json)")],
-    port: Port = None,
+    port: ChainPort = None,
     baud: _Baud = 1_000_000,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the EEPROM of all servos on the bus into a file; changes nothing."""
-    from snakewalk.controller.app.service.eeprom_backup import back_up, backup_text  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
-    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
+    from snakewalk.controller.app.service.eeprom_backup import back_up_all, backup_text  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.app.service.port_lines import open_lines  # noqa: PLC0415
 
     refuse_to_overwrite([out], force)
-    with open_port(pick_port(port), baud) as line:
-        found = back_up(line, line.latency_s, lambda step: typer.echo(step, err=True))
+    with open_lines(port, baud) as lines:
+        found = back_up_all(lines, lambda step: typer.echo(step, err=True))
     with atomic_write(out) as part:
         part.write_text(backup_text(found), encoding="utf-8")
     show({"servos": [each.id for each in found.servos], "backup": str(out)}, as_json)
 
 
 def bus_identify(
-    port: Port = None,
+    port: ChainPort = None,
     baud: Annotated[
         list[int] | None, typer.Option(help="only this rate, may be given again; default: all")
     ] = None,
@@ -353,36 +350,51 @@ def bus_identify(
 ) -> None:
     """Tell who is on the wire: models, IDs, firmware, faults; suggest a robot's file."""
     from snakewalk.controller.app.service import inventory, scan  # noqa: PLC0415  --help stays quick
-    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
+    from snakewalk.controller.app.service.port_lines import open_lines  # noqa: PLC0415
 
     if out is not None and out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
     refuse_to_overwrite([out], force)
     scan.check_bauds(baud or ())
-    device = scan.pick_port(port)
-    with open_port(device, baud[0] if baud else 1_000_000) as line:
-        entries = inventory.take_inventory(
-            line, line.latency_s, baud or (), lambda step: typer.echo(step, err=True)
-        )
+    with open_lines(port, baud[0] if baud else 1_000_000) as lines:
+        entries, places = [], []
+        for line, _ in lines.lines:
+            on_it = inventory.take_inventory(
+                line, line.latency_s, baud or (), lambda step: typer.echo(step, err=True)
+            )
+            entries += on_it
+            places += [line.name] * len(on_it)
     if not entries:
-        raise InputError(f"{device}: nobody answers: power? cable? adapter's switch?")
+        raise InputError(f"{lines.port}: nobody answers: power? cable? adapter's switch?")
+    told = [entry.found.servo_id for entry in entries]
+    for note in lines.misplaced(zip(places, told, strict=True)):
+        LOGGER.warning("%s", note)
     if out is not None:
-        text = inventory.robot_skeleton(out.stem, entries)
+        segments = [
+            (line.name, [i for name, i in zip(places, told, strict=True) if name == line.name])
+            for line, _ in lines.lines
+        ]
+        text = inventory.robot_skeleton(out.stem, entries, segments if lines.several else ())
         with atomic_write(out) as part:
             part.write_text(text, encoding="utf-8")
     if as_json:
-        servos = [entry.to_dict() for entry in entries]
-        print(json.dumps({"port": device, "servos": servos, "robot": out and str(out)}))
+        servos = [
+            entry.to_dict() | {"port": name} for entry, name in zip(entries, places, strict=True)
+        ]
+        print(json.dumps({"port": lines.port, "servos": servos, "robot": out and str(out)}))
         return
-    table = Table("ID", "model", "firmware", "baud", "volt", "Celsius", "torque", "fault", box=None)
-    for entry in entries:
+    heads = ("ID", "model", "firmware", "baud", "volt", "Celsius", "torque", "fault")
+    table = Table(*heads, *(["port"] if lines.several else []), box=None)
+    for entry, name in zip(entries, places, strict=True):
         found, state = entry.found, entry.report
-        told = ("-",) * 3
+        state_told = ("-",) * 3
         if state is not None:
             torque = "on" if state.torque_on else "off"
-            told = f"{state.voltage_v:.1f}", f"{state.temperature_c:.0f}", torque
+            state_told = f"{state.voltage_v:.1f}", f"{state.temperature_c:.0f}", torque
         about = (found.servo_id, found.model, found.firmware, found.baud)
-        table.add_row(*map(str, about), *told, entry.fault)
+        table.add_row(
+            *map(str, about), *state_told, entry.fault, *([name] if lines.several else [])
+        )
     console.print(table)
     if out is not None:
         console.print(f"robot {out}: say the axes, then: snakewalk calibrate --robot {out}")
@@ -393,7 +405,7 @@ def restore(
     servo_id: Annotated[
         list[int] | None, typer.Option("--id", help="only this servo; may be repeated")
     ] = None,
-    port: Port = None,
+    port: ChainPort = None,
     baud: _Baud = 1_000_000,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="show the changes, no more")] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="write without asking")] = False,
@@ -401,9 +413,8 @@ def restore(
 ) -> None:
     """Write a backup's values where they differ; shows them and asks first."""
     from snakewalk.controller.app.service.eeprom_backup import load_backup, plan_restore  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
-    from snakewalk.controller.app.service.servo_settings import apply, open_servo  # noqa: PLC0415
-    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
+    from snakewalk.controller.app.service.port_lines import open_lines  # noqa: PLC0415
+    from snakewalk.controller.app.service.servo_settings import apply  # noqa: PLC0415
 
     servos = {each.id: each for each in load_backup(file).servos}
     wanted = servo_id or list(servos)
@@ -412,8 +423,8 @@ def restore(
         raise InputError(
             f"{file}: has no ID {', '.join(missing)}; it has {', '.join(map(str, servos))}"
         )
-    with open_port(pick_port(port), baud) as line:
-        buses = {each: open_servo(line, each, line.latency_s) for each in wanted}
+    with open_lines(port, baud) as lines:
+        buses = {each: lines.open_servo(each) for each in wanted}
         plans = {each: plan_restore(buses[each], servos[each]) for each in wanted}
         changed = {each: changes for each, changes in plans.items() if changes}
         if not as_json:
@@ -438,19 +449,18 @@ def restore(
 
 def reboot(
     servo_id: _Ids,
-    port: Port = None,
+    port: ChainPort = None,
     baud: _Baud = 1_000_000,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="without asking")] = False,
     as_json: Json = False,
 ) -> None:
     """Restart servos, which clears their alarms; torque goes off: what they hold falls."""
-    from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.app.service.servo_settings import open_servo, restart  # noqa: PLC0415
-    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
+    from snakewalk.controller.app.service.port_lines import open_lines  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.app.service.servo_settings import restart  # noqa: PLC0415
 
     facts: dict[str, object] = {}
-    with open_port(pick_port(port), baud) as line:
-        buses = {each: open_servo(line, each, line.latency_s) for each in servo_id}
+    with open_lines(port, baud) as lines:
+        buses = {each: lines.open_servo(each) for each in servo_id}
         if yes or _confirmed(
             as_json, "torque goes off: what these servos hold falls; reboot them?"
         ):
@@ -464,24 +474,23 @@ def reboot(
 
 def blink(
     servo_id: _Ids,
-    port: Port = None,
+    port: ChainPort = None,
     baud: _Baud = 1_000_000,
     times: Annotated[int, typer.Option(min=1, max=1000, help="how often")] = 5,
     as_json: Json = False,
 ) -> None:
     """Let the LED of servos blink, to find them; nothing moves."""
-    from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.app.service.servo_settings import open_servo  # noqa: PLC0415
-    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
+    from snakewalk.controller.app.service.port_lines import open_lines  # noqa: PLC0415  --help stays quick
 
-    with open_port(pick_port(port), baud) as line:
-        buses = {each: open_servo(line, each, line.latency_s) for each in servo_id}
+    with open_lines(port, baud) as lines:
+        buses = {each: lines.open_servo(each) for each in servo_id}
+        clock = lines.lines[0][0].clock
         try:
             for _ in range(times):
                 for on in (1, 0):
                     for each, bus in buses.items():
                         bus.write(each, "LED", on)
-                    line.clock.sleep_until_s(line.clock.now_s() + _BLINK_S)
+                    clock.sleep_until_s(clock.now_s() + _BLINK_S)
         finally:
             for each, bus in buses.items():
                 bus.write(each, "LED", 0)

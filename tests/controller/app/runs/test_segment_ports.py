@@ -16,6 +16,7 @@ from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait, prepare_walk
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.drivers.errors import BusError, PortError
+from snakewalk.drivers.port import network_port
 from snakewalk.drivers.protocol.packet import BROADCAST_ID, Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.faults.fault_player import FaultPlayer
@@ -39,12 +40,13 @@ class Bench:
         self.paths = [server.path for server in servers]
         by_path = dict(zip(self.paths, servers, strict=True))
 
-        def open_port(device: str, baud: int, _clock: object) -> PtyPort:
+        def open_port(device: str, baud: int, _clock: object = None) -> PtyPort:
             if device not in by_path:
                 raise PortError(f"{device}: no such port")
             return opened.enter_context(PtyPort(by_path[device], baud, clock))
 
         monkeypatch.setattr(backend, "open_port", open_port)
+        monkeypatch.setattr(network_port, "open_port", open_port)
         leave_out_pages(monkeypatch)
 
     def run(self, folder: Path, port: str, *words: str) -> Ended:
@@ -114,10 +116,57 @@ def test_ports_that_do_not_fit_are_refused(
     assert bench.torque_on() == [False, False]
 
 
-def test_commands_for_one_port_say_so(tmp_path: Path) -> None:
-    done = snakewalk("scan", "--port", "1-8=/dev/a,9-16=/dev/b")
+def test_a_command_for_one_port_says_so(tmp_path: Path) -> None:
+    done = snakewalk(
+        *("calibrate", "--robot", "yaw16", "--port", "1-8=/dev/a,9-16=/dev/b"),
+        *("-o", str(tmp_path / "mine.toml")),
+    )
     assert done.returncode == 2
     assert "one port at a time" in done.stderr
+
+
+class Service:
+    """Commands that care for servos, on the same two ports."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench, (first, second) = bench, bench.paths
+        self.port = f"1-8={first},9-16={second}"
+
+    def __call__(self, *words: object) -> Ended:
+        return snakewalk(*map(str, words), "--port", self.port)
+
+    def row(self, servo_id: int) -> tuple[SimLine, int]:
+        """Line and row of a servo."""
+        line = self.bench.lines[servo_id > 8]
+        assert isinstance(line, SimLine)
+        line.settle()
+        return line, (servo_id - 1) % 8
+
+
+@pytest.fixture
+def service(bench: Bench) -> Service:
+    return Service(bench)
+
+
+def test_a_servo_is_found_on_its_port(service: Service) -> None:
+    seen: dict[int, int] = {}
+    for servo_id in (3, 12):
+        line, row = service.row(servo_id)
+        line.bank["Hardware Error Status"][row] = 0x20
+    done = service("bus", "reboot", "--id", 3, "--id", 12, "--yes")
+    assert done.returncode == 0, done.stderr
+    for servo_id in (3, 12):
+        line, row = service.row(servo_id)
+        seen[servo_id] = int(line.bank["Hardware Error Status"][row])
+    assert seen == {3: 0, 12: 0}
+    assert service("bus", "blink", "--id", 12, "--times", 1).returncode == 0
+    done = service("bus", "set", "--id", 9, "--return-delay", 0, "--yes")
+    assert done.returncode == 0, done.stderr
+    line, row = service.row(9)
+    assert line.bank["Return Delay Time"][row] == 0
+    done = service("bus", "blink", "--id", 40)
+    assert done.returncode == 2
+    assert "has no ID 40; say which port it is on" in done.stderr
 
 
 def test_a_walk_goes_on_with_some_servos_real_and_the_others_simulated(

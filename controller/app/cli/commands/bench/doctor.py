@@ -6,12 +6,18 @@ import typer
 
 from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.findings_table import show_findings
-from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, Port, Robot
+from snakewalk.controller.app.cli.options import DEFAULT_RUN, Json, Robot
 from snakewalk.controller.app.messages import stderr_console
 
 
 def doctor(
-    port: Port = None,
+    port: Annotated[
+        str | None,
+        typer.Option(
+            help="serial port, or a URL such as socket://host:5000; 1-8=PORT,9-16=PORT, or robot, "
+            "whose file says which; default: the only USB adapter there is"
+        ),
+    ] = None,
     robot: Robot = None,
     run: Annotated[
         str, typer.Option(help="run whose rate and limits count", autocompletion=completion.RUNS)
@@ -27,28 +33,49 @@ def doctor(
     Changes nothing, unless the joints are to wiggle: then the chain is set up as in a run.
     """
     from snakewalk.config.loader import load_robot, load_run  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.app.runs.backend import FILE_PORTS, on_ports, real_ports  # noqa: PLC0415
     from snakewalk.controller.app.service.adapter import permission  # noqa: PLC0415
-    from snakewalk.controller.app.service.doctor import examine  # noqa: PLC0415
+    from snakewalk.controller.app.service.doctor import examine, examine_segments  # noqa: PLC0415
+    from snakewalk.controller.app.service.port_lines import open_lines  # noqa: PLC0415
     from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
-    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
+    from snakewalk.drivers.port.port_map import is_port_map, port_map_text  # noqa: PLC0415
 
     job = load_run(run)
     described = load_robot(robot if robot is not None else job.robot)
-    device = pick_port(port)
-    findings = [permission(device)]
-    if findings[0].grade != "fail":
+    if port is not None and (port == FILE_PORTS or is_port_map(port)):
+        described = on_ports(described, port)
+        device = port_map_text((each.port, each.ids) for each in described.ports)
+        findings = [permission(each) for each in real_ports(described)]
+    else:
+        device = pick_port(port)
+        findings = [permission(device)]
+    if all(finding.grade != "fail" for finding in findings):
         with (
-            open_port(device, described.servo.baud) as line,
+            open_lines(device, described.servo.baud) as lines,
             stderr_console().status("") as status,
         ):
-            findings += examine(
-                line,
-                described,
-                job.safety,
-                job.cycle_hz,
-                latency_s=line.latency_s,
-                latency_timer_ms=line.latency_timer_ms,
-                wiggle=wiggle,
-                on_progress=lambda step: status.update(f"{device}: {step}"),
-            )
+            progress = lambda step: status.update(f"{device}: {step}")  # noqa: E731
+            (line, ids), *others = lines.lines
+            if others:
+                segments = [(each, some or ()) for each, some in lines.lines]
+                findings += examine_segments(
+                    segments,
+                    described,
+                    job.safety,
+                    job.cycle_hz,
+                    wiggle=wiggle,
+                    on_progress=status.update,
+                )
+            else:
+                findings += examine(
+                    line,
+                    described,
+                    job.safety,
+                    job.cycle_hz,
+                    latency_s=line.latency_s,
+                    latency_timer_ms=line.latency_timer_ms,
+                    wiggle=wiggle,
+                    on_it=ids,
+                    on_progress=progress,
+                )
     show_findings(findings, {"port": device, "robot": described.name}, as_json)

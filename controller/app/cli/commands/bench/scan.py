@@ -6,12 +6,12 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from snakewalk.controller.app.cli.options import Json, Port, console
-from snakewalk.controller.app.messages import stderr_console
+from snakewalk.controller.app.cli.options import ChainPort, Json, console
+from snakewalk.controller.app.messages import LOGGER, stderr_console
 
 
 def scan(
-    port: Port = None,
+    port: ChainPort = None,
     baud: Annotated[
         list[int] | None, typer.Option(help="only this rate, may be given again; default: all")
     ] = None,
@@ -19,21 +19,33 @@ def scan(
 ) -> None:
     """List the servos on a bus, at every baud rate; changes nothing."""
     from snakewalk.controller.app.service import scan as scanning  # noqa: PLC0415  --help stays quick
-    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
+    from snakewalk.controller.app.service.port_lines import open_lines  # noqa: PLC0415
 
     scanning.check_bauds(baud or ())
-    device = scanning.pick_port(port)
+    results, places = [], []
     with (
-        open_port(device, baud[0] if baud else 1_000_000) as line,
+        open_lines(port, baud[0] if baud else 1_000_000) as lines,
         stderr_console().status("") as status,
     ):
-        results = scanning.scan(line, baud or (), lambda step: status.update(f"{device}: {step}"))
+        for line, _ in lines.lines:
+
+            def show_step(step: str, name: str = line.name) -> None:
+                status.update(f"{name}: {step}")
+
+            there = scanning.scan(line, baud or (), show_step)
+            results += there
+            places += [line.name] * len(there)
+    for note in lines.misplaced((n, s.servo_id) for n, s in zip(places, results, strict=True)):
+        LOGGER.warning("%s", note)
     if as_json:
-        print(json.dumps({"port": device, "servos": [servo.to_dict() for servo in results]}))
+        servos = [s.to_dict() | {"port": n} for n, s in zip(places, results, strict=True)]
+        print(json.dumps({"port": lines.port, "servos": servos}))
     elif results:
-        table = Table("ID", "model", "firmware", "baud", box=None)
-        for servo in results:
-            table.add_row(str(servo.servo_id), servo.model, str(servo.firmware), str(servo.baud))
+        heads = ("ID", "model", "firmware", "baud")
+        table = Table(*heads, *(["port"] if lines.several else []), box=None)
+        for name, servo in zip(places, results, strict=True):
+            shown = (servo.servo_id, servo.model, servo.firmware, servo.baud)
+            table.add_row(*map(str, shown), *([name] if lines.several else []))
         console.print(table)
         for servo in results:
             if servo.secondary_id is not None:
@@ -42,6 +54,8 @@ def scan(
                     "Secondary ID(12); a run sets it to 255"
                 )
     else:
-        console.print(f"{device}: nobody answers at any baud rate: power? cable? adapter's switch?")
+        console.print(
+            f"{lines.port}: nobody answers at any baud rate: power? cable? adapter's switch?"
+        )
     if not results:
         raise SystemExit(1)
