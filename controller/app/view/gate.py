@@ -12,7 +12,7 @@ import socket
 from collections.abc import Callable
 from html import escape
 from http.cookies import CookieError, SimpleCookie
-from typing import Any, Final
+from typing import Any, Final, Protocol
 from urllib.parse import parse_qs, urlsplit
 
 import websockets.asyncio.server
@@ -26,13 +26,27 @@ _ASK: Final = (
     "type=password aria-label=token> <button>open</button></form>"
 )
 _CHECK_S: Final = 5.0
+_PAGES: Final = ("/", "/index.html")
 Serve = Callable[..., Any]
+
+
+class Insert(Protocol):
+    """Something of our own in the page: a script, and the socket that it opens."""
+
+    path: str
+    """Of the socket."""
+    script: str
+
+    async def serve(self, connection: Any) -> None:
+        """Talk to the script of one browser."""
+        ...
 
 
 class Gate:
     """Lets requests pass, or answers them itself."""
 
-    def __init__(self, host: str) -> None:
+    def __init__(self, host: str, insert: Insert | None = None) -> None:
+        self._insert = insert
         self._local = host in _LOCAL
         self.token = None if self._local else secrets.token_urlsafe(16)
         """Asked for; None where only this machine is served."""
@@ -64,18 +78,33 @@ class Gate:
         return hmac.compare_digest(given.encode(), (self.token or "").encode())
 
     def guard(self, serve: Serve) -> Serve:
-        """Return a ``websockets`` server that asks this gate before its own ``process_request``."""
+        """Return a ``websockets`` server that asks this gate before its own ``process_request``.
 
-        def guarded(*args: Any, process_request: Any = None, **options: Any) -> Any:
+        It has the insert's script in its page, and leads its socket to the insert.
+        """
+        insert = self._insert
+
+        def guarded(handler: Serve, *args: Any, process_request: Any = None, **options: Any) -> Any:
             def ask(connection: Any, request: Request) -> Response | None:
                 port = connection.local_address[1]
                 refusal = self.answer(request, port)
                 if refusal is not None or process_request is None:
                     return refusal
+                has_script = insert is not None and urlsplit(request.path).path in _PAGES
+                if has_script:  # the page is changed, so it must come as it is
+                    _ask_for_plain(request)
                 passed: Response | None = process_request(connection, request)
+                if insert is not None and has_script and passed is not None:
+                    _add_script(passed, insert.script)
                 return passed
 
-            return serve(*args, process_request=ask, **options)
+            async def handle(connection: Any) -> None:
+                if insert is not None and urlsplit(connection.request.path).path == insert.path:
+                    await insert.serve(connection)
+                else:
+                    await handler(connection)
+
+            return serve(handle, *args, process_request=ask, **options)
 
         return guarded
 
@@ -98,6 +127,20 @@ class Gate:
         with socket.create_connection((here, port), _CHECK_S) as line:
             line.sendall(b"GET / HTTP/1.1\r\nHost: elsewhere.example\r\nOrigin: http://x\r\n\r\n")
             return line.recv(64).startswith(b"HTTP/1.1 403")
+
+
+def _ask_for_plain(request: Request) -> None:
+    """Take out of a request that what is sent may be compressed."""
+    if "Accept-Encoding" in request.headers:
+        del request.headers["Accept-Encoding"]
+
+
+def _add_script(response: Response, script: str) -> None:
+    """Put a script into a page, before everything else."""
+    head = b"<head>"
+    response.body = response.body.replace(head, head + f"<script>{script}</script>".encode(), 1)
+    del response.headers["Content-Length"]
+    response.headers["Content-Length"] = str(len(response.body))
 
 
 def _cookie(request: Request, name: str) -> str:

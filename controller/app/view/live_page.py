@@ -13,8 +13,10 @@ from typing import Any, Final
 
 import viser
 
+from snakewalk.controller.app.view.browser_gamepad import BrowserGamepad
 from snakewalk.controller.app.view.dashboard import SPAN_S, Dashboard
 from snakewalk.controller.app.view.gait_panel import GaitPanel
+from snakewalk.controller.app.view.gamepad_panel import GamepadPanel
 from snakewalk.controller.app.view.page_server import StopPanel, open_page
 from snakewalk.controller.app.view.row_line import WatcherEnd
 from snakewalk.controller.app.view.scene import BodyScene
@@ -40,12 +42,13 @@ def serve(line: socket.socket, host: str, port: int) -> None:
     sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115  viser prints
     give_way()
     try:
-        server, url = open_page(host, port)
+        gamepad = BrowserGamepad()
+        server, url = open_page(host, port, gamepad)
     except OSError as fault:
         line.sendall(json.dumps({"fault": str(fault)}).encode() + b"\n")
         return
     line.sendall(json.dumps({"url": url}).encode() + b"\n")
-    page = _LivePage(server, WatcherEnd(line))
+    page = _LivePage(server, WatcherEnd(line), gamepad)
     with suppress(EOFError, OSError):
         while True:
             page.step()
@@ -55,8 +58,10 @@ def serve(line: socket.socket, host: str, port: int) -> None:
 class _LivePage:
     """State of the page between two steps."""
 
-    def __init__(self, server: viser.ViserServer, end: WatcherEnd) -> None:
-        self._server, self._end = server, end
+    def __init__(self, server: viser.ViserServer, end: WatcherEnd, gamepad: BrowserGamepad) -> None:
+        self._server, self._end, self._gamepad = server, end, gamepad
+        gamepad.on_stop = lambda: self._stop.show(self._press("E-STOP of a gamepad"))
+        self._gamepad_panel: GamepadPanel | None = None
         self._clock = WallClock()
         self._stop = StopPanel(server, self._press)
         self._button: PressedButton | None = None
@@ -97,9 +102,12 @@ class _LivePage:
         """What was set in the page since the last call."""
         found = []
         if self._gait_panel is not None:
-            found += self._gait_panel.commands(self._asked_s)
+            found += self._gait_panel.commands(self._asked_s) + self._gamepad.commands()
         if self._waypoint_panel is not None:
             found += self._waypoint_panel.commands()
+        if self._gamepad_panel is not None:
+            self._gamepad_panel.show(steers=self._gait_panel is not None)
+            found += self._gamepad_panel.commands()
         return found
 
     def _take(self, topic: str, row: dict[str, Any]) -> None:
@@ -115,6 +123,8 @@ class _LivePage:
                 self._dashboard = Dashboard(self._server, self._header)
             self._show_gait()
             self._take_waypoints()
+            tabs = self._dashboard.tabs
+            self._gamepad_panel = GamepadPanel(self._server, tabs, self._gamepad)
             return
         if topic == "/picture":
             if self._dashboard is not None:

@@ -12,6 +12,7 @@ from typing import Final
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.app.view.dead_man import DeadMan
 from snakewalk.controller.app.view.watcher import WatcherProcess
 
 _PICTURE_S: Final = 0.5
@@ -34,13 +35,16 @@ class LiveView(WatcherProcess):
         """To be opened in a browser; holds the token where one is asked for."""
         self._picture: bytes | None = None
         self._picture_s = -math.inf
+        self._dead_man = DeadMan()
 
-    held = True
-    """The page has no dead man's button."""
+    @property
+    def held(self) -> bool:
+        """Whether the dead man's button of a browser's gamepad is held; True without a gamepad."""
+        return self._dead_man.held
 
     def pressed(self) -> list[str]:
         """What was set in the page since the last call, for an ``Operator`` or a ``LiveCourse``."""
-        return self._end.commands()
+        return self._dead_man.sort_out(self._end.commands())
 
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:
         """Take the gait that an operator runs: the page then has its sliders."""

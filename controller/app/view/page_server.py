@@ -8,21 +8,23 @@ from io import StringIO
 
 import viser
 
-from snakewalk.controller.app.view.gate import Gate
+from snakewalk.controller.app.view.gate import Gate, Insert
 
 _LEFT_PX, _TOP_PX, _WIDTH_PX = 16.0, 170.0, 300.0
 """Where a window floats over the scene: below the browser's own notices."""
 
 
-def open_page(host: str, port: int) -> tuple[viser.ViserServer, str]:
+def open_page(host: str, port: int, insert: Insert | None = None) -> tuple[viser.ViserServer, str]:
     """Serve an empty page; returns it with its address, which holds the token if there is one.
+
+    ``insert`` is something of our own in it.
 
     Raises:
         OSError: nothing can be served there, or not behind the gate.
 
     """
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # each refusal is a trace
-    gate = Gate(host)
+    gate = Gate(host, insert)
     with redirect_stdout(StringIO()):  # viser prints its address without the token
         server: viser.ViserServer = gate.install(
             lambda: viser.ViserServer(host=host, port=port, label="snakewalk", verbose=False)

@@ -1,6 +1,7 @@
 """The page of a run that moves servos on a pseudo-terminal, in a browser: what it shows, E-STOP."""
 
 import dataclasses
+import json
 import os
 import re
 import shutil
@@ -25,7 +26,9 @@ from snakewalk.config.loader import load_robot
 from snakewalk.controller.app.cli.commands.gait_run import _Hands
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait, prepare_walk
+from snakewalk.controller.app.view.browser_gamepad import BrowserGamepad
 from snakewalk.controller.app.view.dashboard import Dashboard
+from snakewalk.controller.app.view.dead_man import DeadMan
 from snakewalk.controller.app.view.gait_panel import GaitPanel
 from snakewalk.controller.app.view.live_page import _LivePage
 from snakewalk.controller.app.view.live_view import LiveView
@@ -65,7 +68,7 @@ def run(folder: Path, *words: str) -> Iterator[subprocess.Popen[str]]:
 
 
 @contextmanager
-def browsed(child: subprocess.Popen[str], width: int = 700) -> Iterator[Any]:
+def browsed(child: subprocess.Popen[str], width: int = 700, script: str = "") -> Iterator[Any]:
     """The page of a run in a browser."""
     playwright = pytest.importorskip("playwright.sync_api")
     assert child.stderr is not None
@@ -79,6 +82,7 @@ def browsed(child: subprocess.Popen[str], width: int = 700) -> Iterator[Any]:
         )
         page = browser.new_page(viewport={"width": width, "height": 500})
         page.set_default_timeout(60_000.0)
+        page.add_init_script(script)
         page.goto(url[0])
         page.get_by_text("torque off at once, latched").wait_for()
         yield page
@@ -94,7 +98,10 @@ class View:
         self._picture: bytes | None = None
         self._picture_s = -1.0
         server, _ = open_page("127.0.0.1", 0)
-        self.page = _LivePage(server, WatcherEnd(far))
+        self.now_s = 100.0
+        self.gamepad = BrowserGamepad(lambda: self.now_s)
+        self.dead_man = DeadMan(lambda: self.now_s)
+        self.page = _LivePage(server, WatcherEnd(far), self.gamepad)
 
     def on_row(self, topic: str, row: bytes) -> None:
         LiveView.on_row(self, topic, row)  # type: ignore[arg-type]
@@ -108,8 +115,11 @@ class View:
     def on_picture(self, image: Image, time_s: float) -> None:
         LiveView.on_picture(self, image, time_s)  # type: ignore[arg-type]
 
-    held = True
-    pressed = property(lambda self: self.end.commands)
+    held = property(lambda self: self.dead_man.held)
+
+    def pressed(self) -> list[str]:
+        return self.dead_man.sort_out(self.end.commands())
+
     _end = property(lambda self: self.end)
 
     def shown(self, what: str) -> str:
@@ -177,6 +187,58 @@ def test_what_is_set_in_the_page_changes_the_gait(
     assert said == ["frequency_hz = 0.3"]
 
 
+def test_a_gamepad_in_the_browser_is_held_steers_and_stops(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    view, cycles = View(), count()
+    hands = _Hands([view], view)  # type: ignore[list-item, arg-type]
+    texts: list[str] = []
+    script = {
+        30: (),  # it is seen: from now on it has to be held
+        60: (HOLD,),
+        61: (HOLD, MIRROR),
+        150: (HOLD, STOP),
+    }
+
+    def on_progress(progress: Progress) -> None:
+        cycle = next(cycles)
+        view.now_s = 100.0 + progress.time_s
+        if cycle in script:
+            assert view.gamepad.take("browser", pad_state(*script[cycle]))
+        if cycle in script or cycle % 10 == 0:
+            view.page.step()
+            assert view.page._gamepad_panel is not None
+            texts.append(view.page._gamepad_panel._shown)
+
+    finished = execute(
+        prepare_gait("lateral-undulation", seconds=10.0, make_operator=hands.operator),
+        tmp_path / "run",
+        view=view,
+        stop_requested=hands.torque_off,
+        on_progress=on_progress,
+    )
+    view.page._server.stop()
+    assert finished.outcome.tripped == "stop requested by E-STOP of a gamepad"
+    events = [each for each in finished.record.events if each.kind == "operator"]
+    let_go, held = "let go: it stands in its shape", "held: it moves"
+    assert [each.text for each in events[:4]] == [let_go, held, "mirror = True", let_go]
+    assert 0.3 < events[3].time_s - events[1].time_s < 0.4  # it said nothing any more
+    for what in ("No gamepad.", "Let go:", "Held:", "It says nothing any more:"):
+        assert any(what in text for text in texts)
+
+
+HOLD, MIRROR, STOP = 4, 1, 11
+
+
+def pad_state(*pressed: int) -> str:
+    """What the page's script sends of a gamepad."""
+    buttons = [int(k in pressed) for k in range(17)]
+    state = {"name": "Pad", "mapping": "standard", "axes": [0.0, 0.0], "buttons": buttons}
+    return json.dumps(state)
+
+
 def test_the_body_walks_to_where_the_ground_was_clicked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -202,10 +264,11 @@ def test_the_body_walks_to_where_the_ground_was_clicked(
             assert "there is no ground where you clicked" in panel._text.content
         if progress.reached == 2 and "reached" not in at:
             at["reached"] = progress.time_s
-            assert len(scene._waypoints) == 2
-            assert "waypoint 2 of 2" in view.shown("_state")
+            view.page._servos_s = -1.0  # not held back
         if "reached" in at and progress.time_s > at["reached"] + 1.0 and "end" not in at:
             at["end"] = progress.time_s
+            assert len(scene._waypoints) == 2
+            assert "waypoint 2 of 2" in view.shown("_state")
             assert "no waypoint is left: it holds" in panel._text.content
             panel._commanding("end")(None)
 
@@ -364,6 +427,38 @@ def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
         assert child.wait(60.0) == 1
     record = read_log(tmp_path / "run" / "log.mcap")
     assert [event.kind for event in record.events][-2:] == ["trip", "stop"]
+
+
+FAKE_PAD = """
+    window.pad = {id: "Pad (fake)", mapping: "standard", connected: true, axes: [0, 0, 0, 0],
+                  buttons: Array.from({length: 17}, () => ({pressed: false}))};
+    window.press = (k, down) => { window.pad.buttons[k] = {pressed: down}; };
+    window.pads = [null];
+    navigator.getGamepads = () => window.pads;
+"""
+
+
+@pytest.mark.slow
+@IN_A_BROWSER
+def test_a_gamepad_at_the_browser_steers_a_gait_and_its_button_stops_it(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    words = ["gait", "run", "lateral-undulation", "--seconds", "300"]
+    with run(tmp_path, *words) as child, browsed(child, script=FAKE_PAD) as page:
+        page.get_by_role("tab", name="gamepad").click()
+        page.get_by_text("No gamepad. Press a button").wait_for()
+        page.evaluate("window.pads = [window.pad]")
+        page.get_by_text("Let go: the body stands in its shape.").wait_for()
+        page.evaluate("window.press(4, true)")
+        page.get_by_text("Held: the body moves.").wait_for()
+        page.evaluate("window.press(1, true)")
+        page.get_by_role("tab", name="events").click()
+        page.get_by_text("operator: mirror = True").wait_for()
+        page.evaluate("window.press(11, true)")
+        page.get_by_text("the run has ended: stop requested by E-STOP of a gamepad").wait_for()
+        assert child.wait(60.0) == 1
+    record = read_log(tmp_path / "run" / "log.mcap")
+    said = [event.text for event in record.events if event.kind == "operator"]
+    assert said[:2] == ["let go: it stands in its shape", "held: it moves"]
 
 
 @pytest.mark.slow
