@@ -77,11 +77,11 @@ default and its meaning (`--robot`, `--from RUN`: like another one), and `snakew
 mine/run.toml` runs them as they are.
 
 **In an editor.** `snakewalk schema run` (`robot`, `world`, `synthesis`, `gait`, `recording`,
-`skin`, `schedule`, `faults`) prints the JSON Schema of such a file. `init` writes those of its
-three files into `mine/schema/` and names them in each file's first line, `#:schema
-schema/run.json`: that is all that the extension *Even Better TOML* of VS Code needs, and `taplo
-check run.toml` on a command line, to complete keys, show their meaning and mark what is wrong. For
-files elsewhere a `.taplo.toml` says it:
+`skin`, `animal`, `schedule`, `faults`, `policy`) prints the JSON Schema of such a file. `init`
+writes those of its three files into `mine/schema/` and names them in each file's first line,
+`#:schema schema/run.json`: that is all that the extension *Even Better TOML* of VS Code needs,
+and `taplo check run.toml` on a command line, to complete keys, show their meaning and mark what
+is wrong. For files elsewhere a `.taplo.toml` says it:
 
 ```
 [[rule]]
@@ -107,12 +107,13 @@ def reference() -> str:
     return "\n".join(parts)
 
 
-def json_schema(kind: str) -> dict[str, Any]:
+def json_schema(kind: str, model: type[BaseModel] | None = None) -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a kind of file: keys, types, ranges, words on each.
 
-    What holds between keys (waypoints of a walk, IDs that differ) only the loader knows.
+    What holds between keys (waypoints of a walk, IDs that differ) only the loader knows. ``model``
+    is that of a file which only a room above reads.
     """
-    model = SCHEMAS[kind]
+    model = model or SCHEMAS[kind]
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"snakewalk: {kind}",

@@ -84,19 +84,19 @@ WAVE_SPAN: Final[Floats] = np.repeat([0.5, 0.15, 0.4, 0.2, 1.0, 0.3], [1, 4, 3, 
 class Layer(Strict):
     """Outputs are ``tanh(weights @ inputs + bias)``; the last layer's are without the tanh."""
 
-    weights: tuple[tuple[float, ...], ...]
+    weights: tuple[tuple[float, ...], ...] = Field(description="a row for each output")
     """(outputs, inputs)"""
-    bias: tuple[float, ...]
+    bias: tuple[float, ...] = Field(description="one for each output")
     """(outputs,)"""
 
 
 class Origin(Strict):
     """How a policy was learnt."""
 
-    method: str
-    seed: int
+    method: str = Field(description="the optimiser: cma or ppo")
+    seed: int = Field(description="of every random choice")
     steps: int = Field(ge=0, description="of the environment, all together")
-    world: str
+    world: str = Field(description="that it was learnt on")
     software: str = Field(description="names and versions")
 
 

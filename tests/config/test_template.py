@@ -6,9 +6,10 @@ import tomllib
 import pytest
 from pydantic import BaseModel
 
-from snakewalk.config.document import SCHEMAS, json_schema
+from snakewalk.config.document import json_schema
 from snakewalk.config.loader import checked, load_robot, load_run, load_world, shipped
 from snakewalk.config.template import template
+from snakewalk.controller.app.cli.commands.files.schema import KINDS, models
 
 SHIPPED = [
     *(load_run(name) for name in shipped("runs")),
@@ -41,10 +42,14 @@ def test_a_template_shows_every_key_with_its_meaning() -> None:
     assert re.search(r"^# radius_m = +# number", text, re.MULTILINE)  # of the obstacle it has not
 
 
-@pytest.mark.parametrize("kind", SCHEMAS)
+def test_every_file_has_a_schema() -> None:
+    assert tuple(models()) == KINDS
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_schema_refuses_unknown_keys_in_every_table_and_has_all_keys(kind: str) -> None:
-    described = json_schema(kind)
-    assert set(described["properties"]) == set(SCHEMAS[kind].model_fields)
+    described = json_schema(kind, models()[kind])
+    assert set(described["properties"]) == set(models()[kind].model_fields)
     tables = [described, *described.get("$defs", {}).values()]
     assert all(one["additionalProperties"] is False for one in tables if "properties" in one)
 

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -11,30 +11,45 @@ from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+
+KINDS: Final = (
+    *("run", "robot", "world", "synthesis", "gait", "recording", "skin", "animal", "schedule"),
+    *("faults", "policy"),
+)
+"""Of ``models``, known before they are built."""
+
 
 def schema(
     kind: Annotated[
         str,
         typer.Argument(
-            help="run, robot, world, synthesis, gait, recording, skin, animal or faults",
-            autocompletion=completion.words(
-                *("run", "robot", "world", "synthesis", "gait", "recording", "skin", "animal"),
-                "faults",
-            ),
+            help=f"{', '.join(KINDS[:-1])} or {KINDS[-1]}",
+            autocompletion=completion.words(*KINDS),
         ),
     ],
     out: Annotated[Path | None, typer.Option("-o", "--out", help="write it here")] = None,
     force: Force = False,
 ) -> None:
     """Print the JSON Schema of a TOML file, with which editors complete and check it."""
-    from snakewalk.config.document import SCHEMAS, json_schema  # noqa: PLC0415  --help stays quick
+    from snakewalk.config.document import json_schema  # noqa: PLC0415  --help stays quick
 
-    if kind not in SCHEMAS:
-        raise InputError(f"{kind}: no such file; there are {', '.join(SCHEMAS)}")
+    if kind not in KINDS:
+        raise InputError(f"{kind}: no such file; there are {', '.join(KINDS)}")
     refuse_to_overwrite([out], force)
-    text = json.dumps(json_schema(kind), indent=2)
+    text = json.dumps(json_schema(kind, models()[kind]), indent=2)
     if out is None:
         print(text)
         return
     with atomic_write(out) as part:
         part.write_text(text + "\n", encoding="utf-8")
+
+
+def models() -> "dict[str, type[BaseModel]]":
+    """Model of each kind of file."""
+    from snakewalk.config.document import SCHEMAS  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.motion.policy import Policy  # noqa: PLC0415
+
+    return {**SCHEMAS, "policy": Policy}
