@@ -18,10 +18,9 @@ setup: $(STAMP)
 $(STAMP): pyproject.toml
 	$(PY) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
 	$(PY) -m venv $(VENV)
-	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --no-compile --no-warn-conflicts --editable '.[dev]'
-	$(BIN)/pip install --quiet --no-deps $(CLIENTS) || echo "tests of other clients are skipped"
-	$(BIN)/pip install --quiet --no-deps --target $(VENV)/clients $(ASIDE) || echo "as above"
+	.ci/install $(BIN) --editable '.[dev]'
+	.ci/install $(BIN) --no-deps $(CLIENTS) || echo "tests of other clients are skipped"
+	.ci/install $(BIN) --no-deps --target $(VENV)/clients $(ASIDE) || echo "as above"
 	rm -rf $(VENV)/clients/dynamixel_sdk
 	.ci/offscreen
 	touch $(STAMP)
