@@ -219,14 +219,19 @@ def _fit(phase: Floats, ahead: Floats, stride: float) -> tuple[float, float, flo
         offset = float(np.mean(way - model))
         return float(np.sqrt(np.mean((way - model - offset) ** 2))), offset
 
-    grid = [(d, k / _PLACES) for d in np.arange(0.2, 0.9, 0.05) for k in range(_PLACES)]
-    start = min(grid, key=lambda one: left(*one)[0])
+    grid = np.meshgrid(np.arange(0.2, 0.9, 0.05), np.arange(_PLACES) / _PLACES, indexing="ij")
+    duties, downs = (values.reshape(-1, 1) for values in grid)
+    off = way - 0.5 * stride * duties * swing((at - downs) % 1.0, duties)
+    best = int(np.argmin(off.var(axis=1)))
 
     def cost(x: Any) -> float:  # scipy's stubs know no array of floats here
         return left(float(np.clip(x[0], 0.12, 0.93)), float(x[1]))[0]
 
     found = minimize(
-        cost, np.array(start), method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-9}
+        cost,
+        np.array([duties[best, 0], downs[best, 0]]),
+        method="Nelder-Mead",
+        options={"xatol": 1e-5, "fatol": 1e-9},
     )
     duty, down = float(np.clip(found.x[0], 0.12, 0.93)), float(found.x[1]) % 1.0
     residual, offset = left(duty, down)

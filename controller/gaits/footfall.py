@@ -12,12 +12,12 @@ from snakewalk.controller.gaits.wave import TURN
 from snakewalk.controller.kinematics import smoothstep
 
 
-def swing(at: Floats, duty: float) -> Floats:
+def swing(at: Floats, duty: float | Floats) -> Floats:
     """1 where a foot comes down, evenly to -1 where it leaves, and back; no step in speed.
 
     Args:
         at: (...) cycles since the foot came down, 0 to 1.
-        duty: share of a cycle on the ground, between 0 and 1.
+        duty: share of a cycle on the ground, between 0 and 1; one, or one for each of ``at``.
 
     """
     ground = 1.0 - 2.0 * at / duty
@@ -32,6 +32,6 @@ def lift(at: Floats, duty: float) -> Floats:
     return np.sin(0.5 * TURN * _air(at, duty)) ** 2
 
 
-def _air(at: Floats, duty: float) -> Floats:
+def _air(at: Floats, duty: float | Floats) -> Floats:
     """Share of the air that has passed, 0 on the ground."""
     return np.clip((at - duty) / (1.0 - duty), 0.0, 1.0)

@@ -1,7 +1,5 @@
 """A program that swings three joints on the port it is given until somebody ends it."""
 
-import sys
-
 import numpy as np
 
 from snakewalk.config.robot import RobotConfig
@@ -20,7 +18,7 @@ WATCHDOG_S = 1.0
 """Long, so that a busy test machine does not trip it."""
 
 
-def main(device: str, how: str) -> None:
+def swing(device: str, how: str) -> None:
     """Swing; ``crash`` raises in the middle of it."""
     safety = SafetyConfig(stale_limit_s=5.0, watchdog_s=WATCHDOG_S)
     with SerialPort(device) as port:
@@ -40,7 +38,3 @@ def main(device: str, how: str) -> None:
                     print("moving", flush=True)
                     if how == "crash":
                         raise RuntimeError("planner crashed")
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

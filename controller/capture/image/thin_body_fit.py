@@ -11,6 +11,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
 from snakewalk.config.arrays import Floats
+from snakewalk.drivers.compiling import compiled
 
 THIN_PX = 6.0
 """Width below which a body is fitted."""
@@ -21,6 +22,7 @@ _ROUNDS = 12
 _STIFF = 0.02  # of second differences of the controls, against the picture's own information
 _EVEN = 0.3  # the same of the differences in thickness
 _LEAST_WIDTH = 0.5  # px, of a spot
+_FAR = 5.5  # standard deviations: further off a spot is not seen
 _TAPER = 0.02  # of the length: what tapers off at each end and is too little to be fitted
 _MISFIT = 0.25  # of the picture's own strength: more left over, and the curve is not the body's
 
@@ -41,6 +43,10 @@ _HATS = np.stack(
     ],
     axis=1,
 )
+_BY_VALUES = np.zeros((3, 2 * _CONTROLS + _STATIONS, _SPOTS))
+"""Slopes of the places and weights of the spots by all values but the last."""
+_BY_VALUES[0, :_CONTROLS] = _BY_VALUES[1, _CONTROLS : 2 * _CONTROLS] = _ALONG.T
+_BY_VALUES[2, 2 * _CONTROLS :] = _HATS.T
 _BEND = np.diff(np.eye(_CONTROLS), 2, axis=0)
 
 
@@ -114,24 +120,70 @@ def _picture(values: Floats, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
     """The picture (h, w) of a line of spots, and its slopes (h w, values)."""
     x, y = _ALONG @ values[:_CONTROLS], _ALONG @ values[_CONTROLS : 2 * _CONTROLS]
     weights, spot = _HATS @ values[2 * _CONTROLS : -1], float(values[-1])
-    high, wide = shape
-    away_x, away_y = np.arange(wide)[:, None] - x, np.arange(high)[:, None] - y
-    across = np.exp(-0.5 * (away_x / spot) ** 2)
-    down = np.exp(-0.5 * (away_y / spot) ** 2) / (2.0 * np.pi * spot * spot)
-    # a spot is a product of its row and its column: no array has rows, columns and spots
-    heavy = down * weights
-    shown = heavy @ across.T
-    moved_x, moved_y = across * away_x / spot**2, heavy * away_y / spot**2
-    by_x, by_y, by_weight = (
-        (rows @ (columns.T[:, :, None] * shares[:, None, :]).reshape(len(shares), -1)).reshape(
-            high * wide, -1
-        )
-        for rows, columns, shares in (
-            (heavy, moved_x, _ALONG),
-            (moved_y, across, _ALONG),
-            (down, across, _HATS),
-        )
-    )
-    spread = heavy @ (across * away_x**2).T + (heavy * away_y**2) @ across.T
-    by_spot = spread / spot**3 - 2.0 / spot * shown
-    return shown, np.concatenate([by_x, by_y, by_weight, by_spot.reshape(-1, 1)], axis=1)
+    shown, by = np.zeros(shape), np.zeros((len(values), *shape))
+    x_by, y_by, weights_by = _BY_VALUES
+    draw_spots(x, y, weights, x_by, y_by, weights_by, spot, shown, by)
+    by[-1] /= spot
+    return shown, by.reshape(len(values), -1).T
+
+
+_EACH = "float64[::1]"
+_BY = "float64[:, ::1]"
+
+
+@compiled(
+    f"void({_EACH}, {_EACH}, {_EACH}, {_BY}, {_BY}, {_BY}, float64, {_BY}, float64[:, :, ::1])"
+)
+def draw_spots(
+    x: Floats,
+    y: Floats,
+    area: Floats,
+    x_by: Floats,
+    y_by: Floats,
+    area_by: Floats,
+    spot: float,
+    cover: Floats,
+    by: Floats,
+) -> None:
+    """Add Gaussian spots to a picture and its slopes, each spot where it is seen.
+
+    Args:
+        x: (S,) columns.
+        y: (S,) rows.
+        area: (S,) sum of a spot's picture.
+        x_by: (P, S) slopes of ``x`` by the parameters.
+        y_by: those of ``y``.
+        area_by: those of ``area``.
+        spot: standard deviation, px.
+        cover: (h, w) the picture.
+        by: (P + 1, h, w) its slopes, the last by the log of ``spot``; (0, h, w) for none.
+
+    """
+    high, wide = cover.shape
+    share = 1.0 / (np.sqrt(2.0 * np.pi) * spot)
+    across, moved, spread = np.empty(wide), np.empty(wide), np.empty(wide)
+    for k in range(len(x)):
+        left = max(0, int(np.ceil(x[k] - _FAR * spot)))
+        right = min(wide, int(np.floor(x[k] + _FAR * spot)) + 1)
+        top = max(0, int(np.ceil(y[k] - _FAR * spot)))
+        bottom = min(high, int(np.floor(y[k] + _FAR * spot)) + 1)
+        for u in range(left, right):
+            off = (u - x[k]) / spot
+            across[u] = share * np.exp(-0.5 * off * off)
+            moved[u] = across[u] * off / spot
+            spread[u] = across[u] * (off * off - 1.0)
+        for v in range(top, bottom):
+            off = (v - y[k]) / spot
+            down = share * np.exp(-0.5 * off * off)
+            heavy = down * area[k]
+            for u in range(left, right):
+                cover[v, u] += heavy * across[u]
+            for p in range(len(by) - 1):
+                beside = heavy * x_by[p, k]
+                along = heavy * off / spot * y_by[p, k] + down * area_by[p, k]
+                for u in range(left, right):
+                    by[p, v, u] += beside * moved[u] + along * across[u]
+            if len(by) > 0:
+                wider = heavy * (off * off - 1.0)
+                for u in range(left, right):
+                    by[-1, v, u] += heavy * spread[u] + wider * across[u]

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.image.thin_body_fit import draw_spots
 
 BENDS = 10
 """Coefficients of the tangent angle."""
@@ -28,8 +29,6 @@ SHADOW = 4
 """Further ones of a shadow: contrast, x, y beside the body, log of its blur."""
 _APART = 1.2  # of the blur: distance of spots
 _ROWS = 7
-_FAR = 4.5  # of the blur: further off a spot is not seen
-_TOGETHER = 8  # places along the body that are drawn at once, in a window of their own
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,47 +179,14 @@ class _Places:
 def _spots(
     spots: _Places, spot: float, shape: tuple[int, ...], *, slopes: bool = True
 ) -> tuple[Floats, Floats]:
-    """Sum of Gaussian spots (h, w); its slopes (P + 1, h, w), the last by the log of ``spot``.
-
-    A few neighbours at a time, in the window where they are seen: that is less work, and no matrix
-    is so large that the algebra library starts threads for it.
-    """
+    """Sum of Gaussian spots (h, w); its slopes (P + 1, h, w), the last by the log of ``spot``."""
+    count = len(spots.x_by)
     cover = np.zeros(shape)
-    by = np.zeros((len(spots.x_by) + 1, *shape))
-    for start in range(0, len(spots.x), _TOGETHER):
-        some = slice(start, start + _TOGETHER)
-        x, y, area = spots.x[some].ravel(), spots.y[some].ravel(), spots.area[some].ravel()
-        left, top = (max(0, int(np.floor(v.min() - _FAR * spot))) for v in (x, y))
-        right = min(shape[1], int(np.ceil(x.max() + _FAR * spot)) + 1)
-        bottom = min(shape[0], int(np.ceil(y.max() + _FAR * spot)) + 1)
-        if left >= right or top >= bottom:
-            continue
-        window = (slice(top, bottom), slice(left, right))
-        off_x = (np.arange(left, right) - x[:, None]) / spot  # (spots, w)
-        off_y = (np.arange(top, bottom)[:, None] - y) / spot  # (h, spots)
-        gx, gy = _gauss(off_x) / spot, _gauss(off_y) / spot
-        heavy = gy * area
-        cover[window] += heavy @ gx
-        if not slopes:
-            continue
-        count = len(by) - 1
-        x_by = spots.x_by[:, some].reshape(count, 1, -1)
-        y_by = spots.y_by[:, some].reshape(count, 1, -1)
-        area_by = spots.area_by[:, some].reshape(count, 1, -1)
-        down = heavy * off_y / spot
-        both = np.concatenate([heavy * x_by, down * y_by + gy * area_by], axis=2)
-        right_side = np.concatenate([gx * off_x / spot, gx])
-        by[(slice(count), *window)] += both @ right_side
-        spread = heavy @ (gx * (off_x * off_x - 1.0)) + (heavy * (off_y * off_y - 1.0)) @ gx
-        by[(-1, *window)] += spread
+    by = np.zeros((count + 1 if slopes else 0, *shape))
+    x, y, area = (v.flatten() for v in (spots.x, spots.y, spots.area))
+    x_by, y_by, area_by = (v.reshape(count, -1) for v in (spots.x_by, spots.y_by, spots.area_by))
+    draw_spots(x, y, area, x_by, y_by, area_by, spot, cover, by)
     return cover, by
-
-
-def _gauss(off: Floats) -> Floats:
-    """Normal density, 0 far away: numbers too small for a float are slow."""
-    square = off * off
-    density = np.exp(-0.5 * np.minimum(square, 50.0)) / np.sqrt(2.0 * np.pi)
-    return np.where(square < 50.0, density, 0.0)
 
 
 @lru_cache(maxsize=64)

@@ -16,7 +16,8 @@ import sys
 from pathlib import Path
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_walk
-execute(prepare_walk("jacksboro-traverse", time_limit_s=1.0), Path(sys.argv[1]))
+near = prepare_walk("jacksboro-traverse", waypoints_m=((0.6, 0.2),), time_limit_s=1.0)
+execute(near, Path(sys.argv[1]))
 """
 _AVX512 = "X86_V4 AVX512_ICL AVX512_SPR"
 PROCESSORS = {"Haswell": _AVX512, "Sandybridge": _AVX512, "Prescott": f"X86_V3 {_AVX512}"}

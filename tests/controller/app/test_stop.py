@@ -18,6 +18,7 @@ from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 from tests.helpers.line_port import OpenedLine, line_port
+from tests.helpers.program import Program, command
 
 HUNG = """
 import signal, sys
@@ -57,13 +58,11 @@ def test_a_simulated_run_is_stopped_from_another_program_and_its_log_says_so(
     tmp_path: Path,
 ) -> None:
     pytest.importorskip("mujoco")
-    command = "from snakewalk.controller.app.cli.main import main; main()"
-    other: list[subprocess.Popen[str]] = []
+    other: list[Program] = []
 
     def on_progress(progress: Progress) -> None:
         if not other:
-            words = [sys.executable, "-c", command, "stop", "--json"]
-            other.append(subprocess.Popen(words, stdout=subprocess.PIPE, text=True))
+            other.append(command("stop", "--json"))
 
     job = prepare_gait("lateral-undulation", seconds=3600.0)
     finished = execute(job, tmp_path / "run", on_progress=on_progress)

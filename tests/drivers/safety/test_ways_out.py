@@ -2,10 +2,7 @@
 
 import select
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,9 +15,9 @@ from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.serve.pty import PtyServer
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
-from tests.helpers.swing_child import ROBOT, WATCHDOG_S
+from tests.helpers.program import Program
+from tests.helpers.swing_child import ROBOT, WATCHDOG_S, swing
 
-CHILD = Path(__file__).parents[2] / "helpers" / "swing_child.py"
 PATIENCE_S = 60.0
 
 
@@ -29,11 +26,7 @@ class Servos:
 
     def __init__(self, server: PtyServer, line: SimLine, how: str) -> None:
         self.server, self.line = server, line
-        self.child = subprocess.Popen(
-            [sys.executable, str(CHILD), server.path, how],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-        )
+        self.child = Program(swing, server.path, how)
         self.clock = WallClock()
 
     def serve_until(self, done: object) -> None:
@@ -43,13 +36,11 @@ class Servos:
             self.server.step(0.005)
 
     def moving(self) -> bool:
-        assert self.child.stdout is not None
         assert self.child.poll() is None or self.said()
         return bool(select.select([self.child.stdout], [], [], 0.0)[0])
 
     def said(self) -> str:
-        assert self.child.stderr is not None
-        return self.child.stderr.read().decode()
+        return self.child.stderr.read()
 
     def torque(self) -> list[int]:
         return self.line.bank["Torque Enable"].tolist()

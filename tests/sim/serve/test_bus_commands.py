@@ -3,8 +3,6 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -22,6 +20,7 @@ from snakewalk.sim.serve.pty import LATE_S, PtyServer
 from snakewalk.sim.serve.servo_bus import ServoBus
 from tests.helpers.bus import a_line, serve_for
 from tests.helpers.command import snakewalk
+from tests.helpers.program import command
 from tests.sim.faults.test_faults import fault, scripted
 
 pytestmark = pytest.mark.usefixtures("patient_sdk")
@@ -29,26 +28,11 @@ pytestmark = pytest.mark.usefixtures("patient_sdk")
 PING = bytes.fromhex("FF FF FD 00 01 03 00 01 19 4E")
 
 
-def started(*words: str) -> subprocess.Popen[str]:
-    # a runner in the background has SIGINT ignored, which its children inherit
-    code = (
-        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
-        "from snakewalk.controller.app.cli.main import main; main()"
-    )
-    return subprocess.Popen(
-        [sys.executable, "-c", code, *words],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
 def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path) -> None:
     record = tmp_path / "exchange.jsonl"
     link = tmp_path / "tty"
     words = ("--servos", "1-2:XL330-M288", "--json")
-    with started("bus", "serve", *words, "--record", str(record), "--link", str(link)) as process:
-        assert process.stdout is not None
+    with command("bus", "serve", *words, "--record", str(record), "--link", str(link)) as process:
         first = json.loads(process.stdout.readline())
         assert first["ids"] == [1, 2]
         port = sdk.PortHandler(str(link))
@@ -152,8 +136,7 @@ def test_the_fixture_takes_faults(servo_bus: Callable[..., ServoBus], tmp_path: 
 
 
 def test_serve_speaks_protocol_1_for_an_ax12() -> None:
-    with started("bus", "serve", "--servos", "5:AX-12A", "--json") as process:
-        assert process.stdout is not None
+    with command("bus", "serve", "--servos", "5:AX-12A", "--json") as process:
         port = sdk.PortHandler(json.loads(process.stdout.readline())["port"])
         port.setBaudRate(1_000_000)
         assert sdk.PacketHandler(1.0).ping(port, 5) == (12, 0, 0)

@@ -42,3 +42,18 @@ def test_the_curve_of_a_picture_of_spots_is_found_again() -> None:
     assert left < 0.01
     away = np.hypot(*(curve[1:-1, None] - true[None]).transpose(2, 0, 1)).min(axis=1)
     assert away.max() < 0.1
+
+
+def test_loops_draw_the_same_as_python() -> None:
+    rng = np.random.default_rng(0)
+    places = rng.uniform(-3.0, 15.0, (2, 5))
+    slopes = rng.normal(size=(3, 4, 5))
+    compiled, python = (
+        (np.zeros((14, 18)), np.zeros((5, 14, 18)), draw)
+        for draw in (thin_body_fit.draw_spots, thin_body_fit.draw_spots.py_func)
+    )
+    for cover, by, draw in (compiled, python):
+        draw(*places, np.linspace(0.5, 2.0, 5), *slopes, 1.7, cover, by)
+    np.testing.assert_allclose(compiled[0], python[0], rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(compiled[1], python[1], rtol=1e-12, atol=1e-14)
+    assert python[0].max() > 0.01
