@@ -17,12 +17,15 @@ from snakewalk.controller.app.identification.pendulum_log import PendulumLog
 from snakewalk.controller.app.identification.pendulum_swing import FINE_S, swing_rad
 from snakewalk.controller.app.identification.servo_constants import (
     CONSTANTS,
+    FITTED,
     HIGH,
     LOW,
     NAMES,
     ServoConstants,
 )
 
+_LOW: Final = LOW[:FITTED]
+_HIGH: Final = HIGH[:FITTED]
 STARTS: Final = 24
 HOPS: Final = 60
 _COARSE_S: Final = 2e-3
@@ -58,7 +61,7 @@ def fit_pendulum(
     hops: int = HOPS,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> ServoConstants:
-    """Fit all constants to all logs.
+    """Fit the constants to all logs; the squares of M6 stay as ``start`` has them.
 
     Args:
         logs: of one servo.
@@ -70,13 +73,14 @@ def fit_pendulum(
 
     """
     rng = np.random.default_rng(seed)
-    first = np.array([c.start for c in CONSTANTS]) if start is None else start.values
-    width, total = HIGH - LOW, starts + hops + 1
+    given = np.array([c.start for c in CONSTANTS]) if start is None else start.values
+    first, squares = given[:FITTED], given[FITTED:]
+    width, total = _HIGH - _LOW, starts + hops + 1
     pool: list[OptimizeResult] = []
     for k in range(starts):
         factor, shift = np.exp(rng.normal(0.0, _SPREAD, len(first))), rng.normal(size=len(first))
         drawn = first if k == 0 else first * factor + 0.02 * width * shift
-        pool.append(_fit(logs, drawn, _COARSE_S, _COARSE_TURNS))
+        pool.append(_fit(logs, drawn, squares, _COARSE_S, _COARSE_TURNS))
         on_progress(k + 1, total)
     pool.sort(key=lambda fit: float(fit.cost))
     for k in range(hops):
@@ -85,28 +89,32 @@ def fit_pendulum(
         size = 0.15 * np.maximum(np.abs(best), 0.01 * width) * (rng.random(len(best)) < 0.4)
         drawn = best + rng.normal(size=len(best)) * size
         drawn = drawn + (rng.random() < 0.3) * 0.3 * (other - best)
-        pool.append(_fit(logs, drawn, _COARSE_S, _COARSE_TURNS))
+        pool.append(_fit(logs, drawn, squares, _COARSE_S, _COARSE_TURNS))
         pool.sort(key=lambda fit: float(fit.cost))
         on_progress(starts + k + 1, total)
-    values = np.asarray(_fit(logs, pool[0].x, FINE_S, _FINE_TURNS).x)
+    values = np.asarray(_fit(logs, pool[0].x, squares, FINE_S, _FINE_TURNS).x)
     on_progress(total, total)
-    low, high = _intervals(logs, values)
-    return ServoConstants(values, low, high, logs[0].actuator)
+    unknown = np.full(len(squares), np.nan)
+    low, high = (np.append(end, unknown) for end in _intervals(logs, values, squares))
+    return ServoConstants(np.append(values, squares), low, high, logs[0].actuator)
 
 
-def _errors(values: Floats, logs: Sequence[PendulumLog], step_s: float) -> Floats:
+def _errors(values: Floats, logs: Sequence[PendulumLog], squares: Floats, step_s: float) -> Floats:
     """(M,) errors of all logs, one after the other."""
-    return np.concatenate([swing_rad(values, log, step_s) - log.position_rad for log in logs])
+    whole = np.append(values, squares)
+    return np.concatenate([swing_rad(whole, log, step_s) - log.position_rad for log in logs])
 
 
-def _fit(logs: Sequence[PendulumLog], values: Floats, step_s: float, turns: int) -> OptimizeResult:
-    width = HIGH - LOW
-    inside = np.clip(values, LOW + 1e-6 * width, HIGH - 1e-6 * width)
+def _fit(
+    logs: Sequence[PendulumLog], values: Floats, squares: Floats, step_s: float, turns: int
+) -> OptimizeResult:
+    width = _HIGH - _LOW
+    inside = np.clip(values, _LOW + 1e-6 * width, _HIGH - 1e-6 * width)
     return least_squares(
         _errors,
         inside,
-        bounds=(LOW, HIGH),
-        args=(logs, step_s),
+        bounds=(_LOW, _HIGH),
+        args=(logs, squares, step_s),
         x_scale=width,
         diff_step=[_TURN],
         loss="soft_l1",
@@ -115,23 +123,28 @@ def _fit(logs: Sequence[PendulumLog], values: Floats, step_s: float, turns: int)
     )
 
 
-def _intervals(logs: Sequence[PendulumLog], values: Floats) -> tuple[Floats, Floats]:
+def _intervals(
+    logs: Sequence[PendulumLog], values: Floats, squares: Floats
+) -> tuple[Floats, Floats]:
     """Ends of the 95 % intervals, by blocks of errors (a sandwich), within the ranges.
 
     A model that is wrong leaves errors that last: within a block they count as one, so that the
     intervals grow with the blocks' sums, not shrink with the number of samples. What the logs do
     not tell has an interval as wide as its range.
     """
-    width = HIGH - LOW
+    width = _HIGH - _LOW
     jacobian = np.stack(
         [
-            (_errors(values + turn, logs, FINE_S) - _errors(values - turn, logs, FINE_S))
+            (
+                _errors(values + turn, logs, squares, FINE_S)
+                - _errors(values - turn, logs, squares, FINE_S)
+            )
             / (2.0 * _TURN)
             for turn in np.diag(_TURN * width)
         ],
         axis=1,
     )  # of each constant in units of its range
-    errors = _errors(values, logs, FINE_S)
+    errors = _errors(values, logs, squares, FINE_S)
     weight = 1.0 / np.sqrt(1.0 + (errors / _OUTLIER_RAD) ** 2)
     blocks = np.concatenate(
         [1000 * k + (log.time_s / _BLOCK_S).astype(int) for k, log in enumerate(logs)]
@@ -151,9 +164,9 @@ def _intervals(logs: Sequence[PendulumLog], values: Floats) -> tuple[Floats, Flo
     spread = np.sqrt(np.diag(bread @ meat @ bread)) * width
     reach = float(student.ppf(0.5 + 0.5 * _COVERAGE, degrees)) * spread
     reach = np.maximum(reach, _LEAST_SHARE * np.abs(values))
-    low, high = np.maximum(values - reach, LOW), np.minimum(values + reach, HIGH)
+    low, high = np.maximum(values - reach, _LOW), np.minimum(values + reach, _HIGH)
     if not low[[NAMES.index(name) for name in _SLOW_TERMS]].any():
         # whether friction grows when the shaft is slow is open, so how slow is open, too
         shape = [NAMES.index(name) for name in ("stribeck_rad_s", "stribeck_exponent")]
-        low[shape], high[shape] = LOW[shape], HIGH[shape]
+        low[shape], high[shape] = _LOW[shape], _HIGH[shape]
     return low, high

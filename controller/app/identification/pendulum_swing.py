@@ -55,6 +55,7 @@ def _swing(
     dry, stribeck, by_motor, by_load = values[4], values[5], values[6], values[7]
     by_motor_slow, by_load_slow, slow_rad_s = values[8], values[9], values[10]
     exponent, viscous, p_unit, delay_s = values[11], values[12], values[13], values[14]
+    by_motor_square, by_load_square = values[15], values[16]
     inertia = mass_kg * arm_m * arm_m + armature
     weight_n_m = mass_kg * GRAVITY_M_S2 * arm_m
     q, w, heard = start_rad, 0.0, 0
@@ -81,6 +82,10 @@ def _swing(
             slow = math.exp(-((abs(w) / slow_rad_s) ** exponent))
             friction = dry + abs(by_load * load - by_motor * motor) + viscous * abs(w)
             friction += slow * (stribeck + abs(by_load_slow * load - by_motor_slow * motor))
+            if load * motor < 0.0:
+                stronger = abs(load) < abs(motor)
+                square = by_load_square * load**2 if stronger else by_motor_square * motor**2
+                friction += slow * square
             half = 0.5 * h * damping / inertia
             free = ((1.0 - half) * w + h * (push + load) / inertia) / (1.0 + half)
             rest = abs(free) - h * friction / (inertia * (1.0 + half))

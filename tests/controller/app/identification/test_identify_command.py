@@ -63,6 +63,17 @@ def test_models_that_do_not_ask_for_the_side(files: list[Path], tmp_path: Path) 
     assert told["constants"]["by_motor"] == told["constants"]["by_load"] == 0.3
 
 
+def test_a_model_with_squares_comes_back(files: list[Path], tmp_path: Path) -> None:
+    start, out = tmp_path / "m6.json", tmp_path / "out.json"
+    squares = {"load_friction_motor_quad": 0.4, "load_friction_external_quad": 0.3}
+    start.write_text(json.dumps(BAM | squares | {"model": "m6"}))
+    told = json.loads(run(files[0], "--start", start, "--no-fit", "--json", "-o", out))
+    written = json.loads(out.read_text())
+    assert written["model"] == "m6"
+    assert {key: written[key] for key in squares} == squares
+    assert told["constants"]["by_load_square"] == 0.3
+
+
 def test_what_is_refused(files: list[Path], tmp_path: Path) -> None:
     bad = tmp_path / "bad.json"
     bad.write_text("{")
@@ -71,8 +82,8 @@ def test_what_is_refused(files: list[Path], tmp_path: Path) -> None:
     assert "mass: is missing" in refused(bad)
     bad.write_text(json.dumps({"mass": 1, "length": 1, "kp": 1, "entries": [{"position": 1}]}))
     assert "is no log of a pendulum" in refused(bad)
-    bad.write_text(json.dumps(BAM | {"model": "m6"}))
-    assert "model is 'm6'" in refused(files[0], "--start", bad)
+    bad.write_text(json.dumps(BAM | {"model": "m7"}))
+    assert "model is 'm7'" in refused(files[0], "--start", bad)
     bad.write_text(json.dumps(BAM | {"kt": "much"}))
     assert "kt: expected a number, found much" in refused(files[0], "--start", bad)
     assert "give them with --start" in refused(files[0], "--no-fit")

@@ -1,5 +1,7 @@
 """Constants that were planted in another simulation come back inside their intervals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,33 @@ def test_what_is_left_is_the_encoder(found: ServoConstants, logs: list[PendulumL
     # rounding to a tick is off by a quarter of it on average
     for log in logs:
         assert error_deg(found, log) < 1.5 * np.degrees(TICK_RAD) / 4.0
+
+
+def test_squares_are_felt_only_where_motor_and_load_strive_against_each_other(
+    logs: list[PendulumLog],
+) -> None:
+    """M6: of the weaker one while the other drives it; a motor that is off strives not."""
+    values = np.array([c.start for c in CONSTANTS])
+    values[NAMES.index("stribeck_rad_s")] = 2.0
+    plain = swing_rad(values, logs[0])
+    for name in ("by_motor_square", "by_load_square"):
+        squared = values.copy()
+        squared[NAMES.index(name)] = 0.5
+        assert np.abs(swing_rad(squared, logs[0]) - plain).max() > 1e-3
+    limp = replace(logs[0], torque_on=np.zeros(len(logs[0].time_s)))
+    squared = values.copy()
+    squared[-2:] = 0.5
+    np.testing.assert_array_equal(swing_rad(squared, limp), swing_rad(values, limp))
+
+
+def test_a_fit_leaves_squares_as_they_are_given(logs: list[PendulumLog]) -> None:
+    given = np.array([c.start for c in CONSTANTS])
+    given[-2:] = 0.02, 0.03
+    unknown = np.full(len(given), np.nan)
+    start = ServoConstants(given, unknown, unknown, "xl330")
+    found = fit_pendulum(logs[1:2], start, starts=1, hops=0)
+    np.testing.assert_array_equal(found.values[-2:], given[-2:])
+    assert np.isnan(found.low[-2:]).all()
 
 
 def test_a_log_that_tells_little_has_wide_intervals(logs: list[PendulumLog]) -> None:
