@@ -82,12 +82,17 @@ class PoseError:
     waypoints_reached: int
     """Waypoints reached by the body's true centre, in order."""
 
+    @property
+    def head_rms_m(self) -> float:
+        """Root of the mean square distance of the head link; NaN before a pose was measured."""
+        return _rms(self.head_m) if self.head_m.size else float("nan")
+
     def facts(self) -> dict[str, float | int]:
         """Numbers for the log and for a command's answer."""
         if not self.head_m.size:
             return {}
         return {
-            "head_error_rms_m": round(_rms(self.head_m), 4),
+            "head_error_rms_m": round(self.head_rms_m, 4),
             "head_error_max_m": round(float(self.head_m.max()), 4),
             "heading_error_rms_rad": round(_rms(self.heading_rad), 4),
             "heading_error_max_rad": round(float(self.heading_rad.max()), 4),

@@ -86,6 +86,10 @@ class Trial:
     roll_max_deg: float = math.nan
     in_air: float = math.nan
     """Share of links that do not touch the ground, mean."""
+    truly_reached: float = math.nan
+    """Waypoints that the body came to, where its pose was estimated; NaN of a measured one."""
+    head_error_m: float = math.nan
+    """How far the estimated head is off, root of the mean square; NaN of a measured one."""
     alarms: int = 0
     """For missing advance."""
     cause: str = ""
@@ -183,11 +187,12 @@ def config_digest(case: Case, changes: Mapping[str, object]) -> str:
 def is_fixed(case: Case, spread_m: float, changes: Mapping[str, object]) -> bool:
     """Whether all seeds give the same run, so that it counts once.
 
-    The seed draws the start, the walk's shapes and a camera's noise, and nothing of a serpenoid or
-    of a gait.
+    The seed draws the start, the walk's shapes, a camera's noise and an IMU's bias and noise, and
+    nothing of a serpenoid or of a gait.
     """
     run = prepare_case(case, 0, 0.0, changes).run
-    return spread_m == 0.0 and run.motion in {"serpenoid", "gait"} and run.pose != "camera"
+    drawn = run.pose in {"camera", "imu"}
+    return spread_m == 0.0 and run.motion in {"serpenoid", "gait"} and not drawn
 
 
 def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, object]) -> Trial:
@@ -212,7 +217,7 @@ def _measured(trial: Trial, prepared: WalkRun | GaitRun) -> Trial:
     with TemporaryDirectory() as folder:
         finished = execute(prepared, Path(folder), stoppable=False)
         stood = ground_contact(finished.record, prepared.ground)
-    numbers, outcome = finished.summary, finished.outcome
+    numbers, outcome, off = finished.summary, finished.outcome, finished.pose.error
     complete = outcome.complete
     ended = None if complete else failure(finished.record)
     return replace(
@@ -230,6 +235,8 @@ def _measured(trial: Trial, prepared: WalkRun | GaitRun) -> Trial:
         current_max_a=_number(numbers.peak_current_a),
         roll_max_deg=float(np.degrees(stood.roll_max_rad)),
         in_air=stood.in_air,
+        truly_reached=math.nan if off is None else float(off.waypoints_reached),
+        head_error_m=math.nan if off is None else off.head_rms_m,
         alarms=outcome.alarms,
         cause="" if ended is None else ended.cause,
         why="" if ended is None else ended.text,
@@ -310,6 +317,10 @@ class CaseSummary:
     """Of gaits, net, mean of the runs."""
     speed_sd_m_s: float | None = None
     """Standard deviation of that speed from run to run."""
+    truly_complete: str = ""
+    """``n of m`` runs whose body came to every waypoint, where its pose was estimated."""
+    head_error_m: float | None = None
+    """Of an estimated pose, mean over the runs."""
     rolled: int = 0
     """Runs in which the head link was over 90 degrees on its side at some time."""
 
@@ -350,10 +361,19 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
                 compliance={None: "", True: "on", False: "off"}[case.compliance],
                 speed_m_s=_mean([t.speed_m_s for t in some], 4),
                 speed_sd_m_s=_deviation([t.speed_m_s for t in some], 4),
+                truly_complete=_truly_complete(some),
+                head_error_m=_mean([t.head_error_m for t in some], 3),
                 rolled=sum(t.roll_max_deg > 90.0 for t in some),
             )
         )
     return rows
+
+
+def _truly_complete(some: Sequence[Trial]) -> str:
+    known = [t for t in some if np.isfinite(t.truly_reached)]
+    if not known:
+        return ""
+    return f"{sum(t.truly_reached == t.waypoints for t in known)} of {len(known)}"
 
 
 def wilson(successes: int, runs: int) -> tuple[float, float]:

@@ -27,6 +27,8 @@ _HEADS = {
     "complete": "com-\nplete",
     "first_pass": "first\npass",
     "passed_by": "mis-\nses",
+    "truly_complete": "truly\nthere",
+    "head_error_m": "head\noff m",
     "duration_s": "time\ns",
     "speed_m_s": "speed\nm/s",
     "speed_sd_m_s": "sd",

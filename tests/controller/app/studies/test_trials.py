@@ -203,6 +203,26 @@ def test_the_table_gives_back_what_it_was_given(tmp_path: Path) -> None:
     assert "world.ground.slope_deg=20" in path.read_text()
 
 
+def test_an_estimated_pose_is_judged_by_where_the_body_truly_is(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    run = tmp_path / "near.toml"
+    run.write_text(
+        'name = "near"\nrobot = "alternating16-imu"\nwaypoints_m = [[0.31, 0.0], [3.0, 0.0]]\n'
+        "time_limit_s = 0.3\n"
+    )
+    estimated, known = (
+        Case(str(run), "serpenoid", keys=(("run.pose", pose),)) for pose in ("imu", "simulator")
+    )
+    trials = [study.run_trial(case, 3, 0.0, {}) for case in (estimated, known)]
+    assert trials[0].truly_reached in {0.0, 1.0}
+    assert 0.0 <= trials[0].head_error_m < 0.05
+    assert np.isnan([trials[1].truly_reached, trials[1].head_error_m]).all()
+    told = study.table(trials, [estimated, known])
+    assert [row.truly_complete for row in told] == ["0 of 1", ""]
+    assert not study.is_fixed(estimated, 0.0, {})  # the seed draws the IMU's bias
+    assert study.is_fixed(known, 0.0, {})
+
+
 def test_a_kept_table_is_not_run_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
