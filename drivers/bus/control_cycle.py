@@ -11,8 +11,12 @@ Rules, each against something that happens on real buses:
 - Fast reads that keep failing are given up for plain ones, where damage ends with its packet.
 """
 
+from __future__ import annotations
+
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +25,13 @@ from snakewalk.config.arrays import Bools
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.bus.pending_replies import PendingReplies
-from snakewalk.drivers.bus.serial_fast_path import SerialFastPath
 from snakewalk.drivers.port.byte_port import BytePort, DescriptorPort
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 
+if TYPE_CHECKING:
+    from snakewalk.drivers.bus.serial_fast_path import SerialFastPath
+
+_IS_LINUX = sys.platform.startswith("linux")
 FAST_FAILURES = 3
 """Fast reads failing in a row until plain ones are used (ours)."""
 _CLEAN_READS = 50
@@ -97,7 +104,9 @@ class ControlCycle:
         self._missed = np.zeros(len(ids), np.intp)
         self._sent_until_s = port.clock.now_s()
         self._default_request = GroupReadRequest(ids, read_address, read_bytes, fast=fast)
-        if isinstance(port, DescriptorPort) and port.descriptor is not None:
+        if isinstance(port, DescriptorPort) and port.descriptor is not None and _IS_LINUX:
+            from snakewalk.drivers.bus.serial_fast_path import SerialFastPath  # noqa: PLC0415  its loops call Linux
+
             self._fast_path = SerialFastPath(
                 port, self._goals, self._default_request, latency_s=latency_s, spin_s=spin_s
             )

@@ -5,10 +5,8 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import select
-import termios
 from contextlib import suppress
 
 import serial
@@ -17,6 +15,12 @@ from serial.tools import list_ports
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.line_port import LinePort
+
+try:
+    import fcntl
+    import termios
+except ImportError:  # Windows
+    fcntl = termios = None  # type: ignore[assignment]
 
 _LATENCY_MS = 16.0
 """How long an FTDI adapter holds bytes back by default (its ``latency_timer``)."""
@@ -34,10 +38,18 @@ class SerialPort(LinePort):
 
     """
 
-    line_errors = (*LinePort.line_errors, termios.error)  # which is no OSError
+    line_errors = (  # termios' is no OSError
+        *LinePort.line_errors,
+        *(() if termios is None else (termios.error,)),
+    )
     grace_ms = 2.0 * _LATENCY_MS + 2.0
 
     def __init__(self, device: str, baud: int = 1_000_000, clock: Clock | None = None) -> None:
+        if termios is None:
+            raise PortError(
+                f"{device}: serial devices are for Linux and macOS; on this system give the URL of "
+                "a server that has one: socket://HOST:PORT or rfc2217://HOST:PORT"
+            )
         self._readable, self._writable = select.poll(), select.poll()
         self.descriptor: int | None = None
         """File descriptor while the port is open, for compiled code."""

@@ -8,7 +8,7 @@ Layout: a byte that is 1 once pressed, a byte that is 1 once the run has ended, 
 how it ended (length and text each), and as JSON what runs. A text is written before its byte.
 """
 
-import fcntl
+import getpass
 import json
 import mmap
 import os
@@ -24,12 +24,19 @@ from typing import Final, Self
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.port.byte_port import is_url
 
+try:
+    import fcntl
+except ImportError:  # Windows: what was killed leaves a button, until somebody deletes its file
+    fcntl = None  # type: ignore[assignment]
+
+_HAS_LOCKS: bool = fcntl is not None
 _BYTES: Final = 4096
 _PRESSED, _ENDED = 0, 1
 _WHO: Final = slice(16, 528)
 _END: Final = slice(528, 1552)
 _RUN: Final = slice(1552, _BYTES)
 _SUFFIX: Final = ".stop"
+_OPEN_FLAGS: Final = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,15 +71,18 @@ class StopButton:
         where = None if folder is None else str(folder.absolute())
         self.run = StoppableRun(os.getpid(), name, devices, where)
         place = button_folder()
-        self._file, made = tempfile.mkstemp(prefix=f"{os.getpid()}-", dir=place)  # mode 0600
-        # locked and filled before it gets a name that others look for
-        fcntl.flock(self._file, fcntl.LOCK_EX)
-        os.truncate(self._file, _BYTES)
+        # locked and filled before it gets a name that others look for; Windows renames no open file
+        kind = "" if _HAS_LOCKS else _SUFFIX
+        self._file, made = tempfile.mkstemp(kind, f"{os.getpid()}-", place)  # mode 0600
+        if _HAS_LOCKS:
+            fcntl.flock(self._file, fcntl.LOCK_EX)
+        os.ftruncate(self._file, _BYTES)
         self._map = mmap.mmap(self._file, _BYTES)
         _write_text(self._map, _RUN, json.dumps(asdict(self.run)))
-        self.path = Path(made + _SUFFIX)
+        self.path = Path(made).with_suffix(_SUFFIX)
         """Whoever is to be able to press it gets this."""
-        os.replace(made, self.path)
+        if not kind:
+            os.replace(made, self.path)
 
     def __enter__(self) -> Self:
         return self
@@ -96,11 +106,15 @@ class StopButton:
         """Take the button away, and tell who waits for it how the run ended; safe to call twice."""
         if self._map.closed:
             return
-        self.path.unlink(missing_ok=True)
+        if _HAS_LOCKS:
+            self.path.unlink(missing_ok=True)
         _write_text(self._map, _END, how)
         self._map[_ENDED] = 1
         self._map.close()
         os.close(self._file)
+        if not _HAS_LOCKS:  # Windows deletes no open file, nor one that somebody else has open
+            with suppress(OSError):
+                self.path.unlink(missing_ok=True)
 
 
 class PressedButton:
@@ -112,10 +126,10 @@ class PressedButton:
     """
 
     def __init__(self, path: Path) -> None:
-        self._file = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC)
+        self._file = os.open(path, os.O_RDWR | _OPEN_FLAGS)
         try:
             info = os.fstat(self._file)
-            if info.st_uid != os.getuid() or info.st_size != _BYTES:
+            if not _is_mine(info) or info.st_size != _BYTES:
                 raise PermissionError(f"{path}: is no stop button of this user")
             self._map = mmap.mmap(self._file, _BYTES)
             known = json.loads(_read_text(self._map, _RUN))
@@ -145,6 +159,8 @@ class PressedButton:
     @property
     def is_held(self) -> bool:
         """Whether the program that made it still holds it."""
+        if not _HAS_LOCKS:
+            return not self._map[_ENDED]
         try:
             # shared: two who look at once do not take each other for the holder
             fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -179,11 +195,12 @@ def button_folder() -> Path:
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     own = Path(runtime) / "snakewalk" if runtime else None
     if own is None or not own.parent.is_dir():
-        own = Path(tempfile.gettempdir()) / f"snakewalk-{os.getuid()}"
+        own = Path(tempfile.gettempdir()) / f"snakewalk-{_user()}"
     with suppress(FileExistsError):
         own.mkdir(mode=0o700)
     info = own.lstat()
-    if not stat.S_ISDIR(info.st_mode) or info.st_uid != os.getuid() or info.st_mode & 0o022:
+    others_write = _HAS_LOCKS and info.st_mode & 0o022
+    if not stat.S_ISDIR(info.st_mode) or not _is_mine(info) or others_write:
         raise InputError(
             f"{own}: must be a folder of this user, which nobody else may write to; stop buttons "
             "are in it (XDG_RUNTIME_DIR says where)"
@@ -208,6 +225,15 @@ def stoppable_runs() -> Iterator[PressedButton]:
                 path.unlink(missing_ok=True)
                 button.close()
     yield from sorted(found, key=lambda button: button.since_s, reverse=True)
+
+
+def _is_mine(info: os.stat_result) -> bool:
+    """Whether a file is this user's; where files have no number of a user, its place says so."""
+    return not _HAS_LOCKS or info.st_uid == os.getuid()
+
+
+def _user() -> str:
+    return getpass.getuser() if not _HAS_LOCKS else str(os.getuid())
 
 
 def _write_text(place: mmap.mmap, where: slice, text: str) -> None:

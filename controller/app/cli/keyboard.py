@@ -3,12 +3,16 @@
 import os
 import select
 import sys
-import termios
-import tty
 from types import TracebackType
 from typing import Self
 
 from snakewalk.config.errors import InputError
+
+try:
+    import termios
+    import tty
+except ImportError:  # Windows
+    termios = tty = None  # type: ignore[assignment]
 
 _NAMES = {
     "\x1b[A": "up", "\x1b[B": "down", "\x1b[C": "right", "\x1b[D": "left",
@@ -40,6 +44,8 @@ class Keyboard:
     """A keyboard has no dead man's button."""
 
     def __init__(self, descriptor: int | None = None) -> None:
+        if termios is None:
+            raise InputError("--live: keys are for Linux and macOS; here take --view")
         self._file = sys.stdin.fileno() if descriptor is None else descriptor
         if not os.isatty(self._file):
             raise InputError("--live reads keys from a terminal, and standard input is none")

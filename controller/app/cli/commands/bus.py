@@ -67,9 +67,12 @@ def serve(
     """Serve simulated servos at a serial device, in real time, with a live table."""
     from snakewalk.drivers.clock import WallClock  # noqa: PLC0415  --help stays quick
     from snakewalk.drivers.priority import raised_priority  # noqa: PLC0415
-    from snakewalk.sim.serve.pty import PtyServer  # noqa: PLC0415
     from snakewalk.sim.sniff.trace import TraceWriter  # noqa: PLC0415
 
+    try:
+        from snakewalk.sim.serve.pty import PtyServer  # noqa: PLC0415
+    except ImportError:  # Windows
+        raise InputError("bus serve: pseudo-terminals are for Linux and macOS") from None
     if servos is not None and robot is not None:
         raise InputError("give --servos or --robot, not both")
     if imu is not None and robot is not None:
