@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from snakewalk.controller.repertoire.search import MotionPrimitives, Route
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent, OnProgress
 from snakewalk.drivers.types import BodyPose
+
+if TYPE_CHECKING:
+    from snakewalk.controller.app.view.watcher import Watcher
 
 
 @dataclass(frozen=True)
@@ -205,13 +209,14 @@ def run_route(
     on_progress: OnProgress = lambda progress: None,
     *,
     force: bool = False,
+    view: "Watcher | None" = None,
 ) -> RouteRun:
-    """Execute a plan on ``port``, or on the simulator where it is None.
+    """Execute a plan on ``port``, or on the simulator where it is None; ``view`` looks on.
 
     Raises:
         InputError: as ``execute``.
 
     """
-    finished = execute(job, folder, port, force=force, on_progress=on_progress)
+    finished = execute(job, folder, port, force=force, view=view, on_progress=on_progress)
     assert isinstance(finished.source, RouteMotion), "a repertoire run has no other motion"
     return RouteRun(job, finished, finished.source.follower)

@@ -121,3 +121,11 @@ def test_every_command_has_these_options() -> None:
     assert len(every) > 40
     wanted = {"-v", "--verbose", "-q", "--quiet", "--log-level", "--log-file"}
     assert {name for name, options in every.items() if not wanted <= options} == set()
+
+
+def test_every_command_that_moves_a_body_may_be_watched() -> None:
+    every = commands(typer.main.get_command(app))
+    movers = {name: options for name, options in every.items() if {"--port", "--film"} <= options}
+    assert {"snakewalk run", "snakewalk repertoire run", "snakewalk policy run"} <= set(movers)
+    wanted = {"--view", "--view-at", "--ros"}
+    assert {name for name, options in movers.items() if not wanted <= options} == set()

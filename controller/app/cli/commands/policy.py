@@ -21,6 +21,7 @@ from snakewalk.controller.app.cli.options import (
     GivenWorld,
     Json,
     Robot,
+    Ros,
     RunFolder,
     RunPort,
     Set,
@@ -84,6 +85,7 @@ def run_policy(
     shadow: Shadow = False,
     view: View = False,
     view_at: ViewAt = VIEW_AT,
+    ros: Ros = False,
     film: Film = True,
     out: RunFolder = None,
     force: Force = False,
@@ -91,26 +93,26 @@ def run_policy(
     as_json: Json = False,
 ) -> None:
     """Run a learnt policy on servos or in the simulator; leaves a log, a report and a film."""
+    from snakewalk.controller.app.cli.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.app.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.runs.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.app.runs.factory import prepare_policy  # noqa: PLC0415
-    from snakewalk.controller.app.view.live_view import open_view  # noqa: PLC0415
 
     keys = key_values("--set", set_)
     prepared = prepare_policy(name, robot=robot, world=world, seconds=seconds, seed=seed, keys=keys)
     run_name = prepared.run.name
     with ExitStack() as stack:
         folder = stack.enter_context(run_folder(f"policy-{run_name}-{prepared.robot.name}", out))
-        page = stack.enter_context(open_view(view, view_at))
+        watchers = stack.enter_context(watched(view, view_at, ros))
         bar = stack.enter_context(TimeBar(run_name, seconds))
         finished = execute(
             prepared,
             folder,
             port,
             force=force,
-            view=page,
+            view=watchers,
             shadow=shadow,
-            on_progress=in_real_time(bar.on_progress) if view and not port else bar.on_progress,
+            on_progress=in_real_time(bar.on_progress) if watchers and not port else bar.on_progress,
             on_event=bar.on_event,
         )
     result: dict[str, object] = {

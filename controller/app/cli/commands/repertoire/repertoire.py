@@ -10,12 +10,16 @@ from rich.table import Table
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import (
+    VIEW_AT,
     Film,
     Force,
     GivenRobot,
     Json,
+    Ros,
     RunFolder,
     RunPort,
+    View,
+    ViewAt,
     console,
     show,
     write_artifacts,
@@ -28,6 +32,7 @@ from snakewalk.controller.app.result_files import (
 )
 
 if TYPE_CHECKING:
+    from snakewalk.controller.app.cli.watchers import Watchers
     from snakewalk.controller.app.runs.repertoire_run import RepertoireRun
     from snakewalk.controller.repertoire.repertoire import Repertoire
 
@@ -106,6 +111,9 @@ def run_plan(
     open_loop: Annotated[
         bool, typer.Option("--open-loop", help="as planned, without looking where the body is")
     ] = False,
+    view: View = False,
+    view_at: ViewAt = VIEW_AT,
+    ros: Ros = False,
     film: Film = True,
     picture: Annotated[Path | None, typer.Option(help="draw predicted and measured way")] = None,
     out: RunFolder = None,
@@ -115,10 +123,12 @@ def run_plan(
     """Run a plan on servos or in the simulator, and compare predicted with measured poses."""
     refuse_to_overwrite([picture], force)
 
+    from snakewalk.controller.app.cli.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.app.studies.repertoire_planning import load_plan  # noqa: PLC0415  heavy
 
     job = load_plan(plan, replan=not open_loop)
-    found, complete = carry_out(job, port, out, film, picture, force)
+    with watched(view, view_at, ros) as watchers:
+        found, complete = carry_out(job, port, out, film, picture, force, watchers)
     show({"plan": str(plan), **found}, as_json)
     if not complete and not open_loop:
         raise SystemExit(1)
@@ -131,9 +141,10 @@ def carry_out(
     film: bool,
     picture: Path | None,
     force: bool,
+    watchers: "Watchers | None" = None,
 ) -> tuple[dict[str, object], bool]:
     """Execute a job with a bar; what it did, and whether it reached every waypoint."""
-    from snakewalk.controller.app.progress import TimeBar  # noqa: PLC0415
+    from snakewalk.controller.app.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.app.runs.repertoire_run import run_name, run_route  # noqa: PLC0415
 
     check_picture(picture)
@@ -141,7 +152,9 @@ def carry_out(
         run_folder(run_name(job), out) as folder,
         TimeBar(job.run.name, job.route.duration_s) as progress,
     ):
-        ran = run_route(job, folder, port, progress.on_progress, force=force)
+        paced = watchers is not None and port is None
+        on_progress = in_real_time(progress.on_progress) if paced else progress.on_progress
+        ran = run_route(job, folder, port, on_progress, force=force, view=watchers)
     finished = ran.finished
     artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     if picture is not None:
