@@ -128,10 +128,20 @@ class FaultPlayer:
         self._servos = line.servos
         self._start_s = line.clock.now_s()
         self._rows = {servo: row for row, servo in enumerate(line.ids())}
-        self._check(faults, source)
         self.noise = Noise(random.Random(faults.seed), self._start_s, line.senders)
         self.stalls: list[tuple[float, float]] = []
         """Pauses of the host: begin on the line's clock, and length, s."""
+        self._add(faults, source)
+        line.attach(self)
+
+    def add(self, faults: plan.FaultPlan, source: str = "faults") -> None:
+        """Let more faults happen, their times counted from now on; raises as the constructor."""
+        since_s = self._line.clock.now_s() - self._start_s
+        later = [each.model_copy(update={"at_s": each.at_s + since_s}) for each in faults.fault]
+        self._add(faults.model_copy(update={"fault": tuple(later)}), source)
+
+    def _add(self, faults: plan.FaultPlan, source: str) -> None:
+        self._check(faults, source)
         for fault in faults.fault:
             if isinstance(fault, plan.NoiseFault):
                 self.noise.add(fault)
@@ -140,7 +150,6 @@ class FaultPlayer:
             else:
                 self._schedule(fault)
         self.stalls.sort()
-        line.attach(self)
 
     def host_resumes_s(self, now_s: float) -> float:
         """Time at which a host that calls at ``now_s`` goes on."""

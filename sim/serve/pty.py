@@ -8,6 +8,7 @@ servos that have aged by a second between two bytes. A client that sets a baud r
 to it, so servos at another are silent; one that sets none is taken to have the line's.
 """
 
+import math
 import os
 import select
 import termios
@@ -33,6 +34,12 @@ _OUTPUT_SPEED = 5
 """Index of the output speed in the attributes of a terminal."""
 
 
+def _checked_pace(pace: float) -> float:
+    if not 0.0 < pace < math.inf:
+        raise InputError(f"pace {pace:g}: must be above 0; 1 is real time, 0.5 half as fast")
+    return pace
+
+
 class PtyServer:
     """Serves ``line`` at ``path`` from construction until ``close``; use it in a ``with``.
 
@@ -47,11 +54,9 @@ class PtyServer:
     def __init__(
         self, line: Wire, clock: Clock, *, pace: float = 1.0, link: Path | None = None
     ) -> None:
-        if not pace > 0.0:
-            raise InputError(f"pace {pace:g}: must be above 0; 1 is real time, 0.5 half as fast")
         self._line = line
         self._clock = clock
-        self._pace = pace
+        self._pace = _checked_pace(pace)
         self._link = link
         self._offset_s = line.clock.now_s() - clock.now_s() * pace
         self.missed_s = 0.0
@@ -84,6 +89,16 @@ class PtyServer:
         self.path = ""
         if self._link is not None and self._link.is_symlink():
             self._link.unlink()
+
+    def set_pace(self, pace: float) -> None:
+        """Let time on the line run at another factor from now on.
+
+        Raises:
+            InputError: it is not positive.
+
+        """
+        self._offset_s += self._clock.now_s() * (self._pace - _checked_pace(pace))
+        self._pace = pace
 
     def serve(self, stopped: Callable[[], bool]) -> None:
         """Serve until ``stopped()``, which is asked at least every ``IDLE_S``."""

@@ -5,7 +5,7 @@ What the registers *do* (drive the motor, show the shaft, run the watchdog) is i
 ``sim.servo.firmware``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -110,6 +110,11 @@ class ServoBank:
     def __contains__(self, name: object) -> bool:
         """Whether a servo has the register, and all that have it at the same address."""
         return name in self._columns
+
+    @property
+    def names(self) -> Iterable[str]:
+        """Registers that lie at the same place in all models that have them."""
+        return self._registers
 
     def register(self, name: str) -> Register:
         """Address, size and sign of a register, also of those that the SDK's table lacks."""

@@ -42,7 +42,7 @@ class BenchPlant:
         terms = Gearbox.columns([each or bare for each in gears])
         self._gear = np.array([getattr(terms, each.name) for each in fields(Gearbox)])
         self._gear[0] += inertia_kg_m2
-        self._no_load = np.zeros(joints)
+        self._constant_load = np.zeros(joints)
         self._load = load_n_m
         self._position = np.full(joints, start_rad, dtype=np.float64)
         self._velocity = np.zeros(joints)
@@ -62,11 +62,15 @@ class BenchPlant:
         """(J,) shaft speeds; a live view."""
         return self._velocity
 
+    def set_load(self, joints: Sequence[int], load_n_m: float) -> None:
+        """Put a constant load on shafts, from the present time on; where none is a function."""
+        self._constant_load[list(joints)] = load_n_m
+
     def advance(self, until_s: float, drive: ServoDrive) -> None:
         """Step to the last whole step at or before ``until_s``."""
         last = int(np.floor(until_s / self._step_s + 1e-9))
         while self._steps < last:
-            steps, load_n_m = last - self._steps, self._no_load
+            steps, load_n_m = last - self._steps, self._constant_load
             if self._load is not None:  # it may change with every step
                 steps, load_n_m = 1, np.asarray(self._load(self._position), dtype=np.float64)
             shafts = (load_n_m, self._gear, self._position, self._velocity)

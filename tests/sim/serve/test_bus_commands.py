@@ -10,6 +10,7 @@ import dynamixel_sdk as sdk
 import numpy as np
 import pytest
 
+from snakewalk.config.errors import InputError
 from snakewalk.config.robot import ImuConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.imu_reader import ImuReader
@@ -104,6 +105,32 @@ def test_pace_stretches_time() -> None:
     with PtyServer(line, clock, pace=0.25) as server:
         serve_for(server, clock, 2.0)
     assert line.clock.now_s() - start_s == pytest.approx(0.5)
+
+
+def test_pace_changes_while_it_serves() -> None:
+    clock, line = SimClock(), a_line(1)
+    start_s = line.clock.now_s()
+    with PtyServer(line, clock) as server:
+        serve_for(server, clock, 1.0)
+        server.set_pace(0.25)
+        server.step(0.0)
+        assert line.clock.now_s() - start_s == pytest.approx(1.0)
+        serve_for(server, clock, 2.0)
+        with pytest.raises(InputError, match="must be above 0"):
+            server.set_pace(0.0)
+    assert line.clock.now_s() - start_s == pytest.approx(1.5)
+
+
+def test_a_console_reads_lines_from_a_pipe(monkeypatch: pytest.MonkeyPatch) -> None:
+    hears, says = os.pipe()
+    os.write(says, b"get 1 Present Position\n\nset 1 LED 1\nquit\n")
+    with os.fdopen(hears) as typed:
+        monkeypatch.setattr("sys.stdin", typed)
+        done = snakewalk("bus", "serve", "--servos", "1", "--console")
+    os.close(says)
+    assert done.stdout.splitlines()[2:] == ["1: 2048", "LED = 1 at 1 servo"]
+    assert snakewalk("bus", "serve", "--servos", "1", "--console", "--json").returncode == 2
+    assert snakewalk("bus", "serve", "--servos", "1:AX-12A", "--console").returncode == 2
 
 
 def test_time_that_the_server_missed_is_left_out() -> None:

@@ -4,6 +4,8 @@
 """
 
 import json
+import os
+import select
 import signal
 import sys
 from functools import partial
@@ -25,9 +27,11 @@ if TYPE_CHECKING:
     from snakewalk.controller.app.cli.live_table import MakeDecoder
     from snakewalk.controller.app.service.servo_settings import SettingChange
     from snakewalk.drivers.clock import Clock
+    from snakewalk.sim.faults.fault_player import FaultPlayer
     from snakewalk.sim.line.sim_line import SimLine
     from snakewalk.sim.line.wire import Wire
     from snakewalk.sim.serve.chain_spec import ChainSpec
+    from snakewalk.sim.serve.console import Console
     from snakewalk.sim.serve.live_table import LiveTable
     from snakewalk.sim.serve.pty import PtyServer
 
@@ -61,6 +65,12 @@ def serve(
     link: Annotated[Path | None, typer.Option(help="symbolic link that leads to the port")] = None,
     record: Annotated[Path | None, typer.Option(help="write the exchange here, JSON lines")] = None,
     for_s: Annotated[float | None, typer.Option("--for", help="seconds; default: until ^C")] = None,
+    with_console: Annotated[
+        bool,
+        typer.Option(
+            "--console", help="read set, get, load, fault, pace, quit from standard input"
+        ),
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -81,7 +91,10 @@ def serve(
         raise InputError(f"--latency {latency:g}: must not be negative")
     refuse_to_overwrite([record], force)
     refuse_to_overwrite([link], force=True)
-    what, line, traffic, make_decoder = _simulated(servos, robot, imu, baud, faults)
+    what, line, traffic, make_decoder, player = _simulated(servos, robot, imu, baud, faults)
+    console = None
+    if with_console:
+        console = _console(line, player, as_json)
     line.usb_latency_s = latency * 1e-3
     line.taps.append(traffic)
     clock = WallClock()
@@ -93,7 +106,10 @@ def serve(
         _announce(server, what, line, as_json)
         try:
             ended = lambda: for_s is not None and clock.now_s() >= for_s  # noqa: E731
-            _run(server, traffic, make_decoder, clock, ended, as_json)
+            if console is not None:
+                _converse(server, console, ended)
+            else:
+                _run(server, traffic, make_decoder, clock, ended, as_json)
         except KeyboardInterrupt:
             print(file=sys.stderr)
         finally:
@@ -163,8 +179,11 @@ def _simulated(
     imu: str | None,
     baud: int | None,
     faults: Path | None,
-) -> tuple["ChainSpec", "Wire", "LiveTable", "MakeDecoder"]:
-    """What is served, its line, who looks at it, and what puts its packets into words."""
+) -> "tuple[ChainSpec, Wire, LiveTable, MakeDecoder, FaultPlayer | None]":
+    """What is served, its line, who looks at it, what puts its packets into words, its faults.
+
+    The last is None of servos of Protocol 1.0 that nothing is to go wrong with.
+    """
     from snakewalk.config.faults import FaultPlan  # noqa: PLC0415
     from snakewalk.config.loader import load  # noqa: PLC0415
     from snakewalk.sim.ax12.decode import Decoder1  # noqa: PLC0415
@@ -181,12 +200,14 @@ def _simulated(
     else:
         line = _robot_line(robot, baud)
         spec = ChainSpec(line.bank.ids, line.bank.models)
+    player = None
     if faults is not None:
-        FaultPlayer(line, load(faults, FaultPlan), str(faults))
+        player = FaultPlayer(line, load(faults, FaultPlan), str(faults))
     if isinstance(line, Ax12Line):
-        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), Decoder1
+        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), Decoder1, None
     models = dict(zip(spec.ids, spec.models, strict=True))
-    return spec, line, LiveTable(lambda: servo_rows(line)), partial(Decoder, spec.kinds[0], models)
+    decoder = partial(Decoder, spec.kinds[0], models)
+    return spec, line, LiveTable(lambda: servo_rows(line)), decoder, player
 
 
 def _robot_line(name: str, baud: int | None) -> "SimLine":
@@ -258,6 +279,36 @@ def _run(
                 if server.missed_s >= REFRESH_S:
                     counts += f"; {server.missed_s:.1f} s left out, this machine is too slow"
                 screen.show(Snapshot(counts, traffic.registers(), traffic.take_recent()))
+
+
+def _console(line: "Wire", player: "FaultPlayer | None", as_json: bool) -> "Console":
+    from snakewalk.config.faults import FaultPlan  # noqa: PLC0415  --help stays quick
+    from snakewalk.sim.faults.fault_player import FaultPlayer  # noqa: PLC0415
+    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
+    from snakewalk.sim.serve.console import Console  # noqa: PLC0415
+
+    if as_json:
+        raise InputError("--console: is a person's; leave --json out")
+    if not isinstance(line, SimLine):
+        raise InputError("--console: servos of Protocol 2.0 have one")
+    return Console(line, player or FaultPlayer(line, FaultPlan()))
+
+
+def _converse(server: "PtyServer", console: "Console", stopped: "Callable[[], bool]") -> None:
+    """Serve, and execute the lines of standard input; its end leaves the servos served."""
+    console.set_pace, heard, unread = server.set_pace, sys.stdin.fileno(), ""
+    listening = True
+    while not stopped():
+        server.step(STEP_S)
+        if not listening or not select.select([heard], [], [], 0.0)[0]:
+            continue
+        more = os.read(heard, 4096).decode(errors="replace")
+        listening = bool(more)
+        *lines, unread = (unread + more).split("\n")
+        for text in filter(str.strip, lines):
+            if text.strip() == "quit":
+                return
+            print(console.execute(text), flush=True)
 
 
 def bus_set(

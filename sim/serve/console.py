@@ -1,0 +1,120 @@
+"""A console of simulated servos: registers, loads, faults and the pace, changed while they run."""
+
+import json
+from collections.abc import Callable
+from typing import Final
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.faults import FaultPlan
+from snakewalk.config.loader import checked
+from snakewalk.drivers.errors import ControlTableError
+from snakewalk.drivers.port.port_map import id_range
+from snakewalk.sim.faults.fault_player import FaultPlayer
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.servo.bench import BenchPlant
+
+HELP: Final = """\
+set IDS REGISTER VALUE    set 3 Homing Offset 100; IDS: 3, 1-4, 1,3,5-8 or all
+get IDS REGISTER          get all Present Position
+load IDS NM               a constant torque on shafts of a bench, N m: load 2 -0.4
+fault KIND KEY=VALUE ...  as in a fault file, from now on: fault mute ids=[3] for_s=2
+pace FACTOR               simulated seconds a second
+quit"""
+_MEASURED: Final = ("Present ", "Realtime Tick", "Moving", "Model Number", "Firmware Version")
+
+
+class Console:
+    """Executes lines that a person types."""
+
+    def __init__(self, line: SimLine, faults: FaultPlayer) -> None:
+        self._line, self._faults = line, faults
+        self.set_pace: Callable[[float], None] | None = None
+        """Takes a new factor of time; None while nobody serves the line in real time."""
+        self._commands: dict[str, Callable[[list[str]], str]] = {
+            "set": self._set,
+            "get": self._get,
+            "load": self._load,
+            "fault": self._fault,
+            "pace": self._change_pace,
+            "help": lambda words: HELP,
+        }
+
+    def execute(self, text: str) -> str:
+        """Do what a line says; returns what became of it, also where it cannot be done."""
+        word, *rest = text.split() or ["help"]
+        do = self._commands.get(word)
+        if do is None:
+            return f"{word}: no such command\n{HELP}"
+        self._line.settle()
+        try:
+            return do(rest)
+        except (InputError, ControlTableError) as error:
+            return str(error)
+        except (ValueError, IndexError):
+            usage = next(each for each in HELP.splitlines() if each.startswith(word))
+            return f"write {usage}"
+
+    def _rows(self, text: str) -> list[int]:
+        there = {servo_id: row for row, servo_id in enumerate(self._line.ids())}
+        if text == "all":
+            return list(there.values())
+        asked = [each for piece in text.split(",") for each in id_range(piece, "IDS", "write 1-4")]
+        missing = [str(each) for each in asked if each not in there]
+        if missing:
+            raise InputError(f"no servo has ID {', '.join(missing)}")
+        return [there[each] for each in asked]
+
+    def _register(self, words: list[str], rows: list[int]) -> str:
+        name, bank = " ".join(words), self._line.bank
+        known = {each.lower(): each for each in bank.names}
+        found = known.get(name.lower())
+        if found is None or not all(bank.has(row, found) for row in rows):
+            raise InputError(f"{name or 'REGISTER'}: no register of all these servos")
+        return found
+
+    def _set(self, words: list[str]) -> str:
+        if len(words) < 3:
+            raise ValueError
+        rows, value = self._rows(words[0]), int(words[-1], 0)
+        name, bank = self._register(words[1:-1], rows), self._line.bank
+        if name.startswith(_MEASURED):
+            raise InputError(f"{name}: is measured, not set; see load and fault")
+        register = bank.register(name)
+        data = register.encode(value)
+        for row in rows:
+            bank.table[row, register.address : register.address + register.size] = list(data)
+        bank.indirect.refresh()
+        self._line.firmware.apply_registers()
+        self._line.refresh_ids()
+        return f"{name} = {value} at {len(rows)} servo{'s' if len(rows) > 1 else ''}"
+
+    def _get(self, words: list[str]) -> str:
+        rows = self._rows(words[0])
+        name = self._register(words[1:], rows)
+        values, ids = self._line.shown(name), self._line.ids()
+        return "  ".join(f"{ids[row]}: {values[row]}" for row in rows)
+
+    def _load(self, words: list[str]) -> str:
+        plant = self._line.firmware.plant
+        if not isinstance(plant, BenchPlant):
+            raise InputError("load: only shafts of a bench (--servos) have one; a robot has ground")
+        rows, load_n_m = self._rows(words[0]), float(words[1])
+        plant.set_load(rows, load_n_m)
+        return f"{load_n_m:g} N m on {len(rows)} shaft{'s' if len(rows) > 1 else ''}"
+
+    def _fault(self, words: list[str]) -> str:
+        table: dict[str, object] = {"kind": words[0]}
+        for word in words[1:]:
+            key, equals, value = word.partition("=")
+            if not equals:
+                raise ValueError
+            table[key] = json.loads(value)
+        plan = checked(FaultPlan, {"fault": [table]}, "fault")
+        self._faults.add(plan)
+        return f"{words[0]}: from now on"
+
+    def _change_pace(self, words: list[str]) -> str:
+        if self.set_pace is None:
+            raise InputError("pace: nobody serves this line in real time")
+        self.set_pace(float(words[0]))
+        return f"pace {float(words[0]):g}"
