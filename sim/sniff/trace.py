@@ -22,6 +22,32 @@ class TraceWriter:
         )
 
 
+def read_exchange(path: Path) -> Iterator[tuple[float, bool, bytes]]:
+    """(time in s, whether the host sent it, bytes) of what ``TraceWriter`` wrote.
+
+    Raises:
+        InputError: the file is missing, or is something else, with the line that is wrong.
+
+    """
+    try:
+        text = path.read_text(encoding="ascii")
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is no exchange of bus serve --record") from None
+    for number, line in enumerate(text.splitlines(), 1):
+        try:
+            entry = json.loads(line)
+            time_s, side, data = float(entry["t"]), entry["from"], bytes.fromhex(entry["hex"])
+        except (ValueError, KeyError, TypeError):
+            raise InputError(
+                f"{path}: line {number}: no packet as bus serve --record writes it"
+            ) from None
+        if side not in {"host", "servo"}:
+            raise InputError(f"{path}: line {number}: from is {side!r}; host or servo")
+        yield time_s, side == "host", data
+
+
 def read_trace(path: Path) -> Iterator[tuple[float, bytes]]:
     """(time in s, bytes) of a recording; hex text and raw bytes have no times: 0.
 

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from snakewalk.sim.serve.live_table import LiveTable
     from snakewalk.sim.serve.pty import PtyServer
 
+    Served = tuple[ChainSpec, Wire, LiveTable, MakeDecoder, FaultPlayer | None]
+
 REFRESH_S = 0.25
 """Time between two drawings of the live table."""
 STEP_S = 0.02
@@ -64,6 +66,10 @@ def serve(
     latency: Annotated[float, typer.Option(help="of the USB adapter, ms")] = 0.0,
     link: Annotated[Path | None, typer.Option(help="symbolic link that leads to the port")] = None,
     record: Annotated[Path | None, typer.Option(help="write the exchange here, JSON lines")] = None,
+    play: Annotated[
+        Path | None,
+        typer.Option(help="give the replies of an exchange that --record wrote, instead of servos"),
+    ] = None,
     for_s: Annotated[float | None, typer.Option("--for", help="seconds; default: until ^C")] = None,
     with_console: Annotated[
         bool,
@@ -83,15 +89,19 @@ def serve(
         from snakewalk.sim.serve.pty import PtyServer  # noqa: PLC0415
     except ImportError:  # Windows
         raise InputError("bus serve: pseudo-terminals are for Linux and macOS") from None
-    if servos is not None and robot is not None:
-        raise InputError("give --servos or --robot, not both")
+    if sum(each is not None for each in (servos, robot, play)) > 1:
+        raise InputError("give one of --servos, --robot and --play")
+    if play is not None and (imu is not None or faults is not None):
+        raise InputError("--play: has what was recorded; leave --imu and --faults out")
     if imu is not None and robot is not None:
         raise InputError("--imu: with --robot, its file says it: table [imu]")
     if latency < 0.0:
         raise InputError(f"--latency {latency:g}: must not be negative")
     refuse_to_overwrite([record], force)
     refuse_to_overwrite([link], force=True)
-    what, line, traffic, make_decoder, player = _simulated(servos, robot, imu, baud, faults)
+    what, line, traffic, make_decoder, player = _served(
+        play, baud, partial(_simulated, servos, robot, imu, baud, faults)
+    )
     console = None
     if with_console:
         console = _console(line, player, as_json)
@@ -173,17 +183,28 @@ def sniff(
         raise InputError(f"{source}: holds {what}; --model AX-12A reads Protocol 1.0")
 
 
+def _served(play: Path | None, baud: int | None, simulated: "Callable[[], Served]") -> "Served":
+    """What is served, its line, who looks at it, what puts its packets into words, its faults."""
+    if play is None:
+        return simulated()
+    from snakewalk.sim.serve.chain_spec import ChainSpec  # noqa: PLC0415  --help stays quick
+    from snakewalk.sim.serve.live_table import LiveTable  # noqa: PLC0415
+    from snakewalk.sim.serve.recorded_line import RecordedLine  # noqa: PLC0415
+    from snakewalk.sim.sniff.decode import Decoder  # noqa: PLC0415
+
+    line = RecordedLine.of(play, baud or 1_000_000)
+    spec = ChainSpec(tuple(line.ids), (f"recording {play}",) * len(line.ids))
+    return spec, line, LiveTable(list), Decoder, None
+
+
 def _simulated(
     servos: str | None,
     robot: str | None,
     imu: str | None,
     baud: int | None,
     faults: Path | None,
-) -> "tuple[ChainSpec, Wire, LiveTable, MakeDecoder, FaultPlayer | None]":
-    """What is served, its line, who looks at it, what puts its packets into words, its faults.
-
-    The last is None of servos of Protocol 1.0 that nothing is to go wrong with.
-    """
+) -> "Served":
+    """Simulated servos, as ``_served`` has them."""
     from snakewalk.config.faults import FaultPlan  # noqa: PLC0415
     from snakewalk.config.loader import load  # noqa: PLC0415
     from snakewalk.sim.ax12.decode import Decoder1  # noqa: PLC0415

@@ -1,0 +1,112 @@
+"""A recorded exchange as a device: a line that gives the replies which it once heard."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from snakewalk.config.errors import InputError
+from snakewalk.drivers.protocol.packet import BITS_PER_BYTE, BROADCAST_ID, HEADER, Instruction
+from snakewalk.sim.line.bus_contention import Reply
+from snakewalk.sim.line.clock import SimClock
+from snakewalk.sim.line.wire import Wire
+from snakewalk.sim.sniff.trace import read_exchange
+
+_ID_AT, _CODE_AT, _ADDRESS = 4, 7, slice(8, 10)
+_WRITES: Final = (Instruction.WRITE, Instruction.REG_WRITE)
+
+
+@dataclass(slots=True)
+class Exchange:
+    """A packet of the host, and what came back."""
+
+    question: bytes
+    replies: list[Reply] = field(default_factory=list)
+
+
+class RecordedLine(Wire):
+    """A line on which nobody is: it answers a packet as the recording does.
+
+    Packets are looked for from the last one that was found on, and then from the beginning, so that
+    a client that goes through the recording gets its replies in order. Of a write only servo and
+    address are compared: a client that writes other values gets the reply of the recorded ones. To
+    what the recording does not have there is no reply.
+    """
+
+    def __init__(self, exchanges: Sequence[Exchange], baud: int = 1_000_000) -> None:
+        super().__init__(SimClock())
+        self._exchanges = tuple(exchanges)
+        self._at = 0
+        self.unknown = 0
+        """Packets that the recording does not have."""
+        self.setBaudRate(baud)
+
+    @staticmethod
+    def of(path: Path, baud: int = 1_000_000) -> "RecordedLine":
+        """Line of a recording of ``bus serve --record``, whose servos were at ``baud``.
+
+        Raises:
+            InputError: it is no such recording, or no host sends anything in it.
+
+        """
+        byte_s = BITS_PER_BYTE / baud
+        found: list[Exchange] = []
+        quiet_s = 0.0
+        for time_s, from_host, data in read_exchange(path):
+            if from_host:
+                found.append(Exchange(data))
+            elif found:  # what comes first answers nobody
+                begin_s = time_s - len(data) * byte_s
+                found[-1].replies.append(Reply(max(begin_s - quiet_s, 0.0), data))
+            quiet_s = time_s
+        if not found:
+            raise InputError(f"{path}: no host sends anything in it")
+        return RecordedLine(found, baud)
+
+    @property
+    def ids(self) -> list[int]:
+        """Servos that answer in the recording."""
+        told = {reply.data[_ID_AT] for each in self._exchanges for reply in each.replies}
+        return sorted(told - {BROADCAST_ID})  # of a fast read: all that were asked
+
+    # the wire
+
+    def _advance(self, until_s: float) -> None:
+        """Nothing moves."""
+
+    def _reset_parser(self) -> None:
+        """Packets are compared whole."""
+
+    def _on_baud_change(self, baud: int) -> None:
+        """Whoever asks is answered, at any rate."""
+
+    def _execute(self, data: bytes, end_s: float) -> list[Reply]:
+        for alike in (_same, _same_write):
+            for k in range(len(self._exchanges)):
+                at = (self._at + k) % len(self._exchanges)
+                if alike(self._exchanges[at].question, data):
+                    self._at = at + 1
+                    return list(self._exchanges[at].replies)
+        self.unknown += 1
+        return []
+
+    def _split(self, data: bytes) -> Sequence[bytes]:
+        starts = [at for at in range(len(data)) if data.startswith(HEADER, at)] or [0]
+        ends = [*starts[1:], len(data)]
+        return [data[start:end] for start, end in zip(starts, ends, strict=True)]
+
+
+def _same(recorded: bytes, data: bytes) -> bool:
+    return recorded == data
+
+
+def _same_write(recorded: bytes, data: bytes) -> bool:
+    """Whether both write to one place of one servo."""
+    return _place(recorded) == _place(data) is not None
+
+
+def _place(data: bytes) -> bytes | None:
+    """ID, instruction and address of a write; None of anything else."""
+    if len(data) < _ADDRESS.stop or data[_CODE_AT] not in _WRITES:
+        return None
+    return bytes([data[_ID_AT], data[_CODE_AT]]) + data[_ADDRESS]
