@@ -33,9 +33,9 @@ class FlatTable:
 
 def flat_tables(record: RunRecord) -> list[FlatTable]:
     """Make a table of each channel that has rows; joints and links are counted from the head."""
-    cycle, slow, pose, walk, qpos, imu = (
-        *(record.cycle, record.slow, record.pose),
-        *(record.walk, record.qpos, record.imu),
+    cycle, slow, pose, walk, qpos, imu, shadow = (
+        *(record.cycle, record.slow, record.pose, record.walk),
+        *(record.qpos, record.imu, record.shadow),
     )
     tables = [
         FlatTable(
@@ -117,7 +117,16 @@ def flat_tables(record: RunRecord) -> list[FlatTable]:
                 "age_s": imu.age_s,
             },
         ),
+        FlatTable(
+            "shadow",
+            {
+                "time_s": shadow.time_s,
+                **_per_joint("position", "rad", shadow.position_rad),
+                **_per_joint("current", "a", shadow.current_a),
+            },
+        ),
         _paths(record),
+        _waypoints(record),
         FlatTable(
             "event",
             {
@@ -177,6 +186,19 @@ def _paths(record: RunRecord) -> FlatTable:
     times = [np.full(len(points), time_s) for time_s, points in record.paths]
     points = np.concatenate([_with_height(points) for _, points in record.paths])
     return FlatTable("path", {"time_s": np.concatenate(times), **_vector("point", points)})
+
+
+def _waypoints(record: RunRecord) -> FlatTable:
+    """All waypoints, from 1, of each time from which others were in force."""
+    counts = [len(points) for _, points in record.waypoints]
+    points = np.concatenate([points for _, points in record.waypoints])
+    columns: dict[str, Cells] = {
+        "time_s": np.repeat([time_s for time_s, _ in record.waypoints], counts),
+        "number": np.concatenate([np.arange(1, count + 1) for count in counts]),
+        "point_x_m": points[:, 0],
+        "point_y_m": points[:, 1],
+    }
+    return FlatTable("waypoints", columns)
 
 
 def _with_height(points_m: NDArray[Any]) -> NDArray[Any]:

@@ -76,7 +76,9 @@ def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:
 
 
 def _rows(record: RunRecord) -> Iterator[Row]:
-    yield 0.0, "/scene", _scene([*_body(record), _ground(record), _waypoints(record)])
+    yield 0.0, "/scene", _scene([*_body(record), _ground(record)])
+    for time_s, points_m in record.waypoints:
+        yield time_s, "/scene", _scene([_waypoints(record, time_s, points_m)])
     for time_s, points_m in record.paths:
         yield time_s, "/scene", _scene([_path(record, time_s, points_m)])
     yield from _frames(record)
@@ -208,18 +210,17 @@ def _drawn_ground(record: RunRecord) -> HeightField:
     return HeightField(np.zeros((2, 2)), size_m, float(low[0]), float(low[1]))
 
 
-def _waypoints(record: RunRecord) -> Json:
-    plan = record.header.plan
-    size_m = 2.0 * (number(plan.waypoint_radius_m) or 0.0)
+def _waypoints(record: RunRecord, time_s: float, points_m: Floats) -> Json:
+    size_m = 2.0 * (number(record.header.plan.waypoint_radius_m) or 0.0)
     spheres = [
         {
             "pose": _pose(at, _UPRIGHT),
             "size": _xyz([size_m, size_m, size_m]),
             "color": _color(_WAYPOINT),
         }
-        for at in floats(_on_ground(record, plan.waypoints_m))
+        for at in floats(_on_ground(record, points_m))
     ]
-    return _entity("waypoints", 0.0, spheres=spheres)
+    return _entity("waypoints", time_s, spheres=spheres)
 
 
 def _path(record: RunRecord, time_s: float, points_m: Floats) -> Json:

@@ -68,6 +68,8 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
             angles[15] = 0.0
             body = body_in_world(robot, BodyPose(time_s, head, turn), angles)
             file.pose(time_s, head, turn, links_m=body.link_m, centre_m=body.centre_m)
+            file.shadow(time_s, angles / 2.0, angles / 5.0)
+        file.waypoints_changed(0.2, [[2.0, 1.0], [0.0, 3.0]])
         file.path_replanned(0.2, [[0.0, 1.0, 0.5], [2.0, 2.0, 0.4]])
         file.event(0.38, "trip", "joint 7: current", level="error")
     return path

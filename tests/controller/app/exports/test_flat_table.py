@@ -11,7 +11,7 @@ from snakewalk.controller.runlog.record import RunRecord
 
 UNITS = ("_rad", "_rad_s", "_a", "_s", "_m", "_m_s", "_c", "_v", "_j")
 UNITLESS = {
-    *("verdict", "reason", "joints", "target", "level", "kind", "text"),
+    *("verdict", "reason", "joints", "target", "level", "kind", "text", "number"),
     *(f"rotation_{i}{j}" for i in range(3) for j in range(3)),
 }
 
@@ -50,7 +50,8 @@ def test_parquet_gives_every_number_back(record: RunRecord, tmp_path: Path) -> N
 
 def test_units_stand_in_the_names(record: RunRecord) -> None:
     tables = {table.name: table for table in flat_tables(record)}
-    assert set(tables) == {"cycle", "slow", "pose", "imu", "path", "event"}
+    names = {"cycle", "slow", "pose", "imu", "shadow", "path", "waypoints", "event"}
+    assert set(tables) == names
     columns = [name for table in tables.values() for name in table.columns]
     flags = [f"{of}_joint{k}" for of in ("valid", "error", "hardware_error") for k in range(16)]
     assert {c for c in columns if not c.endswith(UNITS)} == UNITLESS | set(flags)
@@ -63,3 +64,10 @@ def test_units_stand_in_the_names(record: RunRecord) -> None:
     path = tables["path"].columns
     np.testing.assert_array_equal(path["time_s"], [0.0, 0.0, 0.2, 0.2])
     np.testing.assert_array_equal(path["point_z_m"], [np.nan, np.nan, 0.5, 0.4])
+    waypoints = tables["waypoints"].columns
+    np.testing.assert_array_equal(waypoints["time_s"], [0.0, 0.2, 0.2])
+    np.testing.assert_array_equal(waypoints["number"], [1, 1, 2])
+    np.testing.assert_array_equal(waypoints["point_y_m"], [1.0, 1.0, 3.0])
+    np.testing.assert_array_equal(
+        tables["shadow"].columns["current_joint4_a"], record.shadow.current_a[:, 4]
+    )

@@ -125,9 +125,11 @@ def test_joints_path_and_events(messages: Messages, record: RunRecord) -> None:
     joints = messages["/joint_states"][5]["joints"]
     assert "position" not in joints[15]  # never read: left out, not zero
     assert joints[2]["position"] == pytest.approx(record.cycle.measured_rad[5, 2], abs=1e-6)
-    paths = [e for m in messages["/scene"][1:] for e in m["entities"]]
-    assert [e["id"] for e in paths] == ["path", "path"]  # the second takes the first one's place
-    assert [e["timestamp"]["nsec"] for e in paths] == [0, 200_000_000]
+    later = [e for m in messages["/scene"][1:] for e in m["entities"]]
+    for kind in ("path", "waypoints"):  # the second takes the first one's place
+        found = [e for e in later if e["id"] == kind]
+        assert [e["timestamp"]["nsec"] for e in found] == [0, 200_000_000]
+    assert [len(e["spheres"]) for e in found] == [1, 2]
     assert [(m["level"], m["message"]) for m in messages["/log"]] == [
         (2, 'start: torque on; "quoted", ünïcode'),
         (4, "trip: joint 7: current"),
