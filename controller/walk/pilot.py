@@ -295,8 +295,8 @@ class Pilot(OnCourse):
         offset, head_m, centre_m = self._measured(view)
         if self._start is None:
             self._start = (head_m, offset)
-        if self._aim_at_waypoint:
-            waypoints_m = self.course.waypoints_m
+        waypoints_m = self.course.waypoints_m
+        if self._aim_at_waypoint and len(waypoints_m):
             target = waypoints_m[min(self.reached, len(waypoints_m) - 1)]
             return offset, float(np.arctan2(*(target - centre_m)[::-1]))
         if not self._feedback:

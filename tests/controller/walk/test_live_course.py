@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.runs.factory import prepare_walk
+from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.motion.path_progress import OpenWaypoints, PathProgress
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.course import Course, OnCourse
@@ -146,3 +148,22 @@ def test_a_run_takes_so_many_waypoints_and_no_more() -> None:
 
 def test_it_tells_of_its_path_what_the_motion_does() -> None:
     assert isinstance(Live().motion, PathProgress)
+
+
+@pytest.mark.parametrize("motion", ["serpenoid", "walk-printed"])
+def test_a_walk_without_waypoints_rests_and_goes_on_to_another(motion: str) -> None:
+    prepared = prepare_walk("flat-slalom", motion=motion)
+    pilot, robot = prepared.pilot(level=True), prepared.robot
+    view = body_in_world(robot, pose_at(np.zeros(2), 0.0), np.zeros(robot.joint_count))
+    pulses_m_s = []
+    for left_m in (None, np.zeros((0, 2)), np.array([(2.0, 1.0)])):
+        if left_m is not None:
+            pilot.course.lead_to(left_m, lambda: 0.0)
+            assert np.isfinite(pilot.path_pose(view).aim_rad)
+        for _ in range(100):
+            pilot.step(0.02, view)
+            pulses_m_s.append(pilot.pulse_m_s)
+        assert pilot.done == (left_m is not None and not len(left_m))
+    assert pulses_m_s[99] == pytest.approx(pulses_m_s[-1], rel=0.1)
+    assert pulses_m_s[199] == 0.0
+    assert np.abs(np.diff(pulses_m_s)).max() < 0.05 * max(pulses_m_s)
