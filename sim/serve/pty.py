@@ -8,9 +8,11 @@ servos that have aged by a second between two bytes. A client that sets a baud r
 to it, so servos at another are silent; one that sets none is taken to have the line's.
 """
 
+import fcntl
 import math
 import os
 import select
+import struct
 import termios
 import tty
 from collections.abc import Callable
@@ -65,6 +67,8 @@ class PtyServer:
         self._speed = 0
         self.overrun_bytes = 0
         """Bytes lost because the client did not read them."""
+        self.output_flushes = 0
+        """How often the client threw away what the kernel had not handed over yet."""
         self.path = ""
         """The device to open as a serial port; empty while the port has vanished."""
         self._open()
@@ -122,7 +126,11 @@ class PtyServer:
             return
         if ready:
             self._follow_baud_rate()
-            line.write(os.read(self._master, CHUNK_BYTES))
+            received = os.read(self._master, CHUNK_BYTES)
+            if received[0] == termios.TIOCPKT_DATA:
+                line.write(received[1:])
+            elif received[0] & termios.TIOCPKT_FLUSHWRITE:
+                self.output_flushes += 1
             line.settle()
         arrived = line.read_until(CHUNK_BYTES, line.clock.now_s())
         if arrived:
@@ -149,6 +157,7 @@ class PtyServer:
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)  # no echo; held open so that clients may come and go
         os.set_blocking(self._master, False)
+        fcntl.ioctl(self._master, termios.TIOCPKT, struct.pack("i", 1))  # tells flushes, too
         self.path = os.ttyname(self._slave)
         self._speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
         link = self._link

@@ -2,7 +2,9 @@
 
 import json
 import os
+import re
 import signal
+import termios
 from collections.abc import Callable
 from pathlib import Path
 
@@ -46,7 +48,7 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
         process.send_signal(signal.SIGINT)
         out, _ = process.communicate()
     done = json.loads(out)
-    assert done["answers"] == 1
+    assert (done["answers"], done["output_flushes"]) == (1, 0)
     assert not link.exists()
     sniffed = snakewalk("bus", "sniff", str(record), "--json")
     assert sniffed.returncode == 0, sniffed.stderr
@@ -160,6 +162,22 @@ def test_the_fixture_takes_faults(servo_bus: Callable[..., ServoBus], tmp_path: 
     bus.line.clock.advance(0.01)
     assert handler.ping(bus.line, 1)[1] == sdk.COMM_SUCCESS
     assert handler.ping(bus.line, 2)[1] == sdk.COMM_RX_TIMEOUT
+
+
+def test_serve_tells_of_a_client_that_flushes_its_output() -> None:
+    with command("bus", "serve", "--servos", "1") as process:
+        line = process.stdout.readline() or process.stderr.readline()
+        found = re.search(r"/dev/\S+", line)
+        assert found is not None, line
+        client = os.open(found[0], os.O_RDWR | os.O_NOCTTY)
+        for _ in range(3):
+            termios.tcflush(client, termios.TCIOFLUSH)
+            os.write(client, PING)
+            os.read(client, 1)  # the answer: the server has seen the flush
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate()
+        os.close(client)
+    assert "a client flushed its output 3 times: what it had sent less than 5 ms before" in said
 
 
 def test_serve_speaks_protocol_1_for_an_ax12() -> None:

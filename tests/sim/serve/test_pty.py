@@ -2,6 +2,7 @@
 
 import os
 import select
+import termios
 import threading
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,27 @@ def test_answers_come_when_their_bytes_are_due() -> None:
             clock.advance(1e-3)
             server.step(0.0)
             assert len(os.read(client, 99)) == 9
+        finally:
+            os.close(client)
+
+
+def test_a_client_that_flushes_its_output_is_told_of() -> None:
+    clock = SimClock()
+    with PtyServer(a_line(1), clock) as server:
+        client = os.open(server.path, os.O_RDWR | os.O_NOCTTY)
+        try:
+            os.write(client, PING)
+            termios.tcdrain(client)
+            server.step(0.0)
+            assert server.output_flushes == 0
+            for _ in range(2):
+                termios.tcflush(client, termios.TCOFLUSH)
+                server.step(0.0)
+            assert server.output_flushes == 2
+            os.write(client, PING)
+            while not select.select([client], [], [], 0.0)[0]:
+                clock.advance(1e-3)
+                server.step(0.0)
         finally:
             os.close(client)
 

@@ -126,14 +126,30 @@ def serve(
             if out is not None:
                 out.close()
         late_share = server.missed_s / max(clock.now_s() * pace, 1e-9)
-        if late_share > LATE_SHARE and not as_json:
-            LOGGER.warning(
-                "time ran %.0f %% slower than --pace: this machine is too slow", late_share * 100
-            )
     if as_json:
-        done = {"questions": traffic.questions, "answers": traffic.answers, "bytes": traffic.bytes}
-        rest = {"missed_s": server.missed_s, "servos": traffic.registers()}
-        print(json.dumps(done | rest), flush=True)
+        done: dict[str, float] = {
+            "questions": traffic.questions,
+            "answers": traffic.answers,
+            "bytes": traffic.bytes,
+        }
+        done |= {"missed_s": server.missed_s, "output_flushes": server.output_flushes}
+        print(json.dumps(done | {"servos": traffic.registers()}), flush=True)
+    else:
+        _tell_what_was_lost(late_share, server.output_flushes)
+
+
+def _tell_what_was_lost(late_share: float, output_flushes: int) -> None:
+    """Say at the end what the machine or the client did that no real bus does."""
+    if late_share > LATE_SHARE:
+        LOGGER.warning(
+            "time ran %.0f %% slower than --pace: this machine is too slow", late_share * 100
+        )
+    if output_flushes:
+        LOGGER.warning(
+            "a client flushed its output %d times: what it had sent less than 5 ms before may "
+            "be lost, as on no UART (docs/bus.md)",
+            output_flushes,
+        )
 
 
 def sniff(
