@@ -11,8 +11,10 @@ from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Bools, DeepImage, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.body_detector import BodyDetector
+from snakewalk.controller.capture.coil_film import COIL_LEAST, COILS, solve_coils
+from snakewalk.controller.capture.coil_fit import Outline
 from snakewalk.controller.capture.frame_status import FrameStatus
-from snakewalk.controller.capture.identity import align_ends, head_end, margins
+from snakewalk.controller.capture.identity import AlignedSkeletons, align_ends, head_end, margins
 from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.capture.outlier_frames import mark_outliers
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
@@ -102,6 +104,8 @@ def capture(
     if sum(one.status is FrameStatus.GOOD for one in checked) < 2:
         raise InputError(f"{name}: {_fault(checked)}")
     aligned = align_ends(checked)
+    coils = solve_coils(aligned.skeletons, found.outlines, np.array(found.axis_error_px))
+    aligned = AlignedSkeletons(coils.skeletons, margins(coils.skeletons))
     points = np.stack([one.points_px for one in aligned.skeletons])
     radius = np.stack([one.radius_px for one in aligned.skeletons])
     if _change(points) < _STILL:
@@ -111,14 +115,20 @@ def capture(
         )
     score, by = head_end(points, radius, rate_hz, head_px, fixed=fixed)
     skeletons = [one.reversed() if score < 0.0 else one for one in aligned.skeletons]
-    expected = np.array(found.expected_px)
-    fitted = fit_film(skeletons, found.crops, aligned.margin, expected, fixed=fixed)
+    solved = np.isfinite(coils.expected_px)
+    expected = np.where(solved, coils.expected_px, found.expected_px)
+    crops = {k: crop for k, crop in found.crops.items() if not solved[k]}
+    fitted = fit_film(skeletons, crops, aligned.margin, expected, fixed=fixed)
+    usual = fitted.expected_px[~solved & np.isfinite(fitted.expected_px)]
+    expected = fitted.expected_px.copy()
+    least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
+    expected[solved] = np.maximum(expected[solved], least)
     return Capture(
         points_px=np.stack([one.points_px for one in fitted.skeletons]),
         radius_px=np.stack([one.radius_px for one in fitted.skeletons]),
         length_px=np.array([one.length_px for one in fitted.skeletons]),
         status=tuple(one.status for one in fitted.skeletons),
-        expected_px=fitted.expected_px,
+        expected_px=expected,
         distractors=np.array(found.distractors),
         margin=margins(fitted.skeletons),
         rate_hz=rate_hz,
@@ -249,6 +259,10 @@ class _Detections:
     distractors: list[float] = field(default_factory=list)
     expected_px: list[float] = field(default_factory=list)
     """Of long bodies, whose medial axis is kept; NaN for all others."""
+    axis_error_px: list[float] = field(default_factory=list)
+    """Of the medial axis of any body; NaN where there is none."""
+    outlines: dict[int, Outline] = field(default_factory=dict)
+    """By frame: silhouettes of bodies that are whole, also those that touch themselves."""
     crops: dict[int, Crop] = field(default_factory=dict)
     """By frame: small bodies, and where a small body was lost its last place."""
 
@@ -265,16 +279,22 @@ def _detect_all(
         out.skeletons.append(body)
         out.area_px.append(silhouette.area_px)
         out.distractors.append(silhouette.distractors)
-        expected = np.nan
+        expected = axis_px = np.nan
+        if body.status is FrameStatus.GOOD:
+            blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
+            axis_px = axis_error_px(blur_px, body.length_px)
+        if body.status is FrameStatus.GOOD or body.status in COILS:
+            width_px = 2.0 * float(np.max(body.radius_px))
+            out.outlines[number] = Outline.of(silhouette, np.nan_to_num(width_px))
         if body.length_px <= LONGEST_PX:
             last, points = number, body.points_px
             out.crops[number] = crop_body(frame, detection.background, points)
         elif body.status is FrameStatus.GOOD:
-            blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
-            expected = axis_error_px(blur_px, body.length_px)
+            expected = axis_px
         elif body.status is FrameStatus.BLOB and number - last <= _LOST_FRAMES:
             out.crops[number] = crop_body(frame, detection.background, points)
         out.expected_px.append(expected)
+        out.axis_error_px.append(axis_px)
         if on_progress is not None:
             on_progress()
     return out

@@ -4,12 +4,13 @@ from enum import StrEnum
 
 
 class FrameStatus(StrEnum):
-    """``GOOD``, ``ROUGH``, ``BRIDGED`` and ``BY_HAND`` frames hold points; others say why not."""
+    """Frames down to ``COIL`` hold points; the others say why they do not."""
 
     GOOD = "good"
     ROUGH = "rough: the points may be off by more than 1 % of the body"
     BRIDGED = "rough: a keypoint was not seen; it lies on the curve through the others"
     BY_HAND = "by hand: a person drew the points"
+    COIL = "touches itself or something: solved by the film's body"
     MISSING = "keypoints are missing"
     NOTHING = "nothing seen"
     SEVERAL = "several animals"
@@ -17,6 +18,9 @@ class FrameStatus(StrEnum):
     LOOP = "touches itself: the silhouette has a hole"
     BRANCH = "touches itself: the medial axis branches"
     SHORT = "touches itself: much shorter or thicker than in the other frames"
+    COIL_TWO_WAYS = "touches itself: what comes before and what comes after solve it in two ways"
+    COIL_UNLIKE = "touches itself: the film's body does not explain the picture"
+    COIL_ALONE = "touches itself: no good frame on one of both sides"
     LARGER = "touches something: longer or larger than in the other frames"
     PART = "a part is missing: something goes on beyond its end"
     GHOST = "the background shows the animal"
@@ -31,4 +35,5 @@ class FrameStatus(StrEnum):
             FrameStatus.ROUGH,
             FrameStatus.BRIDGED,
             FrameStatus.BY_HAND,
+            FrameStatus.COIL,
         }

@@ -40,9 +40,11 @@ def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skelet
     radius = uniform_filter1d(np.stack([out[k].radius_px for k in good]), _STRETCH, axis=1)
     radius = radius[:, _TIPS:-_TIPS]
     median = np.maximum(np.median(radius, axis=0), _LEAST_PX)
-    ratio = radius / median - 1.0
-    spread = 1.4826 * np.median(np.abs(ratio), axis=0)
-    thick = (ratio / np.maximum(_THICK, _SPREADS * spread)).max(axis=1)
+    spread = 1.4826 * np.median(np.abs(radius / median - 1.0), axis=0)
+    most = np.maximum(_THICK, _SPREADS * spread)
+    # after a coil the other end may be first: that makes no body thick
+    ways = [((way / median - 1.0) / most).max(axis=1) for way in (radius, radius[:, ::-1])]
+    thick = np.minimum(*ways)
     for n, k in enumerate(good):
         if thick[n] > 1.0 or length[n] < -1.0 or area[n] < -1.0:
             out[k] = no_skeleton(FrameStatus.SHORT)

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
+from scipy.special import erf
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.controller.capture.resample import body_points, equal_arc_length
@@ -86,10 +87,44 @@ def true_midlines(scene: SnakeScene) -> Floats:
     return np.stack([equal_arc_length(one, 100) for one in body])
 
 
-def film(scene: SnakeScene) -> Iterator[Image]:
-    """The frames (H, W)."""
+def coiled_midlines(scene: SnakeScene) -> Floats:
+    """(T, 101, 2) as ``true_midlines``, of a body that crawls, coils in the middle, and goes on.
+
+    A bend goes from the head to the tail. By the seed it is a loop (280 to 520 degrees: the body
+    crosses itself), or a hairpin (about 190 degrees, narrow: one half lies beside the other).
+    """
+    rng = np.random.default_rng([scene.seed, 7])
+    if rng.uniform() < 0.3:
+        turn, wide = np.radians(rng.uniform(180.0, 215.0)), rng.uniform(0.05, 0.08)
+    else:
+        turn = np.radians(rng.uniform(280.0, 520.0))
+        wide = rng.uniform(0.1, 0.16) * max(1.0, turn / 5.0)
+    turn *= rng.choice([-1.0, 1.0])
+    first, last = rng.uniform(0.25, 0.4), rng.uniform(0.5, 0.7)
+    s = (np.arange(400) + 0.5) / 400
+    at = np.arange(scene.frames)[:, None] / scene.frames
+    phase = scene.wave_hz * scene.frames / scene.rate_hz * at - scene.waves * s
+    wave = scene.bend_rad * np.sin(2.0 * np.pi * (phase + rng.uniform()))
+    place = first + (last - first) * at
+    rise = np.sin(np.pi * np.clip((at - 0.15) / 0.7, 0.0, 1.0)) ** 2
+    coil = 0.5 * turn * rise * erf((s - place) / (np.sqrt(2.0) * wide))
+    drift = rng.uniform(-0.6, 0.6) * at + rng.uniform(0.0, 2.0 * np.pi)
+    angles = wave * (1.0 - 0.6 * rise) + coil + drift
+    body = body_points(angles, scene.length_px)
+    travel = scene.length_px * (at - 0.5) * rng.uniform(-0.3, 0.3, 2)
+    middle = np.array([(scene.columns - 1) / 2.0, (scene.rows - 1) / 2.0])
+    body = body - body.mean(axis=1, keepdims=True) + travel[:, None] + middle
+    return np.stack([equal_arc_length(one, 100) for one in body])
+
+
+def film(scene: SnakeScene, midlines: Floats | None = None) -> Iterator[Image]:
+    """The frames (H, W); of ``midlines`` (T, 101, 2) in a picture at rest if given."""
     rng = np.random.default_rng(scene.seed)
     ground = _ground(scene, rng)
+    if midlines is not None:
+        for midline in midlines:
+            yield _shot(scene, ground, _coverage(scene, midline), rng)
+        return
     still = true_midlines(replace(scene, follow=0.0))
     for midline, (x, y) in zip(
         true_midlines(scene), camera_places(scene, still).astype(int), strict=True

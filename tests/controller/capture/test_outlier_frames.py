@@ -77,7 +77,8 @@ def test_a_small_animal_that_touches_the_body_is_noticed() -> None:
 
     frames, ground = with_something(beside)
     seen = capture(frames, make_detector(frames[::4], ground), SCENE.rate_hz)
-    assert np.flatnonzero(~seen.used).tolist() == ODD
+    assert np.flatnonzero(~seen.good).tolist() == ODD
+    assert all(seen.status[k] is FrameStatus.COIL for k in ODD)
 
 
 def test_a_small_animal_elsewhere_is_counted_and_the_body_still_used() -> None:
@@ -121,3 +122,11 @@ def test_edge_blur_is_that_of_a_blurred_step() -> None:
         assert abs(edge_blur_px(level, 50.0) - blur) < 0.3 * blur
     assert edge_blur_px(step, 50.0) < 0.8
     assert axis_error_px(3.0, 100.0) > axis_error_px(1.0, 100.0) > 0.3
+
+
+def test_a_body_with_its_other_end_first_is_not_thicker_than_the_others() -> None:
+    taper = np.linspace(5.0, 2.0, 101)
+    bodies = [replace(one, radius_px=taper) for one in usual()]
+    bodies[7] = bodies[7].reversed()
+    found = mark_outliers(bodies, np.full(12, 800.0))
+    assert all(one.status is FrameStatus.GOOD for one in found)

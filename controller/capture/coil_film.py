@@ -1,0 +1,445 @@
+"""Frames of a film in which the body lies on itself, solved from the good frames on both sides.
+
+Each stretch of such frames is followed from its first frame on and from its last frame back, with
+the body that the film's good frames show. Both solutions are then fitted to all frames of the
+stretch at once. Where they agree, and explain the silhouette, the frame is solved; where they do
+not, no picture says which strand goes where, and the frame says so.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.coil_fit import (
+    COIL_BENDS,
+    PARAMETERS,
+    CoilBody,
+    Normal,
+    Outline,
+    Shape,
+    curve,
+    fit_coil,
+    left_over,
+    line_slopes,
+    normal_of,
+)
+from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
+from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton, no_skeleton
+
+_SAMPLE = 40  # good frames from which the body and its usual residual are learnt
+_FEWEST = 5  # good frames
+_BETWEEN = 4  # good frames between two coils that are looked at as well
+_LONGEST = 400  # frames of a stretch
+_CHANGE = 2.0  # times the usual change from frame to frame, while a body coils
+_LEAST_CHANGE = (0.3, 0.3, 0.004, *[0.05] * COIL_BENDS)  # working px, log, rad
+_ROUNDS = 10
+_AGREE = 0.02  # of the length: solutions that are further apart are two
+_RIVAL = 150.0  # squares of what is usual: a dearer solution is none
+_OF_FIT, _OF_MODEL = 3.0, 2.5  # how the fit's own error and that of its body count
+_STEP = 100.0  # the same of a step from frame to frame: a body does not jump
+_BESIDE = 3  # frames on both sides of one that is solved in two ways, which are as doubtful
+_LEFT_OVER = 0.015  # of the body's area, or
+_OF_USUAL = 3.0  # times what good frames leave
+COIL_LEAST = 1.4
+"""Times the usual expected error of the other frames: a coil is not surer than that."""
+_OTHERS = {FrameStatus.BLOB, FrameStatus.LARGER, FrameStatus.PART, FrameStatus.GHOST}  # or else
+COILS = {FrameStatus.LOOP, FrameStatus.BRANCH, FrameStatus.SHORT, *_OTHERS}
+"""What the medial axis and the comparison with the film make of a coil."""
+
+
+@dataclass(frozen=True, slots=True)
+class CoilFilm:
+    """A film's skeletons after its coils were solved."""
+
+    skeletons: tuple[Skeleton, ...]
+    expected_px: Floats
+    """(T,) expected mean error of a point in the frames that were solved; NaN in others."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Solution:
+    """A stretch followed from one side, then fitted as a whole."""
+
+    values: Floats
+    """(K, PARAMETERS)"""
+    left: Floats
+    """(K,) ``left_over``."""
+    error: Floats
+    """(K,) expected mean error of a point by the fit alone, working px."""
+    cost: float
+    """Of all frames, and of the steps between them, in squares of what is usual."""
+    apart: Floats
+    """(K,) how far another solution of about the same cost is, working px."""
+    steps: Floats
+    """(K + 1,) of the steps alone."""
+
+
+def solve_coils(
+    skeletons: Sequence[Skeleton], outlines: Mapping[int, Outline], expected_px: Floats
+) -> CoilFilm:
+    """Solve the frames in which the body lies on itself.
+
+    Args:
+        skeletons: (T) the same end first in all.
+        outlines: silhouettes by frame, of coils and good frames.
+        expected_px: (T,) of the good frames; NaN where it is not known.
+
+    """
+    out = list(skeletons)
+    expected = np.full(len(out), np.nan)
+    good = [k for k in sorted(outlines) if out[k].status is FrameStatus.GOOD]
+    coils = [k for k in sorted(outlines) if out[k].status in COILS]
+    if len(good) < _FEWEST or not coils:
+        return CoilFilm(tuple(out), expected)
+    film = _Film.of(out, outlines, good)
+    known = expected_px[good]
+    own_px = float(np.nanmedian(known)) if np.isfinite(known).any() else 0.0
+    for stretch in _stretches(coils, set(good)):
+        if len(stretch) > _LONGEST:
+            continue
+        solved = film.solved(stretch, out, own_px)
+        if solved.turned:  # what follows was taken for the other end first
+            out[stretch[-1] + 1 :] = [one.reversed() for one in out[stretch[-1] + 1 :]]
+        for k, body, error in zip(stretch, solved.skeletons, solved.expected_px, strict=True):
+            out[k], expected[k] = body, error
+    return CoilFilm(tuple(out), expected)
+
+
+def _stretches(coils: Sequence[int], good: set[int]) -> list[list[int]]:
+    """Runs of consecutive frames: coils, and the good frames among and beside them.
+
+    A coil may pass for a body that does not touch itself for a few frames.
+    """
+    out: list[list[int]] = []
+    for k in coils:
+        between = range(out[-1][-1] + 1, k) if out else range(0)
+        if out and len(between) <= _BETWEEN and good.issuperset(between):
+            out[-1] += [*between, k]
+        else:
+            out.append([k])
+    for run in out:
+        if {run[0] - 1, run[0] - 2} <= good:
+            run.insert(0, run[0] - 1)
+        if {run[-1] + 1, run[-1] + 2} <= good:
+            run.append(run[-1] + 1)
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """A good frame beside a stretch."""
+
+    values: Floats
+    turned: Floats
+    """The same with its other end first."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Solved:
+    """What became of the frames of a stretch."""
+
+    skeletons: list[Skeleton]
+    expected_px: list[float]
+    """NaN where the frame is not solved, or was good before."""
+    turned: bool
+    """Whether the ends changed places from before the stretch to after it."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Film:
+    """What the good frames say of a film."""
+
+    body: CoilBody
+    outlines: Mapping[int, Outline]
+    squares: float
+    """Usual mean square of the residual."""
+    left: float
+    """What good frames leave, nine of ten of them."""
+    misfit: float
+    """How far fits of good frames are from their skeletons, nine of ten of them, working px."""
+    change: Floats
+    """(PARAMETERS, PARAMETERS) information of one frame about the next one."""
+
+    @classmethod
+    def of(
+        cls, skeletons: Sequence[Skeleton], outlines: Mapping[int, Outline], good: list[int]
+    ) -> "_Film":
+        body = CoilBody.of([skeletons[k] for k in good])
+        shapes = {k: Shape.of(outlines[k], body.scale) for k in good}
+        values = {k: body.values_of(skeletons[k], shapes[k]) for k in good}
+        squares, left, misfit = [], [], []
+        for k in good[:: max(1, len(good) // _SAMPLE)]:
+            fit, normal = fit_coil(values[k], body, shapes[k], 0.1, coarse=False)
+            squares.append(normal.squares)
+            left.append(left_over(fit, body, shapes[k]))
+            off = body.line(fit, shapes[k]) - body.line(values[k], shapes[k])
+            misfit.append(float(np.hypot(*off.T).mean()))
+        steps = [_near(values[k], values[k - 1]) - values[k - 1] for k in good if k - 1 in values]
+        floor = np.square(_LEAST_CHANGE)
+        spread = np.diag(floor)
+        if len(steps) > _FEWEST:
+            moved = np.array(steps)
+            spread = spread + _CHANGE**2 * (moved.T @ moved) / len(moved)
+        return cls(
+            body,
+            outlines,
+            max(float(np.median(squares)), 0.05),
+            float(np.percentile(left, 90.0)),
+            float(np.percentile(misfit, 90.0)),
+            np.linalg.inv(spread),
+        )
+
+    def solved(self, stretch: list[int], skeletons: Sequence[Skeleton], own_px: float) -> "_Solved":
+        """What becomes of the frames of a stretch."""
+        shapes = [Shape.of(self.outlines[k], self.body.scale) for k in stretch]
+        before, after = (self._end(k, skeletons) for k in (stretch[0] - 1, stretch[-1] + 1))
+        if before is None or after is None:
+            return _Solved(
+                [_unsolved(skeletons[k], FrameStatus.COIL_ALONE) for k in stretch],
+                [np.nan] * len(stretch),
+                turned=False,
+            )
+        best, turned = self._solution(shapes, before, after)
+        out = _Solved([], [], turned)
+        for n, k in enumerate(stretch):
+            own, status, error = skeletons[k], *self._check(n, best)
+            body, error_px = _unsolved(own, status), np.nan
+            if status is FrameStatus.COIL:
+                line = self.body.line(best.values[n], shapes[n], 4 * SEGMENTS)
+                body = self._skeleton(shapes[n].to_px(line))
+                error_px = float(np.hypot(error / self.body.scale, own_px))
+            beside = n in {0, len(stretch) - 1} and status is not FrameStatus.COIL
+            if own.status is FrameStatus.GOOD and (beside or _apart(own, body) < error_px):
+                body, error_px = own, np.nan  # the medial axis was right
+            out.skeletons.append(body)
+            out.expected_px.append(error_px)
+        return out
+
+    def _end(self, k: int, skeletons: Sequence[Skeleton]) -> "_End | None":
+        """The good frame beside a stretch."""
+        if not 0 <= k < len(skeletons) or skeletons[k].status is not FrameStatus.GOOD:
+            return None
+        shape = Shape.of(self.outlines[k], self.body.scale)
+        one, other = (
+            self.body.values_of(body, shape) for body in (skeletons[k], skeletons[k].reversed())
+        )
+        return _End(one, other)
+
+    def _solution(
+        self, shapes: Sequence[Shape], before: "_End", after: "_End"
+    ) -> tuple[_Solution, bool]:
+        """The stretch from both sides, and whether it shows that the ends changed places in it."""
+        first, last = before.values, after.values
+        ahead = self._followed(shapes, first)
+        turned = False
+        if self._distance(ahead[-1], after.turned) < 0.5 * self._distance(ahead[-1], last):
+            back = self._followed(shapes[::-1], after.turned)[::-1]
+            turned = self._distance(back[0], first) < 0.5 * self._distance(back[0], before.turned)
+        if turned:
+            last = after.turned
+        else:
+            back = self._followed(shapes[::-1], last)[::-1]
+        chains = [ahead, back]
+        both = first, last
+        found = [self._as_a_whole(chain, shapes, both) for chain in chains]
+        tried = [*chains, *(one.values for one in found)]
+        choice = np.argmin(self._ways(tried, shapes, both), axis=1)
+        joined = np.array([tried[one][n] for n, one in enumerate(choice)])
+        found.append(self._as_a_whole(joined, shapes, both))
+        found.sort(key=lambda one: one.cost)
+        others = [*chains, *(one.values for one in found[1:])]
+        apart = self._rivals([found[0].values, *others], shapes, both)
+        return replace(found[0], apart=apart), turned
+
+    def _rivals(
+        self, chains: Sequence[Floats], shapes: Sequence[Shape], ends: tuple[Floats, Floats]
+    ) -> Floats:
+        """(K,) how far another way of about the same cost is from the first one, working px."""
+        ways = self._ways(chains, shapes, ends)
+        out = np.zeros(len(shapes))
+        for n, row in enumerate(ways):
+            for chain, cost in zip(chains[1:], row[1:], strict=True):
+                if cost < row[0] + _RIVAL:
+                    out[n] = max(out[n], self._distance(chain[n], chains[0][n]))
+        return out
+
+    def _ways(
+        self, chains: Sequence[Floats], shapes: Sequence[Shape], ends: tuple[Floats, Floats]
+    ) -> Floats:
+        """(K, chains) the least cost of the stretch if a frame takes its value of that chain.
+
+        A chain that took a wrong way at some frame is right before it.
+        """
+        cost = np.array(
+            [
+                [normal_of(chain[n], self.body, shape, self.squares).cost for chain in chains]
+                for n, shape in enumerate(shapes)
+            ]
+        )
+        cost[0] += [self._step_cost(ends[0], chain[0]) for chain in chains]
+        cost[-1] += [self._step_cost(chain[-1], ends[1]) for chain in chains]
+        steps = [
+            np.array([[self._step_cost(one, other) for other in later] for one in here])
+            for here, later in pairwise(np.stack(chains, axis=1))
+        ]
+        before, after = [cost[0]], [cost[-1]]
+        for n, step in enumerate(steps):
+            before.append((before[-1][:, None] + step).min(axis=0) + cost[n + 1])
+        for n in range(len(steps) - 1, -1, -1):
+            after.append((steps[n] + after[-1]).min(axis=1) + cost[n])
+        return np.asarray(np.array(before) + np.array(after[::-1]) - cost)
+
+    def _step_cost(self, one: Floats, other: Floats) -> float:
+        step = _near(other, one) - one
+        return float(step @ self.change @ step)
+
+    def _distance(self, one: Floats, other: Floats) -> float:
+        """Mean distance of two bodies about the middles of their silhouettes."""
+        at = np.zeros(2)
+        lines = [curve(values, self.body.length, at) for values in (one, other)]
+        return float(np.hypot(*(lines[0] - lines[1]).T).mean())
+
+    def _followed(self, shapes: Sequence[Shape], start: Floats) -> Floats:
+        """(K, PARAMETERS) each frame fitted from the one before it."""
+        before, here = start, start
+        out = []
+        for shape in shapes:
+            tried = []
+            for first in (here, here + 0.7 * (here - before)):
+                values, normal = fit_coil(
+                    first, self.body, shape, self.squares, (here, self.change)
+                )
+                off = values - here
+                tried.append((normal.cost + float(off @ self.change @ off), values))
+            before, here = here, min(tried, key=lambda one: one[0])[1]
+            out.append(here)
+        return np.array(out)
+
+    def _as_a_whole(
+        self, chain: Floats, shapes: Sequence[Shape], ends: tuple[Floats, Floats]
+    ) -> _Solution:
+        """Fit all frames of a stretch at once, tied to each other and to the good frames."""
+        values, best, kept, damp = chain, np.inf, chain, 1e-2
+        held: tuple[list[Normal], Floats] | None = None
+        for _ in range(_ROUNDS):
+            normals = [
+                normal_of(row, self.body, shape, self.squares)
+                for row, shape in zip(values, shapes, strict=True)
+            ]
+            cost = sum(one.cost for one in normals) + float(self._ties(values, ends).sum())
+            if cost < best:
+                done = best - cost < 1e-4 * cost
+                best, kept, held, damp = cost, values, (normals, values), 0.3 * damp
+                if done:
+                    break
+            else:
+                damp *= 8.0
+            assert held is not None
+            step, _ = self._step(held[0], held[1], ends, damp)
+            values = kept + step
+        assert held is not None
+        _, covariance = self._step(held[0], kept, ends, 0.0)
+        error = np.array([self._error(row, own) for row, own in zip(kept, covariance, strict=True)])
+        left = np.array(
+            [left_over(row, self.body, shape) for row, shape in zip(kept, shapes, strict=True)]
+        )
+        return _Solution(
+            kept, left, error, float(best), np.zeros(len(kept)), self._ties(kept, ends)
+        )
+
+    def _ties(self, values: Floats, ends: tuple[Floats, Floats]) -> Floats:
+        """(K + 1,) cost of each step."""
+        return np.array([self._step_cost(*pair) for pair in pairwise([ends[0], *values, ends[1]])])
+
+    def _step(
+        self, normals: Sequence[Normal], values: Floats, ends: tuple[Floats, Floats], damp: float
+    ) -> tuple[Floats, Floats]:
+        """Newton's step (K, PARAMETERS) of a chain of frames, and each frame's covariance.
+
+        The frames are eliminated one after the other from both ends: each frame's own information
+        then holds that of all frames before it, and of all after it.
+        """
+        count = len(values)
+        own = [one.information + damp * np.diag(np.diag(one.information)) for one in normals]
+        push = [one.push.copy() for one in normals]
+        tie = self.change
+        for n, end in ((0, ends[0]), (count - 1, ends[1])):
+            own[n] = own[n] + tie
+            push[n] = push[n] + tie @ (_near(end, values[n]) - values[n])
+        for n in range(count - 1):
+            off = tie @ (values[n + 1] - values[n])
+            push[n] = push[n] + off
+            push[n + 1] = push[n + 1] - off
+        before = self._eliminated(own, push)
+        after = self._eliminated(own[::-1], push[::-1])[::-1]
+        steps, covariance = [], []
+        for n in range(count):
+            full = own[n] + before[n][0] + after[n][0]
+            inverse = np.linalg.inv(full)
+            covariance.append(inverse)
+            steps.append(inverse @ (push[n] + before[n][1] + after[n][1]))
+        return np.array(steps), np.array(covariance)
+
+    def _eliminated(
+        self, own: Sequence[Floats], push: Sequence[Floats]
+    ) -> list[tuple[Floats, Floats]]:
+        """For each frame, what the frames before it add to its information and push."""
+        tie = self.change
+        nothing = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+        out = [nothing]
+        for n in range(len(own) - 1):
+            full = own[n] + out[n][0] + tie
+            ahead = np.linalg.solve(full, np.column_stack([tie, push[n] + out[n][1]]))
+            out.append((tie - tie @ ahead[:, :-1], tie @ ahead[:, -1]))
+        return out
+
+    def _error(self, values: Floats, covariance: Floats) -> float:
+        slopes = line_slopes(values, self.body.length)
+        square = np.einsum("kij,jl,kil->k", slopes, covariance, slopes)
+        return float(np.sqrt(np.maximum(square, 0.0)).mean())
+
+    def _check(self, n: int, best: _Solution) -> tuple[FrameStatus, float]:
+        """Whether all solutions of a frame agree, and how far they may be off, working px."""
+        strange = best.left > max(_LEFT_OVER, _OF_USUAL * self.left)
+        if strange[n]:
+            return FrameStatus.COIL_UNLIKE, np.nan
+        beside = best.apart[max(0, n - _BESIDE) : n + _BESIDE + 1]
+        leaps = best.steps > _STEP
+        leaps[:-1] |= strange
+        tied = not leaps[: n + 1].any() or not leaps[n + 1 :].any()
+        if beside.max() > _AGREE * self.body.length or not tied:
+            return FrameStatus.COIL_TWO_WAYS, np.nan
+        own = np.hypot(_OF_FIT * best.error[n], _OF_MODEL * self.misfit)
+        return FrameStatus.COIL, float(np.hypot(own, best.apart[n]))
+
+    def _skeleton(self, line_px: Floats) -> Skeleton:
+        at = np.linspace(0.0, len(self.body.half_width) - 1.0, SEGMENTS + 1)
+        radius = np.interp(at, np.arange(len(self.body.half_width)), self.body.half_width)
+        try:
+            points = equipartition(line_px, SEGMENTS).points
+        except (NoEquipartitionError, ValueError):
+            points = line_px[:: (len(line_px) - 1) // SEGMENTS]
+        length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+        return Skeleton(points, radius / self.body.scale, length, FrameStatus.COIL)
+
+
+def _unsolved(own: Skeleton, status: FrameStatus) -> Skeleton:
+    """What stays of a frame that is not solved: its own reason where it may be no coil."""
+    return own if own.status in _OTHERS else no_skeleton(status)
+
+
+def _apart(one: Skeleton, other: Skeleton) -> float:
+    """Mean distance of corresponding points, px."""
+    return float(np.hypot(*(one.points_px - other.points_px).T).mean())
+
+
+def _near(values: Floats, reference: Floats) -> Floats:
+    """The same body, its angles by whole turns as near as can be to those of another."""
+    turns = np.rint((values[3:] - reference[3:]).mean() / (2.0 * np.pi))
+    out = values.copy()
+    out[3:] -= 2.0 * np.pi * turns
+    return out
