@@ -350,6 +350,8 @@ class Course:
         gaps_m = [more_m[-1], *left_m[np.isinf(passes)]]
         beyond_m = float(np.hypot(*np.diff(gaps_m, axis=0).T).sum())
         whole = SplinePath.tabulated(np.vstack([kept_m, more_m[1:]]))
+        # tabulated again it is a hair shorter: its last waypoint is not beyond its end
+        passes = [at if math.isinf(at) else min(at, whole.length_m) for at in passes]
         return _Onward(whole, [*behind, *passes], whole.length_m + _BEYOND * beyond_m)
 
     def _failing(self, centre_m: Floats) -> str | None:

@@ -165,3 +165,15 @@ def test_waypoints_that_no_path_leads_to_change_nothing() -> None:
         assert on.path is path
         assert on.waypoints_m is waypoints_m
     assert numbers == [3, 1]
+
+
+def test_one_more_after_one_more_goes_on_from_the_last() -> None:
+    plan = Plans(9.0)
+    on = course(plan)
+    walked(on, 0.8)
+    chance, left_m = np.random.default_rng(0), list(WAYPOINTS)
+    for _ in range(20):
+        left_m.append(tuple(chance.uniform(-3.0, 3.0, 2)))
+        on.lead_to(np.array(left_m), lambda: 0.0)
+        np.testing.assert_allclose(plan.asked[-1], left_m[-2:], atol=1e-9)
+    assert on.leads_on
