@@ -110,7 +110,8 @@ class TerrainPlanner:
         if not np.array_equal(planned[1 - len(points) :], points[1:]):
             return None
         until_next = planned[1 : len(planned) - len(points) + 2]
-        onward = path.piece_m(path.passes(until_next)[-1], path.length_m)
+        passes = path.passes(until_next) or [0.0]  # it may have been planned from that point on
+        onward = path.piece_m(passes[-1], path.length_m)
         if self.relief is not None and len(avoid):
             gap = np.hypot(*(onward[:, None] - avoid[None]).T)
             if gap.min() < self.relief.config.footprint_m:

@@ -250,3 +250,15 @@ def test_a_beach_that_varies_too_much_is_told_with_the_limit_that_it_passes() ->
     told = r"elevation variance 0\.0014 m2 \(limit 0\.0004\); .*world\.planner\.variance_limit_m2"
     with pytest.raises(InputError, match=told):
         TerrainPlanner(beach, CONFIG).plan([(-1.5, 0.0), (1.5, 0.0)])
+
+
+def test_a_path_from_elsewhere_goes_onto_one_that_was_planned_from_the_next_point_on() -> None:
+    planner = TerrainPlanner(None, PlannerConfig())
+    onward = planner([(2.0, 0.0), (4.0, 1.0)])
+    path = planner([(0.0, 0.5), (2.0, 0.0), (4.0, 1.0)], 0.0)
+    np.testing.assert_allclose(
+        path.position([0.0, path.length_m]), [(0.0, 0.5), (4.0, 1.0)], atol=1e-9
+    )
+    rest_m = path.piece_m(path.length_m - 0.5 * onward.length_m, path.length_m)
+    planned_m = onward.piece_m(0.0, onward.length_m)
+    assert max(np.hypot(*(planned_m - at).T).min() for at in rest_m) < 0.02
