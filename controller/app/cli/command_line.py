@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from copy import copy
 from functools import wraps
+from itertools import pairwise
 from typing import Annotated, Any
 
 import typer
@@ -102,10 +103,14 @@ class _Commands(TyperGroup):
         listed.whole = {}
         TyperGroup.format_help(listed, ctx, formatter)
 
-    def make_context(self, *words: Any, **options: Any) -> Any:
-        """Read the words before a command's name."""
+    def make_context(self, info_name: Any, args: list[str], *more: Any, **options: Any) -> Any:
+        """Read the words before a command's name; an empty one would be the folder of now."""
         with _faults_in_one_line():
-            return super().make_context(*words, **options)
+            for before, word in pairwise([self.name or "snakewalk", *args]):
+                name = before if word == "" else word.removesuffix("=")
+                if word == "" or (word.startswith("--") and name != word):
+                    raise typer.BadParameter(f"nothing after {name}: fill it, or leave it out")
+            return super().make_context(info_name, args, *more, **options)
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command; print what an interrupt's notes say of torque and log."""

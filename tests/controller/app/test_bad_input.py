@@ -48,6 +48,7 @@ ROWS = [
     ("init file.txt", "dir 'file.txt' is a file"),
     ("schema nosuch", "nosuch: no such file; there are run, robot, world"),
     ("schema run -o file.txt", "file.txt: exists; --force overwrites it"),
+    ("run flat-square --out=", "nothing after --out: fill it"),
     ("run flat-square --out file.txt", "'--out' / '-o': dir 'file.txt' is a file"),
     ("gait run rolling --robot nosuch", "nosuch: no such robot"),
     ("track --picture nosuch/a.png", "nosuch: no such folder"),
