@@ -26,6 +26,7 @@ _FEWEST = 5  # frames from which a ground is learnt
 _CALM = 8  # frames whose median has little of their noise
 _CLEAR = 0.9  # share from which no other size of the surroundings is tried
 _SURE = 0.5  # share from which a ground's length of the body is believed
+_FAINT = 0.5  # of the strongest contrast: a ground's body that is fainter may be a stain
 _PARTS = (0.015, 0.04, 0.1)  # of the smaller side: half the side of the surroundings
 _WIDTHS = 1.5  # of the body: the same
 
@@ -172,23 +173,32 @@ class _Candidate:
     length_px: float
     """Usual length; 0 where there is none."""
     width_px: float
+    contrast: float
+    """At the boundaries of these bodies, grey levels."""
 
     @classmethod
     def of(cls, detector: BodyDetector, frames: Sequence[DeepImage]) -> "_Candidate":
-        bodies = [detector.detect(frame).skeleton for frame in frames]
+        found = [detector.detect(frame) for frame in frames]
+        bodies = [one.skeleton for one in found]
         length = np.array([one.length_px for one in bodies])
         if not np.isfinite(length).any():
-            return cls(detector, 0.0, 0.0, 0.0)
+            return cls(detector, 0.0, 0.0, 0.0, 0.0)
         usual = float(np.nanmedian(length))
         share = float(np.mean(np.abs(length - usual) < _LENGTH_TOLERANCE * usual))
         width = 2.0 * float(np.nanmedian([np.median(one.radius_px) for one in bodies]))
-        return cls(detector, share, usual, width)
+        edges = [one.silhouette.threshold for one in found if np.isfinite(one.skeleton.length_px)]
+        return cls(detector, share, usual, width, float(np.median(edges)))
 
 
 def _best(candidates: Sequence[_Candidate]) -> BodyDetector:
-    """The first with about the highest share; half of a body in all frames counts as half."""
-    sure = [one.length_px for one in candidates if one.share >= _SURE]
-    longest = max(sure, default=0.0)
+    """The first with about the highest share; half of a body in all frames counts as half.
+
+    A part of the body stands out as much as all of it; what is longer and much fainter is a stain.
+    """
+    sure = [one for one in candidates if one.share >= _SURE]
+    strongest = max((one.contrast for one in sure), default=0.0)
+    whole = [one.length_px for one in sure if one.contrast >= _FAINT * strongest]
+    longest = max(whole, default=0.0)
     scores = [
         one.share * (min(1.0, one.length_px / longest) if longest else 1.0) for one in candidates
     ]

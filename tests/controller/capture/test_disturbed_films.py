@@ -19,7 +19,12 @@ from tests.oracles.skeleton_accuracy import point_error
 
 SCENE = SnakeScene(rows=300, columns=400, length_px=140.0, frames=10, wave_hz=0.6)
 WHITE = replace(SCENE, ground=250.0, gain=1.15, body=15.0, noise=2.0)
+STAINED = replace(
+    SCENE, rows=240, columns=320, length_px=100.0, wave_hz=0.75, taper=0.2, waves=1.1, bend_rad=0.8,
+    follow=1.0, stains=25.0, vignette=0.4, jpeg=40, seed=2000,
+)  # fmt: skip
 FILMS = {
+    "a stain longer than the animal, in half of the frames": STAINED,
     "black worm on white, coarse JPEG": replace(WHITE, jpeg=20),
     "white, stained": replace(WHITE, gain=1.1, jpeg=50, stains=60.0),
     "dark corners": replace(SCENE, vignette=0.9),
