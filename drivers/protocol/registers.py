@@ -62,6 +62,8 @@ SHUTDOWN_ALARMS = 0x34
 shock, overheating."""
 
 
+HOMING_LIMIT = 1_024
+"""Homing Offset(20) beyond this, either way, is ignored in position control mode (e-manual)."""
 EEPROM_END = 64
 """Addresses below are the EEPROM area, X series: locked while Torque Enable(64) is 1."""
 

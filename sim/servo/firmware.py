@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from snakewalk.drivers.protocol.registers import (
     CURRENT_MODE,
     CURRENT_POSITION_MODE,
+    HOMING_LIMIT,
     POSITION_MODE,
     PWM_FULL,
     PWM_MODE,
@@ -42,8 +43,6 @@ FAR_RAD = 1e9
 """Goal of a motor that only has to push: the output saturates at its limit."""
 STARTUP_TORQUE_ON, STARTUP_RAM_RESTORE = 0x01, 0x02
 """Startup Configuration(60)."""
-HOMING_LIMIT_TICKS = 1_024
-"""Homing Offset(20) beyond this is ignored in position control mode (e-manual)."""
 
 
 class Firmware:
@@ -151,7 +150,7 @@ class Firmware:
         if restarted.any():
             self._reset_turns(restarted)
         offset = bank["Homing Offset"].astype(np.int64)
-        offset[(mode == POSITION_MODE) & (np.abs(offset) > HOMING_LIMIT_TICKS)] = 0
+        offset[(mode == POSITION_MODE) & (np.abs(offset) > HOMING_LIMIT)] = 0
         self._zero = self._centre + offset - TICKS_PER_REV * self._turns
         self._frame = np.stack([self._sign, self._zero])
         self._last_on, self._last_mode = on, mode.copy()

@@ -1,13 +1,16 @@
 """A chain that nobody knows is found out through its bus and a pair of eyes, and then walks."""
 
+import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
 import pytest
+from click.testing import Result
 from typer.testing import CliRunner
 
 from snakewalk.config.arrays import Floats
@@ -16,6 +19,7 @@ from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import JointConfig, RobotConfig
 from snakewalk.config.robot_file import robot_toml
 from snakewalk.controller.app.cli.command_line import app
+from snakewalk.controller.app.cli.commands.bench import calibrate as calibrate_command
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.app.service.chain_calibration import (
@@ -25,9 +29,14 @@ from snakewalk.controller.app.service.chain_calibration import (
     calibrate,
     find_servos,
 )
+from snakewalk.controller.app.service.homing_offset import (
+    HomingOffset,
+    homing_written,
+    plan_homing,
+)
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
-from snakewalk.drivers.errors import ChainError
+from snakewalk.drivers.errors import BusError, ChainError
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.plant import Mounting, ServoDrive
@@ -39,6 +48,8 @@ JOINTS = LIKE.joint_count
 BROKEN, STOP_RAD = 5, 0.62
 TICK_RAD = 2.0 * np.pi / 4096
 SEED = 20
+ANSWERS = "what\na\n3\nr\n1\nl\n1\n2\nd\n\n"
+"""ID 4: nonsense, again, then joint 3 to the right; ID 9; ID 30: taken, then joint 2 down."""
 
 
 class Filmed(MujocoPlant):
@@ -159,6 +170,22 @@ def test_a_chain_is_found_out_completely_and_then_walks(
     assert finished.summary.path_error_mean_m < 0.1
 
 
+@pytest.mark.slow
+def test_a_chain_that_was_found_out_walks_the_square(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(SEED)
+    bench = Bench.of(planted(rng), rng)
+    file = tmp_path / "found.toml"
+    file.write_text(robot_toml(bench.calibrate().robot))
+    monkeypatch.setattr(Mounting, "of", staticmethod(lambda _: Mounting(*mounted(bench.truth))))
+    finished = execute(prepare_walk("flat-square", robot=str(file)), tmp_path / "run")
+    assert (finished.outcome.reached, finished.outcome.missed) == (4, 0)
+    assert finished.outcome.tripped is None
+    assert finished.summary.path_error_mean_m is not None
+    assert finished.summary.path_error_mean_m < 0.1
+
+
 def mounted(robot: RobotConfig) -> tuple[Floats, Floats]:
     return np.array(robot.signs, np.float64), np.array(robot.zeros_rad)
 
@@ -201,11 +228,33 @@ def test_models_are_read_from_the_servos() -> None:
     assert find_servos(bench.line, 0.004) == truth.models_by_id
 
 
-def test_a_person_answers_at_the_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@dataclass
+class Trio:
+    """Three servos, a robot's file like them, and the command line at their port."""
+
+    robot: RobotConfig
+    line: SimLine
+    folder: Path
+
+    @property
+    def out(self) -> Path:
+        return self.folder / "mine.toml"
+
+    @property
+    def words(self) -> list[str]:
+        like = str(self.folder / "like.toml")
+        return ["calibrate", "--port", "/dev/ttyUSB0", "--robot", like, "-o", str(self.out)]
+
+    def __call__(self, *more: str, answers: str = ANSWERS) -> Result:
+        return CliRunner().invoke(app, [*self.words, *more], input=answers)
+
+
+@pytest.fixture
+def trio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Trio:
     like = tmp_path / "like.toml"
     like.write_text('name = "trio"\njoint_axes = "ypy"\n')
     # ID 4 is joint 3 and reversed, ID 9 is joint 1, ID 30 joint 2 and reversed
-    trio = load_robot(str(like)).model_copy(
+    robot = load_robot(str(like)).model_copy(
         update={
             "joints": (
                 JointConfig(id=9, zero_rad=0.2),
@@ -214,9 +263,8 @@ def test_a_person_answers_at_the_terminal(tmp_path: Path, monkeypatch: pytest.Mo
             )
         }
     )
-    line = SimLine(
-        ServoBank(trio.servo_ids, trio.servo_models), BenchPlant(3), mounting=Mounting.of(trio)
-    )
+    bank = ServoBank(robot.servo_ids, robot.servo_models)
+    line = SimLine(bank, BenchPlant(3), mounting=Mounting.of(robot))
 
     @contextmanager
     def opened(device: str, baud: int) -> Iterator[SimLine]:
@@ -225,21 +273,119 @@ def test_a_person_answers_at_the_terminal(tmp_path: Path, monkeypatch: pytest.Mo
         yield line
 
     monkeypatch.setattr("snakewalk.drivers.port.network_port.open_port", opened)
-    out = tmp_path / "mine.toml"
-    words = ["calibrate", "--port", "/dev/ttyUSB0", "--robot", str(like), "-o", str(out)]
-    # ID 4: nonsense, again, then joint 3 to the right; ID 9; ID 30: taken, then joint 2 down
-    answers = "what\na\n3\nr\n1\nl\n1\n2\nd\n\n"
-    result = CliRunner().invoke(app, words, input=answers)
+    return Trio(robot, line, tmp_path)
+
+
+def test_a_person_answers_at_the_terminal(trio: Trio) -> None:
+    result = trio()
     assert result.exit_code == 0, result.output
     assert "joint 1 is ID 9 already" in result.output
-    found = load_robot(str(out))
+    found = load_robot(str(trio.out))
     assert found.name == "mine"
-    assert found.servo_ids == trio.servo_ids
-    assert found.signs == trio.signs
+    assert found.servo_ids == trio.robot.servo_ids
+    assert found.signs == trio.robot.signs
     # nobody laid these shafts straight: they rest where the wiggles left them
-    assert found.zeros_rad == pytest.approx(trio.zeros_rad, abs=0.03)
-    assert found.limit_rad == trio.limit_rad
-    assert isinstance(CliRunner().invoke(app, words).exception, InputError)  # it is there already
-    fewer = CliRunner().invoke(app, [*words, "--force"], input="3\n")
-    assert isinstance(fewer.exception, InputError)
-    assert not line.bank["Torque Enable"].any()
+    assert found.zeros_rad == pytest.approx(trio.robot.zeros_rad, abs=0.03)
+    assert found.limit_rad == trio.robot.limit_rad
+    assert isinstance(trio().exception, InputError)  # it is there already
+    assert isinstance(trio("--force", answers="3\n").exception, InputError)  # fewer answers
+    assert not trio.line.bank["Torque Enable"].any()
+
+
+def joints_rad(trio: Trio) -> Floats:
+    """As a chain reads them that is given the file."""
+    found = load_robot(str(trio.out))
+    chain = ServoChain(DynamixelBus(trio.line, found.models_by_id), found)
+    try:
+        return chain.enable().position_rad
+    finally:
+        chain.disable()
+
+
+def test_zeros_go_into_the_servos_and_the_file_has_none(trio: Trio) -> None:
+    trio.line.bank["Homing Offset"][0] = -70  # of somebody before
+    trio.line.bank["Drive Mode"][1] = 1  # reverse: its sign turns, the offset's does not
+    kept = trio.line.bank.table[:, 7:64].copy()
+    answers = ANSWERS.replace("d", "u")
+    result = trio("--homing-offset", "--yes", "--json", answers=answers)
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert told["homing_written"]
+    offsets = {str(i): h for i, h in zip((9, 30, 4), trio.line.bank["Homing Offset"], strict=True)}
+    assert told["homing_offsets"] == offsets
+    # joint 2's servo is the wrong way round twice: its zero is on the other side of its centre
+    expected = np.array([-0.2, -0.3, 0.0]) / TICK_RAD
+    assert list(offsets.values()) == pytest.approx(expected, abs=0.03 / TICK_RAD)
+    found = load_robot(str(trio.out))
+    assert found.zeros_rad == (0.0, 0.0, 0.0)
+    assert found.signs == (1, 1, -1)
+    assert "in Homing Offset(20)" in trio.out.read_text()
+    assert joints_rad(trio) == pytest.approx(np.zeros(3), abs=2 * TICK_RAD)
+    # all that the EEPROM held is in the backup
+    backup = trio.folder / "mine-eeprom.json"
+    assert told["backup"] == str(backup)
+    assert CliRunner().invoke(app, ["bus", "restore", str(backup), "--yes"]).exit_code != 0
+    again = ["bus", "restore", str(backup), "--yes", "--port", "/dev/ttyUSB0"]
+    assert CliRunner().invoke(app, again).exit_code == 0
+    assert (trio.line.bank.table[:, 7:64] == kept).all()
+
+
+def test_nothing_moves_where_nobody_can_say_yes(trio: Trio) -> None:
+    assert "say --yes" in str(trio("--homing-offset").exception)
+    assert "goes with --homing-offset" in str(trio("--yes").exception)
+    assert trio.line.clock.now_s() == 0.0
+    assert not list(trio.folder.glob("mine*"))
+
+
+def test_who_says_no_has_the_zeros_in_the_file(trio: Trio, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calibrate_command, "_confirmed", lambda offsets, backup: False)
+    monkeypatch.setattr(calibrate_command.sys, "stdin", SimpleNamespace(isatty=lambda: True))
+    lines = iter(ANSWERS.splitlines())
+    monkeypatch.setattr("builtins.input", lambda: next(lines))
+    calibrate_command.calibrate(
+        trio.out, str(trio.folder / "like.toml"), "/dev/ttyUSB0", homing_offset=True
+    )
+    assert not trio.line.bank["Homing Offset"].any()
+    assert joints_rad(trio) == pytest.approx(np.zeros(3), abs=2 * TICK_RAD)
+
+
+def test_offsets_that_a_servo_would_ignore_or_that_leave_its_turn_are_refused(trio: Trio) -> None:
+    near, far, wide = (
+        joint.model_copy(update=keys)
+        for joint, keys in zip(
+            trio.robot.joints,
+            ({}, {"zero_rad": 1.7}, {"zero_rad": -1.4, "limit_rad": 1.7}),
+            strict=True,
+        )
+    )
+    robot = trio.robot.model_copy(update={"joints": (near, far, wide)})
+    trio.line.bank["Homing Offset"][2] = 80
+    with pytest.raises(InputError) as refused:
+        plan_homing(DynamixelBus(trio.line, robot.models_by_id), robot)
+    ignored, beyond = refused.value.faults
+    assert ignored.startswith("joint 2 (ID 30): needs Homing Offset -1108: beyond 1024 the servo")
+    assert beyond.startswith("joint 3 (ID 4): needs Homing Offset 993: with its limit of 1.7 rad")
+
+
+def test_offsets_are_put_back_where_one_servo_does_not_do_as_the_manual_says(trio: Trio) -> None:
+    bus = DynamixelBus(trio.line, trio.robot.models_by_id)
+    offsets = plan_homing(bus, trio.robot)
+    assert [each.after for each in offsets] == [-130, 196, 0]
+    turned = [offsets[0], HomingOffset(30, before=100, after=196), offsets[2]]
+    said = r"Position by \+196.*all Homing Offsets are as they were"
+    with pytest.raises(BusError, match=said), homing_written(bus, turned):
+        pytest.fail("written")
+    assert trio.line.bank["Homing Offset"].tolist() == [0, 100, 0]
+    trio.line.bank["Homing Offset"][1] = 0
+
+    def full_disk() -> None:
+        with homing_written(bus, offsets):
+            assert trio.line.bank["Homing Offset"].tolist() == [-130, 196, 0]
+            raise OSError("full")
+
+    with pytest.raises(OSError, match="full"):
+        full_disk()
+    assert not trio.line.bank["Homing Offset"].any()
+    trio.line.mute(np.array([1]), True)
+    with pytest.raises(BusError, match=r"left in servo 30 \(196, was 0\): restore the backup"):
+        homing_written(bus, offsets).__enter__()

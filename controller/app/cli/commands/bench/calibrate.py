@@ -1,6 +1,7 @@
 """``snakewalk calibrate``: find out which servo is which joint, and write the robot's file."""
 
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,9 @@ from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import Force, Json, Port, console, show
 
 if TYPE_CHECKING:
-    from snakewalk.controller.app.service.chain_calibration import ChainCalibration, SeenBend
+    from snakewalk.config.robot import RobotConfig
+    from snakewalk.controller.app.service.chain_calibration import SeenBend
+    from snakewalk.controller.app.service.homing_offset import HomingOffset
 
 
 def calibrate(
@@ -28,6 +31,16 @@ def calibrate(
     sweep: Annotated[
         bool, typer.Option("--sweep/--no-sweep", help="look for the ends of each joint's range")
     ] = True,
+    homing_offset: Annotated[
+        bool,
+        typer.Option(
+            "--homing-offset",
+            help="zeros into the servos' EEPROM, Homing Offset(20), after a question, not the file",
+        ),
+    ] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", "-y", help="with --homing-offset: write without asking")
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -38,12 +51,16 @@ def calibrate(
     from snakewalk.config.errors import InputError  # noqa: PLC0415  --help stays quick
     from snakewalk.config.loader import load_robot  # noqa: PLC0415
     from snakewalk.config.robot_file import robot_toml  # noqa: PLC0415
-    from snakewalk.controller.app.result_files import (  # noqa: PLC0415
-        atomic_write,
-        refuse_to_overwrite,
-    )
+    from snakewalk.controller.app.result_files import refuse_to_overwrite  # noqa: PLC0415
     from snakewalk.controller.app.service import chain_calibration  # noqa: PLC0415
+    from snakewalk.controller.app.service.eeprom_backup import back_up, backup_text  # noqa: PLC0415
+    from snakewalk.controller.app.service.homing_offset import (  # noqa: PLC0415
+        homing_written,
+        plan_homing,
+        without_zeros,
+    )
     from snakewalk.controller.app.service.scan import pick_port  # noqa: PLC0415
+    from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus  # noqa: PLC0415
     from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
     from snakewalk.drivers.safety.stop_button import StopButton  # noqa: PLC0415
 
@@ -51,15 +68,25 @@ def calibrate(
         raise InputError(f"{out}: a robot's file ends in .toml")
     if not 0.0 < current <= 2.0:
         raise InputError(f"--current {current:g}: over 0 and at most 2 A")
-    refuse_to_overwrite([out], force)
+    if homing_offset and not yes and not sys.stdin.isatty():
+        raise InputError("--homing-offset: asks before it writes, and nobody is there: say --yes")
+    if yes and not homing_offset:
+        raise InputError("--yes: goes with --homing-offset; the robot's file is always written")
+    backup = out.with_name(f"{out.stem}-eeprom.json") if homing_offset else None
+    refuse_to_overwrite([out, backup], force)
     like = load_robot(robot)
     if like.limbs:
         raise InputError(f"robot {like.name}: has legs; calibrate knows chains without")
     device = pick_port(port)
+    heading = f"Found by snakewalk calibrate, like {like.name}."
+    facts: dict[str, object] = {"robot": str(out)}
     with (
         open_port(device, baud or like.servo.baud) as line,
         StopButton(out.stem, device) as button,
     ):
+        if backup is not None:  # before anything is written: what a chain needs is EEPROM, too
+            chain_calibration.find_servos(line, line.latency_s)
+            _write(backup, backup_text(back_up(line, line.latency_s)))
         found = chain_calibration.calibrate(
             line,
             like,
@@ -71,15 +98,41 @@ def calibrate(
             stop_requested=button.pressed,
             on_progress=lambda step: typer.echo(step, err=True),
         )
-    if baud is not None:
-        servo = found.robot.servo.model_copy(update={"baud": baud})
-        described = found.robot.model_copy(update={"servo": servo})
-    else:
         described = found.robot
+        if baud is not None:
+            servo = described.servo.model_copy(update={"baud": baud})
+            described = described.model_copy(update={"servo": servo})
+        _write(out, robot_toml(described, heading))
+        if backup is not None:
+            bus = DynamixelBus(line, described.models_by_id, latency_s=line.latency_s)
+            offsets = plan_homing(bus, described)
+            written = yes or _confirmed(offsets, backup)
+            if written:
+                described = without_zeros(described)
+                there = "The zeros are in the servos, in Homing Offset(20)."
+                with homing_written(bus, offsets):
+                    _write(out, robot_toml(described, f"{heading}\n{there}"))
+            facts |= {
+                "backup": str(backup),
+                "homing_offsets": {str(each.servo_id): each.after for each in offsets},
+                "homing_written": written,
+            }
+    _show(described, found.notes, facts, as_json)
+
+
+def _write(out: Path, text: str) -> None:
+    from snakewalk.controller.app.result_files import atomic_write  # noqa: PLC0415
+
     with atomic_write(out) as part:
-        text = robot_toml(described, f"Found by snakewalk calibrate, like {like.name}.")
         part.write_text(text, encoding="utf-8")
-    _show(found, out, as_json)
+
+
+def _confirmed(offsets: "Sequence[HomingOffset]", backup: Path) -> bool:
+    """Show the servos' registers as they would be, and ask."""
+    for each in offsets:
+        typer.echo(f"ID {each.servo_id}: Homing Offset {each.before} -> {each.after}", err=True)
+    question = f"write this into the servos? what they hold now is in {backup}"
+    return typer.confirm(question, default=False, err=True)
 
 
 class _Person:
@@ -124,8 +177,9 @@ def _ask(question: str) -> str:
         raise InputError("calibrate asks what has moved: answers came to an end") from None
 
 
-def _show(found: "ChainCalibration", out: Path, as_json: bool) -> None:
-    robot = found.robot
+def _show(
+    robot: "RobotConfig", notes: "Sequence[str]", facts: dict[str, object], as_json: bool
+) -> None:
     if not as_json:
         rows = zip(robot.servo_ids, robot.signs, robot.zeros_rad, robot.limit_rad, strict=True)
         for joint, (servo_id, sign, zero, limit) in enumerate(rows, 1):
@@ -133,14 +187,14 @@ def _show(found: "ChainCalibration", out: Path, as_json: bool) -> None:
                 f"joint {joint}: ID {servo_id}, sign {sign:+d}, zero {zero:+.3f} rad, "
                 f"limit {limit:g} rad"
             )
-        for note in found.notes:
+        for note in notes:
             console.print(f"look at {note}")
-    facts = {
-        "robot": str(out),
-        "ids": list(robot.servo_ids),
-        "signs": list(robot.signs),
-        "zeros_rad": list(robot.zeros_rad),
-        "limits_rad": list(robot.limit_rad),
-        "notes": list(found.notes),
-    }
-    show(facts if as_json else {"robot": str(out)}, as_json)
+    else:
+        facts |= {
+            "ids": list(robot.servo_ids),
+            "signs": list(robot.signs),
+            "zeros_rad": list(robot.zeros_rad),
+            "limits_rad": list(robot.limit_rad),
+            "notes": list(notes),
+        }
+    show(facts, as_json)

@@ -1,0 +1,116 @@
+"""Zeros of a robot in its servos: out of the robot's file, into Homing Offset(20).
+
+A servo adds the register to its position, also where Drive Mode(10) turns it round: the manual says
+that its sign stays. Whether it does is seen at once: a shaft that rests must be read as far
+from before as the register was changed.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.errors import BusError, DriverError
+from snakewalk.drivers.protocol.registers import HOMING_LIMIT
+
+_REST_POSITIONS = 16
+"""How far a limp shaft may sag between two readings, positions: 1.4 degrees (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class HomingOffset:
+    """One servo's register."""
+
+    servo_id: int
+    before: int
+    after: int
+    """With it the straight joint is where the servo's own zero is."""
+
+
+def plan_homing(bus: DynamixelBus, robot: RobotConfig) -> tuple[HomingOffset, ...]:
+    """Homing Offset of each joint's servo that takes over its ``zero_rad``, head first; reads only.
+
+    Raises:
+        InputError: offsets that a servo would ignore in position mode, or that take the joint's
+            range out of its turn, all of them at once.
+        BusError: a servo does not answer.
+
+    """
+    faults, planned = [], []
+    for joint, servo_id in enumerate(robot.servo_ids):
+        table = bus.table_of(servo_id)
+        before = bus.read(servo_id, "Homing Offset")
+        after = before - round(robot.zeros_rad[joint] / table.rad_per_position)
+        planned.append(HomingOffset(servo_id, before, after))
+        reach_rad = abs(after) * table.rad_per_position + robot.limit_rad[joint]
+        if abs(after) > HOMING_LIMIT or reach_rad > math.pi:
+            why = (
+                f"beyond {HOMING_LIMIT} the servo ignores it in position mode"
+                if abs(after) > HOMING_LIMIT
+                else f"with its limit of {robot.limit_rad[joint]:g} rad it leaves the servo's turn"
+            )
+            faults.append(
+                f"{robot.joint_name(joint)}: needs Homing Offset {after}: {why}; mount its horn "
+                "nearer to the servo's centre, or leave the zeros in the robot's file"
+            )
+    if faults:
+        raise InputError(faults)
+    return tuple(planned)
+
+
+@contextmanager
+def homing_written(bus: DynamixelBus, offsets: Sequence[HomingOffset]) -> Iterator[None]:
+    """Torque off, write, read back, and see that the position has moved with it.
+
+    If that, or what is done in the context, fails, all servos get their old offsets again.
+
+    Raises:
+        BusError: a servo does not do as it is told, and which of them may have its new offset.
+
+    """
+    tried: list[HomingOffset] = []
+    try:
+        for offset in offsets:
+            tried.append(offset)
+            _write(bus, offset)
+        yield
+    except DriverError as error:
+        raise BusError(f"{error}; {_put_back(bus, tried)}") from error
+    except BaseException:
+        _put_back(bus, tried)
+        raise
+
+
+def without_zeros(robot: RobotConfig) -> RobotConfig:
+    """The robot whose servos know where straight is."""
+    joints = tuple(joint.model_copy(update={"zero_rad": 0.0}) for joint in robot.joints)
+    return robot.model_copy(update={"joints": joints})
+
+
+def _write(bus: DynamixelBus, offset: HomingOffset) -> None:
+    servo_id = offset.servo_id
+    bus.write_verified(servo_id, "Torque Enable", 0)  # the EEPROM is locked while it is on
+    was = bus.read(servo_id, "Present Position")
+    bus.write_verified(servo_id, "Homing Offset", offset.after)
+    moved = bus.read(servo_id, "Present Position") - was
+    if abs(moved - (offset.after - offset.before)) > _REST_POSITIONS:
+        raise BusError(
+            f"servo {servo_id}: Homing Offset went from {offset.before} to {offset.after}, Present "
+            f"Position by {moved:+d}: its shaft was turned meanwhile, or it counts otherwise"
+        )
+
+
+def _put_back(bus: DynamixelBus, offsets: Sequence[HomingOffset]) -> str:
+    """Write the old offsets again, and tell how that went."""
+    faults = []
+    for offset in offsets:
+        try:
+            bus.write_verified(offset.servo_id, "Homing Offset", offset.before)
+        except DriverError:
+            faults.append(f"servo {offset.servo_id} ({offset.after}, was {offset.before})")
+    if faults:
+        return f"a new Homing Offset may be left in {', '.join(faults)}: restore the backup"
+    return "all Homing Offsets are as they were"
