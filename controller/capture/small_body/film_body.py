@@ -38,6 +38,7 @@ _DIRECTIONS = 8
 _AWAY = (0.5, 1.0, 1.8, 3.0)  # of the greatest half width
 _LOOKED_AT = 12  # frames
 _WORTH = 30.0  # by how much the fit must gain, in squares of the noise
+_UNSEEN = 1e-6  # of a parameter of which no pixel tells: an error of 1,000
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +140,7 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
                 cost = squares / noise2 + float(soft @ soft)
             best, kept, damp = cost, values, 0.3 * damp
             products = gram(np.vstack([slopes.reshape(FRAME, -1) * use, rest])) / noise2
-            normal = products[:-1, :-1] + prior.T @ prior
+            normal = _solvable(products[:-1, :-1] + prior.T @ prior)
             push = products[:-1, -1] + prior.T @ soft
             if done:
                 break
@@ -150,7 +151,7 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
     residual = (patch.picture - shown) * patch.use
     raised = _correlation(residual, float(np.exp(body.values[1])))
     products = gram(slopes.reshape(len(slopes), -1) * use) / noise2
-    inverse = np.linalg.inv(products[:FRAME, :FRAME] + prior.T @ prior)
+    inverse = np.linalg.inv(_solvable(products[:FRAME, :FRAME] + prior.T @ prior))
     moved = -inverse @ products[:FRAME, FRAME:]
     return Fit(kept, float(np.sqrt(noise2 * raised)), np.asarray(inverse * raised), moved, residual)
 
@@ -206,7 +207,7 @@ def film_body(
             blocks = []
             for row, soft in zip(rows, softs, strict=True):
                 products = gram(row) / noise2
-                own = products[:FRAME, :FRAME] + prior.T @ prior
+                own = _solvable(products[:FRAME, :FRAME] + prior.T @ prior)
                 push = products[:FRAME, -1] + prior.T @ soft
                 blocks.append((own, products[:FRAME, FRAME:-1], push))
                 hss = hss + products[FRAME:-1, FRAME:-1]
@@ -233,6 +234,14 @@ def film_body(
     covariance = np.asarray(np.linalg.inv(reduced) * raised, dtype=float)
     contrast = float(np.median([one[2 + BENDS] for one in kept]))
     return FilmBody(kept_body, covariance, ribbon.grid, contrast), kept
+
+
+def _solvable(normal: Floats) -> Floats:
+    """Normal equations that can be solved where no pixel tells of a parameter.
+
+    A body that a step took out of its patch moves nothing in it: it stays, with an error of 1,000.
+    """
+    return np.asarray(normal + np.diag(np.where(np.diag(normal) < _UNSEEN, _UNSEEN, 0.0)))
 
 
 def _rows(ribbon: Ribbon, frame: Floats, body: Floats, patch: Patch) -> Floats:

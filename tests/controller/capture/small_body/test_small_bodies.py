@@ -14,6 +14,7 @@ from snakewalk.controller.capture.image.medial_axis import no_skeleton
 from snakewalk.controller.capture.image.silhouette import Polarity
 from snakewalk.controller.capture.image.thin_body_fit import fitted
 from snakewalk.controller.capture.small_body.crop import bends_of, crop_body, reversed_body
+from snakewalk.controller.capture.small_body.film_body import Patch, film_body, fit_frame
 from snakewalk.controller.capture.small_body.film_fit import fit_film
 from snakewalk.controller.capture.small_body.ribbon import (
     BENDS,
@@ -143,6 +144,19 @@ def test_reversed_body_is_the_same_line_from_its_other_end() -> None:
 def test_products_in_parts_are_the_products() -> None:
     rows = np.random.default_rng(1).normal(size=(40, 1003))
     assert np.allclose(gram(rows), rows @ rows.T)
+
+
+def test_a_body_outside_its_patch_tells_nothing_and_leaves_the_others_their_fit() -> None:
+    ribbon, frame, body, shape = picture_and_parameters()
+    picture, _ = ribbon.picture(frame, body, shape)
+    patch = Patch(picture, np.ones(shape))
+    outside = frame.copy()
+    outside[:2] += 500.0
+    shared, frames = film_body([patch] * 3, [frame, frame, outside], body)
+    assert np.allclose(frames[0][:2], frame[:2], atol=0.3)
+    assert np.allclose(frames[2][:2], outside[:2])
+    lost = fit_frame(patch, outside, shared)
+    assert np.sqrt(np.diag(lost.inverse)[:2]).min() > 100.0
 
 
 def test_a_faint_line_is_found_from_a_wrong_guess() -> None:
