@@ -145,6 +145,13 @@ class SafetyConfig(Strict):
         "stop", description="after a vanished port or a rebooted servo: torque off, ask, or go on"
     )
     recovery_time_s: float = Field(10.0, gt=0.0, description="how long it is waited for")
+    overload_reboots: int = Field(
+        0,
+        ge=0,
+        le=10,
+        description="how often in a run a servo that an overload has shut down is rebooted, set up "
+        "again and moved on slowly; 0: torque off",
+    )
 
     def following_limits_rad(self, robot: RobotConfig) -> tuple[float, ...]:
         """How far each joint may be from its goal, rad, head first.

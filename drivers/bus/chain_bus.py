@@ -85,6 +85,10 @@ class ChainBus(Protocol):
         """Write a register if it differs, and read it back."""
         ...
 
+    def reboot(self, servo_id: int) -> None:
+        """Restart a servo: its alarms, its torque and its RAM settings are gone."""
+        ...
+
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
         """Write one value to all servos at once."""
         ...

@@ -93,6 +93,11 @@ class SegmentedBus:
         with self._with_port_name(servo_id) as bus:
             bus.write_verified(servo_id, name, value)
 
+    def reboot(self, servo_id: int) -> None:
+        """Restart a servo; raises as ``DynamixelBus.reboot``."""
+        with self._with_port_name(servo_id) as bus:
+            bus.reboot(servo_id)
+
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
         """Write one value to all servos, also on the ports behind one that is gone.
 

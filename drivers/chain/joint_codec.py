@@ -222,6 +222,11 @@ class Readings:
         self._temperature[ok] = reply.data[ok, 2]
         self._slow_at_s[ok] = measured_at_s
 
+    @property
+    def alert(self) -> bool:
+        """Whether a servo's newest reply says that it has an alarm."""
+        return bool((self._error & ALERT).any())
+
     def slow_at_s(self) -> float:
         """When the oldest temperature and voltage were measured; before the first, -inf."""
         return float(self._slow_at_s.min())

@@ -12,6 +12,7 @@ from snakewalk.drivers.bus.budget import WireBudget, robot_budget
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, CycleCounters
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.group_read import GroupReadReply
 from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Readings
 from snakewalk.drivers.chain.recheck import Recheck, recheck
@@ -192,6 +193,16 @@ class ServoChain:
             self.disable()
             raise
 
+    def reboot(self, joint: int) -> None:
+        """Restart a joint's servo, which ends its alarm; it is limp until ``resume`` sets it up.
+
+        Raises:
+            BusError: it does not answer, or refuses.
+            PortError: the port is gone.
+
+        """
+        self._bus.reboot(self.robot.servo_ids[joint])
+
     def reopen(self) -> None:
         """Close and open the port again; of several, those that are gone.
 
@@ -338,23 +349,41 @@ class ServoChain:
         reply = self._cycle.read()
         if self._fast_reads and not self._cycle.fast:
             self._report_plain_reads()
-        measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
-        for joint in self._readings.update(reply, measured_at_s):
-            self._read_alarm(int(joint))
+        measured_at_s = self._take(reply)
         place = self._reads % SLOW_EVERY
         self._reads += 1
         if place == 0 or measured_at_s - self._readings.slow_at_s() > _SLOW_S:
             reply = self._slow.read()
             slow_at_s = self._clock.now_s() - self._slow.since_sent_s
             self._readings.update_slow(reply, slow_at_s)
-        if self._armed and self._liveness is not None:
-            self._liveness.check(self._reads - 1)
+        self._check_liveness()
         imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
         if imu is not None:
             state = state._replace(imu=imu)
         self.on_state(state)
         return state
+
+    def _take(self, reply: GroupReadReply) -> float:
+        """Take in a group read of the state; when it was measured, s."""
+        measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
+        for joint in self._readings.update(reply, measured_at_s):
+            self._read_alarm(int(joint))
+        return measured_at_s
+
+    def _check_liveness(self) -> None:
+        """Check torque, watchdogs, settings; where a servo tells an alarm, that is the reason.
+
+        An alarm that switches a servo off may come between the group read and the check.
+        """
+        if not self._armed or self._liveness is None or self._readings.alert:
+            return
+        try:
+            self._liveness.check(self._reads - 1)
+        except BusError:
+            self._take(self._cycle.read())
+            if not self._readings.alert:
+                raise
 
     def write(self, command: JointCommand) -> None:
         """Send goal positions, kept inside the joint limits.

@@ -3,13 +3,17 @@
 The servos hold by themselves: their watchdogs stop them where they are, torque on. The recovery
 opens the port again, compares the chain with what it was, and goes on from its present pose; but
 only if the run's policy, or an operator, allows it.
+
+A servo that an overload has shut down can be brought back in the same way, if the run allows it: it
+is rebooted first. No other alarm is recovered from.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Generic, Literal, Protocol, TypeVar
 
 from snakewalk.drivers.clock import Clock
-from snakewalk.drivers.errors import ChainFault, DriverError, PortError
+from snakewalk.drivers.errors import ChainFault, DriverError, FaultCause, PortError
 from snakewalk.drivers.types import JointState
 
 Policy = Literal["stop", "confirm", "resume"]
@@ -44,6 +48,10 @@ class RecoverableLink(Protocol[C]):
         """Set the goals to the positions that were last read."""
         ...
 
+    def reboot(self, joint: int) -> None:
+        """Restart a joint's servo."""
+        ...
+
     def recheck(self) -> C:
         """Compare the chain with what it was."""
         ...
@@ -63,6 +71,7 @@ class Recovery(Generic[C]):
         policy: Policy = "stop",
         patience_s: float = 10.0,
         limit: int = 3,
+        overload_reboots: int = 0,
         confirm: Callable[[str], bool] | None = None,
         on_event: Callable[[str], None] = lambda line: None,
     ) -> None:
@@ -73,6 +82,8 @@ class Recovery(Generic[C]):
             policy: ``stop``: never go on; ``confirm``: ask; ``resume``: go on if nothing changed.
             patience_s: how long to wait for port and servos.
             limit: interruptions in one run after which no further one is recovered.
+            overload_reboots: how often a servo that an overload has shut down is rebooted, whatever
+                the policy; with ``confirm`` an operator is asked as well.
             confirm: asks an operator; gets what was found; without one ``confirm`` means no.
             on_event: gets every step as one line, for the log.
 
@@ -80,6 +91,8 @@ class Recovery(Generic[C]):
         self._chain, self._clock = chain, chain.clock
         self._policy, self._patience_s, self._remaining = policy, patience_s, limit
         self._confirm, self._on_event = confirm, on_event
+        self.overload_reboots = overload_reboots
+        """How many are left."""
 
     def recover(self, reason: str, stopped: Callable[[], str | None]) -> JointState | None:
         """Hold, wait, compare, ask, go on; None if it must not or cannot go on.
@@ -95,31 +108,69 @@ class Recovery(Generic[C]):
         if self._policy == "stop" or self._remaining <= 0:
             return None
         self._remaining -= 1
-        self._on_event(f"interrupted: {reason}; the servos hold")
-        found = self._wait(stopped)
+        return self._bring_back(f"interrupted: {reason}; the servos hold", stopped)
+
+    def restart(
+        self, joint: int, reason: str, stopped: Callable[[], str | None]
+    ) -> JointState | None:
+        """Hold, reboot the servo of a joint, compare, go on; None if it must not or cannot go on.
+
+        Args:
+            joint: its servo has been shut down by an overload, and nothing else is wrong.
+            reason: in words.
+            stopped: called while waiting; returns a reason to give up, or None.
+
+        Raises:
+            DriverError: it broke again while going on.
+
+        """
+        if self.overload_reboots <= 0:
+            return None
+        self.overload_reboots -= 1
+        left = self.overload_reboots or "no"
+        text = f"{reason}: its servo is rebooted, the others hold; {left} more after this one"
+        return self._bring_back(text, stopped, joint)
+
+    def _bring_back(
+        self, event: str, stopped: Callable[[], str | None], joint: int | None = None
+    ) -> JointState | None:
+        self._on_event(event)
+        found = self._wait(stopped, joint)
         if found is None:
             return None
         self._on_event(f"verified: {found}")
         if self._policy == "confirm" and not (self._confirm and self._confirm(str(found))):
             self._on_event("not confirmed")
             return None
+        why = stopped()
+        if why is not None:
+            self._on_event(f"given up: {why}")
+            return None
         state = self._chain.resume(found)
         self._on_event("going on from where it stands")
         return state
 
-    def _wait(self, stopped: Callable[[], str | None]) -> C | None:
-        """A chain that may go on; None if it does not come back in time."""
+    def _wait(self, stopped: Callable[[], str | None], joint: int | None) -> C | None:
+        """A chain that may go on; None if it does not come back in time.
+
+        The servo of ``joint`` is rebooted; an alarm after that is not waited for.
+        """
         give_up_s = self._clock.now_s() + self._patience_s
-        held = False
+        held, to_reboot = False, joint
         while True:
             try:
                 if not held:
                     self._chain.hold()
                     held = True
+                if to_reboot is not None:
+                    self._chain.reboot(to_reboot)
+                    to_reboot = None
                 found = self._chain.recheck()
                 last = str(found)
                 if not found.faults:
                     return found
+                if joint is not None and any(f.cause is FaultCause.ALARM for f in found.faults):
+                    give_up_s = -math.inf
             except PortError as error:
                 last = str(error)
                 self._try_reopen()

@@ -1,8 +1,10 @@
 """The safe link: a joint link that vets every command and switches torque off in every case."""
 
+import math
 import signal
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -13,9 +15,19 @@ from snakewalk.drivers.safety.following_error import FollowingError
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.measured_step import believable
 from snakewalk.drivers.safety.recovery import Recovery
-from snakewalk.drivers.safety.vet import SafetyMemory, Verdict, check_state, stale_fault, vet
+from snakewalk.drivers.safety.vet import (
+    SafetyMemory,
+    Verdict,
+    check_state,
+    overloaded_joint,
+    stale_fault,
+    vet,
+    without_alarm,
+)
 from snakewalk.drivers.types import JointCommand, JointState
 
+RESTART_S = 2.0
+"""After a servo's reboot the goals' rate grows for so long until it is the limit again (ours)."""
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 """SIGQUIT is Ctrl-\\. SIGTSTP is Ctrl-Z: a program that is stopped cannot switch torque off, and
 the watchdogs would leave the servos holding with torque on."""
@@ -32,7 +44,8 @@ class SafeLink:
     watchdog stops them.
 
     With a ``recovery`` it does not latch at once when the line or a servo goes away: the chain
-    holds, and goes on from where it stands if the policy of the recovery allows it.
+    holds, and goes on from where it stands if the policy of the recovery allows it; the same with a
+    servo that an overload has shut down, slowly, if the recovery may reboot it.
     """
 
     def __init__(
@@ -48,7 +61,7 @@ class SafeLink:
         self.last_verdict: Verdict | None = None
         """Of the last command."""
         self.recoveries = 0
-        """Interruptions that were recovered from."""
+        """Interruptions and overloads that were recovered from."""
         self._link = link
         self._recovery = recovery
         self._limits = limits
@@ -59,6 +72,7 @@ class SafeLink:
         self._stop_requested: str | None = None
         self._asked_to_stop = stop_requested
         self._touched = False
+        self._restarted_at_s = -math.inf
         self._handlers: dict[signal.Signals, object] = {}
 
     def __enter__(self) -> "SafeLink":
@@ -145,6 +159,10 @@ class SafeLink:
                 self._trip(f"{stale}: {doubt}")
                 return state
         self._state = state
+        joint = self._overloaded(state, self._memory)
+        if joint is not None:
+            name = self._limits.joint_names[joint]
+            return self._recover(f"{name}: alarm: overload", None, joint)
         self._check(state, self._memory)
         return state
 
@@ -170,7 +188,8 @@ class SafeLink:
             if stale is not None:
                 self._recover(stale, None)
                 return
-        verdict = vet(command, self._state, self._memory, self._limits, self._clock.now_s())
+        now_s = self._clock.now_s()
+        verdict = vet(command, self._state, self._memory, self._limits_at(now_s), now_s)
         self.last_verdict, self._memory = verdict, verdict.memory
         if verdict.veto is not None:
             self._trip(verdict.veto)
@@ -199,12 +218,38 @@ class SafeLink:
         self.tripped = None
         self._stop_requested = None
 
-    def _recover(self, reason: str, fault: DriverError | None) -> JointState:
-        """Recover from an interruption; else latch and raise."""
+    def _overloaded(self, state: JointState, memory: SafetyMemory) -> int | None:
+        """The joint whose servo may be rebooted: an overload has shut it down, all else is well."""
+        if self._recovery is None or self.tripped is not None:
+            return None
+        joint = overloaded_joint(state) if self._recovery.overload_reboots > 0 else None
+        if joint is None:
+            return None
+        fault, _ = check_state(
+            without_alarm(state, joint), memory, self._limits, self._clock.now_s()
+        )
+        fault = self._stop() or fault or self._following.update(state, memory.goal_rad)
+        return joint if fault is None else None
+
+    def _limits_at(self, now_s: float) -> SafetyLimits:
+        """The limits; after a reboot the goals' rate begins at nothing and grows evenly."""
+        share = (now_s - self._restarted_at_s) / RESTART_S
+        if share >= 1.0:
+            return self._limits
+        return replace(self._limits, goal_rate_rad_s=share * self._limits.goal_rate_rad_s)
+
+    def _recover(
+        self, reason: str, fault: DriverError | None, overloaded: int | None = None
+    ) -> JointState:
+        """Recover from an interruption, or a joint's overload; else latch and raise."""
         state = None
         if self._recovery is not None and self._memory is not None:
             try:
-                state = self._recovery.recover(reason, self._stop)
+                if overloaded is None:
+                    state = self._recovery.recover(reason, self._stop)
+                else:
+                    state = self._recovery.restart(overloaded, reason, self._stop)
+                    self._restarted_at_s = self._clock.now_s()
             except DriverError as again:
                 fault = again
                 reason = f"{reason}; while going on: {again}"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Bools, Bytes, Floats
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.protocol.packet import ALERT
-from snakewalk.drivers.protocol.registers import alarm_names
+from snakewalk.drivers.protocol.registers import Alarm, alarm_names
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.types import JointCommand, JointState
 
@@ -187,6 +187,23 @@ def state_fault(
             names = alarm_names(int(values[joint])) if what == "alarm" else ""
             return f"{fault}: {names}" if names else fault
     return None
+
+
+def overloaded_joint(state: JointState) -> int | None:
+    """The joint whose servo an overload has shut down; None if any other alarm is up."""
+    alarm = (state.hardware_error != 0) | ((state.error & ALERT) != 0)
+    joints = np.flatnonzero(alarm)
+    if len(joints) != 1 or state.hardware_error[joints[0]] != Alarm.OVERLOAD:
+        return None
+    return int(joints[0])
+
+
+def without_alarm(state: JointState, joint: int) -> JointState:
+    """The state as if this joint had none: what else is wrong shows."""
+    hardware_error, error = state.hardware_error.copy(), state.error.copy()
+    hardware_error[joint] = 0
+    error[joint] &= 0xFF ^ ALERT
+    return state._replace(hardware_error=hardware_error, error=error)
 
 
 def _age_max_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> float:

@@ -71,7 +71,14 @@ class Rig:
         self.chain = ServoChain(self.bus, ROBOT, watchdog_s=SAFETY.watchdog_s)
         self.witness = Witness()
         self.limits = SafetyLimits.from_config(ROBOT, SAFETY)
-        recovery = Recovery(self.chain, policy=policy, patience_s=PATIENCE_S, limit=10**6)
+        reboots = 10**6 if policy == "resume" else 0
+        recovery = Recovery(
+            self.chain,
+            policy=policy,
+            patience_s=PATIENCE_S,
+            limit=10**6,
+            overload_reboots=reboots,
+        )
         self.link = SafeLink(self.chain, self.limits, self.line.clock, recovery)
         self.player = FaultPlayer(self.line, plan)
         self.clashing = any(fault.kind == "clash" for fault in plan.fault)

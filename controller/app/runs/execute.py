@@ -140,6 +140,7 @@ def execute(
             backend.chain,
             policy=safety.recovery,
             patience_s=safety.recovery_time_s,
+            overload_reboots=safety.overload_reboots,
             confirm=confirm,
             on_event=lambda text: warn("recovery", text),
         )

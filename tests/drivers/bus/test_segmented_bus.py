@@ -22,7 +22,7 @@ from snakewalk.drivers.errors import (
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.packet import BROADCAST_ID, Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
-from snakewalk.drivers.protocol.registers import WATCHDOG_TRIPPED
+from snakewalk.drivers.protocol.registers import WATCHDOG_TRIPPED, Alarm
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
@@ -296,6 +296,20 @@ def test_an_interrupted_port_is_recovered_from(segments: Body) -> None:
         assert link.tripped is None
         assert link.recoveries == 1
     assert any(line.startswith("interrupted: B: ") for line in events)
+
+
+def test_an_overloaded_servo_is_rebooted_on_its_own_port(segments: Body) -> None:
+    recovery = Recovery(segments.chain, overload_reboots=1)
+    with segments.safe(recovery) as link:
+        link.enable()
+        cycles(segments, link, 5)
+        firmware = segments.lines[1].firmware
+        firmware.protection.detect(np.array([1]), Alarm.OVERLOAD)
+        firmware.apply_registers()
+        state = cycles(segments, link, 10)
+        assert state.valid.all()
+        assert link.recoveries == 1
+        assert all(line.bank["Torque Enable"].all() for line in segments.lines)
 
 
 def test_the_wire_counts_port_by_port() -> None:

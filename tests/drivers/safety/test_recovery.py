@@ -1,6 +1,8 @@
 """A line or a servo that goes away in the middle of a run: hold, verify, and go on or not."""
 
+import re
 from collections.abc import Callable
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -8,8 +10,11 @@ import pytest
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.chain.servo_chain import SLOW_EVERY, ServoChain
 from snakewalk.drivers.errors import ChainError, PortError, SafetyTrippedError
+from snakewalk.drivers.protocol.packet import Instruction
+from snakewalk.drivers.protocol.parser import PacketParser
+from snakewalk.drivers.protocol.registers import Alarm
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Policy, Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
@@ -45,12 +50,24 @@ class LooseLine(SimLine):
 class Rig:
     """A chain that is asked to swing, and everything that can be known about it."""
 
-    def __init__(self, policy: Policy, confirm: Callable[[str], bool] | None = None) -> None:
+    def __init__(
+        self,
+        policy: Policy,
+        confirm: Callable[[str], bool] | None = None,
+        overload_reboots: int = 0,
+        safety: SafetyConfig | None = None,
+    ) -> None:
         self.line = LooseLine(ServoBank(ROBOT.servo_ids), BenchPlant(4, start_rad=0.1))
         self.chain = ServoChain(DynamixelBus(self.line), ROBOT, watchdog_s=WATCHDOG_S)
         self.events: list[str] = []
-        recovery = Recovery(self.chain, policy=policy, confirm=confirm, on_event=self.events.append)
-        limits = SafetyLimits.from_config(ROBOT, SafetyConfig())
+        recovery = Recovery(
+            self.chain,
+            policy=policy,
+            confirm=confirm,
+            overload_reboots=overload_reboots,
+            on_event=self.events.append,
+        )
+        limits = SafetyLimits.from_config(ROBOT, safety or SafetyConfig())
         self.link = SafeLink(self.chain, limits, self.line.clock, recovery)
         self.link.enable()
         self.goal = 0.1
@@ -86,6 +103,25 @@ class Rig:
         """Reboot a servo and turn its shaft once around by hand."""
         self.line.firmware.reboot(servo)
         self.line.firmware.plant.position_rad[servo] += 2.0 * np.pi
+
+    def detect(self, alarm: int, *servos: int) -> None:
+        """Alarms, as in Hardware Error Status(70); Shutdown(63) says which switch off."""
+        self.line.settle()
+        self.line.firmware.protection.detect(np.array(servos), alarm)
+        self.line.firmware.apply_registers()
+
+    def count_reboots(self) -> list[int]:
+        """IDs that are rebooted from now on, a list that grows."""
+        ids: list[int] = []
+
+        def overhear(time_s: float, from_host: bool, data: bytes) -> None:
+            packets = PacketParser().feed(data) if from_host else ()
+            ids.extend(
+                p.servo_id for p in packets if getattr(p, "instruction", 0) == Instruction.REBOOT
+            )
+
+        self.line.taps.append(overhear)
+        return ids
 
     def alter(self, register: str, servo: int, value: int) -> None:
         self.line.bank[register][servo] = value
@@ -309,3 +345,194 @@ def test_a_pause_between_read_and_write_is_an_interruption_like_any_other(rig: R
     assert rig.link.tripped is None
     rig.cycles(20)
     assert rig.torque() == [1] * 4
+
+
+@pytest.fixture
+def patient() -> Rig:
+    """A chain that may reboot an overloaded servo twice; interruptions end its runs."""
+    made = Rig("stop", overload_reboots=2)
+    made.cycles(30)
+    return made
+
+
+def test_an_overloaded_servo_is_rebooted_set_up_again_and_goes_on_slowly(patient: Rig) -> None:
+    rebooted = patient.count_reboots()
+    bank = patient.line.bank
+    names = ("Position P Gain", "Position D Gain", "Goal Current", "Goal PWM", "Bus Watchdog")
+    before = {name: bank[name].tolist() for name in names}
+    patient.detect(Alarm.OVERLOAD, 1)
+    assert patient.torque() == [1, 0, 1, 1]
+    held = patient.position
+    patient.link.read()
+    assert rebooted == [2]
+    assert patient.link.tripped is None
+    assert patient.link.recoveries == 1
+    assert patient.torque() == [1] * 4
+    assert not bank["Hardware Error Status"].any()
+    assert {name: bank[name].tolist() for name in names} == before
+    assert np.abs(patient.position - held).max() < 0.02
+    first, *_, last = patient.events
+    assert first == (
+        "joint 2 (ID 2): alarm: overload: its servo is rebooted, the others hold; 1 more after "
+        "this one"
+    )
+    assert "to be set up again: joint 2 (ID 2)" in patient.events[1]
+    assert last == "going on from where it stands"
+    # it is asked for 0.8 rad more at once, and begins at nothing
+    patient.goal = float(held[0]) + 0.8
+    goals = []
+    for _ in range(120):
+        patient.cycles(1, speed_rad_s=0.0)
+        verdict = patient.link.last_verdict
+        assert verdict is not None
+        goals.append(verdict.goal_rad[1])
+    steps = np.diff(goals)
+    assert steps[0] < 4.0 * PERIOD_S * 0.1
+    assert (steps[:20] <= 4.0 * PERIOD_S * (np.arange(20) + 4) * PERIOD_S / 2.0).all()
+    assert patient.position == pytest.approx(np.full(4, patient.goal), abs=0.1)
+
+
+def test_after_a_while_the_goals_are_as_fast_as_ever(patient: Rig) -> None:
+    patient.detect(Alarm.OVERLOAD, 1)
+    patient.cycles(110, speed_rad_s=0.0)
+    here = float(patient.position[0])
+    patient.goal = here + 0.5
+    patient.cycles(1, speed_rad_s=0.0)
+    verdict = patient.link.last_verdict
+    assert verdict is not None
+    patient.cycles(1, speed_rad_s=0.0)
+    again = patient.link.last_verdict
+    assert again is not None
+    assert again.goal_rad[0] - verdict.goal_rad[0] == pytest.approx(4.0 * PERIOD_S, rel=0.05)
+
+
+def test_an_overload_between_the_reading_and_the_check_of_torque_is_one() -> None:
+    """Else every sixteenth overload was told as ``torque is off: has it rebooted?``."""
+    rig = Rig("stop", overload_reboots=1)
+    while rig.chain._reads % SLOW_EVERY != SLOW_EVERY // 3:
+        rig.cycles(1)
+    read, once = rig.chain._cycle.read, [True]
+
+    def read_then_overload() -> object:
+        reply = read()
+        if once:
+            once.clear()
+            rig.detect(Alarm.OVERLOAD, 2)
+        return reply
+
+    rig.chain._cycle.read = read_then_overload  # type: ignore[method-assign, assignment]
+    rig.cycles(3)
+    assert rig.link.recoveries == 1
+    assert rig.torque() == [1] * 4
+
+
+def test_a_shaft_that_is_held_overloads_as_often_as_it_may() -> None:
+    # else the current, 2.29 A, ends it before the servo does
+    patient = Rig("stop", overload_reboots=2, safety=SafetyConfig(current_time_s=5.0))
+    patient.cycles(30)
+    rebooted = patient.count_reboots()
+    patient.line.firmware.block_shafts(np.array([2]))
+    here = float(patient.position[2])
+    patient.goal = here + 0.33  # full output, and less than does not follow
+    with pytest.raises(SafetyTrippedError, match=r"joint 3 \(ID 3\): alarm: overload"):
+        patient.cycles(1000, speed_rad_s=0.0)
+    assert rebooted == [3, 3]
+    assert patient.link.recoveries == 2
+    assert patient.torque() == [0] * 4
+
+
+@pytest.mark.parametrize(
+    ("alarm", "servos", "said"),
+    [
+        (Alarm.OVERHEATING, (1,), "joint 2 (ID 2): alarm: overheating"),
+        (Alarm.ELECTRICAL_SHOCK, (1,), "joint 2 (ID 2): alarm: electrical shock"),
+        (Alarm.OVERLOAD | Alarm.OVERHEATING, (1,), "alarm: overheating, overload"),
+        (Alarm.OVERLOAD | Alarm.INPUT_VOLTAGE, (1,), "alarm: input voltage, overload"),
+        (Alarm.OVERLOAD, (1, 3), "joint 2 (ID 2): alarm: overload"),
+    ],
+)
+def test_no_other_alarm_is_rebooted_away(
+    patient: Rig, alarm: Alarm, servos: tuple[int, ...], said: str
+) -> None:
+    rebooted = patient.count_reboots()
+    patient.detect(alarm, *servos)
+    with pytest.raises(SafetyTrippedError, match=re.escape(said)):
+        patient.cycles(1)
+    assert (rebooted, patient.events, patient.torque()) == ([], [], [0] * 4)
+
+
+def test_what_else_is_wrong_ends_it_though_there_is_an_overload(patient: Rig) -> None:
+    rebooted = patient.count_reboots()
+    patient.detect(Alarm.OVERLOAD, 1)
+    patient.link.request_stop("stop button")
+    with pytest.raises(SafetyTrippedError, match="stop button"):
+        patient.cycles(1)
+    assert (rebooted, patient.torque()) == ([], [0] * 4)
+
+
+def test_an_alarm_after_the_reboot_is_not_waited_for(patient: Rig) -> None:
+    reboot = patient.line.firmware.reboot
+
+    def and_then_it_is_hot(row: int, *more: object) -> None:
+        reboot(row)
+        patient.detect(Alarm.OVERHEATING, row)
+
+    patient.line.firmware.reboot = and_then_it_is_hot  # type: ignore[method-assign, assignment]
+    patient.detect(Alarm.OVERLOAD, 1)
+    start_s = patient.line.clock.now_s()
+    with pytest.raises(SafetyTrippedError, match="alarm: overload"):
+        patient.cycles(1)
+    assert patient.events[-1].startswith("given up: joint 2 (ID 2): alarm: overheating")
+    assert patient.line.clock.now_s() - start_s < 1.0
+    assert patient.torque() == [0] * 4
+
+
+def test_a_limp_joint_that_has_fallen_stays_down(patient: Rig) -> None:
+    reboot = patient.line.firmware.reboot
+
+    def and_fall(row: int, *more: object) -> None:
+        reboot(row)
+        patient.line.firmware.plant.position_rad[row] -= 0.5
+
+    patient.line.firmware.reboot = and_fall  # type: ignore[method-assign, assignment]
+    patient.detect(Alarm.OVERLOAD, 1)
+    with pytest.raises(SafetyTrippedError):
+        patient.cycles(1)
+    assert "joint 2 (ID 2): moved by -0.5" in patient.events[-1]
+    assert patient.torque() == [0] * 4
+
+
+@pytest.mark.parametrize("answer", [True, False])
+def test_an_operator_is_asked_about_an_overload_too(answer: bool) -> None:
+    asked: list[str] = []
+
+    def confirm(found: str) -> bool:
+        asked.append(found)
+        return answer
+
+    rig = Rig("confirm", confirm, overload_reboots=1)
+    rig.cycles(5)
+    rig.detect(Alarm.OVERLOAD, 0)
+    with nullcontext() if answer else pytest.raises(SafetyTrippedError):
+        rig.cycles(3)
+    assert len(asked) == 1
+    assert "to be set up again: joint 1 (ID 1)" in asked[0]
+    assert rig.torque() == [int(answer)] * 4
+
+
+def test_a_stop_while_the_operator_thinks_counts() -> None:
+    """Torque came on again, for the time of one check, before it went off."""
+    rig = Rig("confirm", lambda found: rig.link.request_stop("stop button") or True)
+    rig.cycles(5)
+    watched: list[int] = []
+
+    def overhear(time_s: float, from_host: bool, data: bytes) -> None:
+        watched.append(sum(rig.torque()))
+
+    rig.line.firmware.reboot(1)
+    rig.line.taps.append(overhear)
+    with pytest.raises(SafetyTrippedError):
+        rig.cycles(20)
+    assert rig.events[-1] == "given up: stop button"
+    assert max(watched) == 3
+    assert rig.torque() == [0] * 4
