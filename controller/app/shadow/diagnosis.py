@@ -24,6 +24,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.shadow.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.app.shadow.shadow import Shadow
 from snakewalk.controller.app.studies.pool import each
+from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.runlog.record import InitialPose, RunRecord
 
 Cause = Literal["friction", "load", "weaker servo", "slipped horn"]
@@ -46,7 +47,7 @@ _REFINED: Final[dict[Cause, int]] = {
     **{"friction": 1, "load": 2, "weaker servo": 1, "slipped horn": 2}
 }
 """How many of each kind, those that explain most at first, are followed on the simulator (ours)."""
-_SETTLED_S: Final = 1.0
+SETTLED_S: Final = 1.0
 """From which on the shadow is compared: it begins at rest, wherever the robot was at (ours)."""
 MOST_S: Final = 12.0
 """Length of the part that is looked at, the last one of the run (ours)."""
@@ -180,8 +181,8 @@ class Diagnosis:
         return float(1.0 / np.exp(logs - logs[0]).sum())
 
 
-class _Constants:
-    """All that may differ, as one vector: friction, loads, servos, slips."""
+class Constants:
+    """All that may differ, as one vector: friction (2), loads (L), servos (J), slips (J)."""
 
     def __init__(self, robot: RobotConfig) -> None:
         links, joints = robot.link_count, robot.joint_count
@@ -269,13 +270,21 @@ def goals_of(record: RunRecord, world: WorldConfig | None = None) -> tuple[Goals
 
 def answers(goals: Goals, deviation: Deviation) -> Floats:
     """Return currents in A and angles in rad (2, T, J) that a shadow answers."""
+    return answers_and_links(goals, deviation)[0]
+
+
+def answers_and_links(goals: Goals, deviation: Deviation) -> tuple[Floats, Floats]:
+    """Return what a shadow answers, as ``answers``, and where its links (T, L, 3) are then, m."""
     ground = build_ground(goals.world)
     shadow = Shadow(goals.run, goals.robot, goals.world, ground, goals.initial_pose, deviation)
-    out = np.empty((2, *goals.sent_rad.shape))
+    rows, joints = goals.sent_rad.shape
+    out = np.empty((2, rows, joints))
+    links_m = np.empty((rows, goals.robot.link_count, 3))
     for k, (due_s, sent_rad) in enumerate(zip(goals.since_start_s, goals.sent_rad, strict=True)):
         state = shadow.step(float(due_s), sent_rad)
         out[0, k], out[1, k] = state.current_a, state.position_rad
-    return out
+        links_m[k] = body_in_world(goals.robot, shadow.head_pose(), state.position_rad).link_m
+    return out, links_m
 
 
 def diagnose(
@@ -310,7 +319,7 @@ class Signatures:
         on_progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
         self._goals = goals
-        self._constants = constants = _Constants(goals.robot)
+        self._constants = constants = Constants(goals.robot)
         count = len(constants.step)
         self._plain = features(goals, answers(goals, NO_DEVIATION))
         work = partial(_answer, goals)
@@ -408,7 +417,7 @@ def features(goals: Goals, values: Floats) -> Floats:
     """Means over bins (B * 2 * J,) of currents and angles (2, T, J), in steps of the registers."""
     hz = goals.run.cycle_hz
     each_bin = max(round(_BIN_S * hz), 1)
-    rows = values[:, round(_SETTLED_S * hz) :]
+    rows = values[:, round(SETTLED_S * hz) :]
     bins = rows.shape[1] // each_bin
     means = rows[:, : bins * each_bin].reshape(2, bins, each_bin, -1).mean(axis=2)
     means = means / np.array([_CURRENT_STEP_A, _ANGLE_STEP_RAD])[:, np.newaxis, np.newaxis]
@@ -461,7 +470,7 @@ class _Likelihood:
 
 def _answer(goals: Goals, constant: int) -> Floats:
     """Answers with one constant changed by its step; a function of its own for a process."""
-    constants = _Constants(goals.robot)
+    constants = Constants(goals.robot)
     vector = np.zeros(len(constants.step))
     vector[constant] = constants.step[constant]
     return answers(goals, constants.deviation(vector))

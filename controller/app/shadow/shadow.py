@@ -1,5 +1,8 @@
 """A simulated chain that gets the goals of another one, at the same times."""
 
+from collections.abc import Callable
+from typing import cast
+
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
@@ -8,7 +11,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.runs.backend import simulated
 from snakewalk.controller.app.shadow.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.runlog.record import InitialPose
-from snakewalk.drivers.types import JointCommand, JointState
+from snakewalk.drivers.types import BodyPose, JointCommand, JointState
 
 
 class Shadow:
@@ -35,6 +38,8 @@ class Shadow:
     ) -> None:
         backend = simulated(run, robot, world, ground, initial_pose, deviation)
         self._chain, self._clock = backend.chain, backend.clock
+        self.head_pose = cast(Callable[[], BodyPose], backend.pose)
+        """Pose of its head; a simulated body always has one."""
         self._chain.enable()
         self._start_s = self._clock.now_s()
 

@@ -1,4 +1,4 @@
-"""``snakewalk identify``: constants of a servo from recordings of it."""
+"""``snakewalk identify``: constants of a servo from recordings, friction of the belly from runs."""
 
 import json
 import math
@@ -10,13 +10,19 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.cli.options import Force, Json, console
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.app.cli.options import Force, Json, World, check_files, console
+from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
 
 
 def identify(
     logs: Annotated[
-        list[Path], typer.Argument(help="recordings of one servo with a pendulum (BAM's raw JSON)")
+        list[Path],
+        typer.Argument(
+            help="recordings of one servo with a pendulum (BAM's raw JSON), or logs of one robot's "
+            "runs (.mcap)"
+        ),
     ],
     judge: Annotated[
         list[Path] | None, typer.Option(help="a recording only to be judged on; again for more")
@@ -29,12 +35,153 @@ def identify(
     ] = True,
     seed: Annotated[int, typer.Option(min=0, help="of the search")] = 0,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="write the constants here, as BAM's JSON")
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            help="write constants as BAM's JSON, or friction as a world's TOML",
+        ),
     ] = None,
+    world: World = None,
+    workers: Annotated[int, typer.Option(min=1, help="processes, for logs of runs")] = 2,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Find a servo's resistance, torque constant, friction, inertia and P unit, with intervals."""
+    """Find a servo's constants from its pendulum, or the belly's friction from logs of runs.
+
+    Of a servo: resistance, torque constant, friction, inertia and P unit. Of runs: friction along
+    and across the body, on the ground --world (default: the logs'). All with 95 % intervals.
+
+    Example: snakewalk identify kp200.json kp800.json -o xl330.json
+
+    Example: snakewalk identify runs/flat-slalom-walk-seed0/log.mcap -o found.toml
+    """
+    judge = judge or []
+    of_runs = [path for path in (*logs, *judge) if _is_run(path)]
+    if of_runs:
+        if len(of_runs) < len(logs) + len(judge):
+            raise InputError(
+                "logs of runs (.mcap) and recordings of a pendulum tell different things: give one "
+                "kind at a time"
+            )
+        if start is not None or not fit:
+            raise InputError("--start and --no-fit are of pendulums; for a run's log take --world")
+        _friction(logs, judge, world, out, force=force, workers=workers, as_json=as_json)
+        return
+    if world is not None:
+        raise InputError("--world is the ground of a run's log (.mcap); a pendulum has none")
+    _servo(logs, judge, start, out, fit=fit, seed=seed, force=force, as_json=as_json)
+
+
+def _is_run(path: Path) -> bool:
+    return ".mcap" in path.suffixes
+
+
+def _friction(
+    paths: list[Path],
+    judge: list[Path],
+    world: str | None,
+    out: Path | None,
+    *,
+    force: bool,
+    workers: int,
+    as_json: bool,
+) -> None:
+    from snakewalk.config.loader import checked, load_world  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.config.template import template  # noqa: PLC0415
+    from snakewalk.config.world import WorldConfig  # noqa: PLC0415
+    from snakewalk.controller.app.identification.friction_fit import (  # noqa: PLC0415
+        FrictionLog,
+        fit_friction,
+    )
+    from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
+    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
+
+    require_extra("friction from a run's log needs", "mujoco")
+    refuse_to_overwrite([out], force)
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: friction is written as a world's file; end its name with .toml")
+    check_files(None, None, world)
+    given = None if world is None else load_world(world)
+    logs = {}
+    for path in (*paths, *judge):
+        record = read_log(path)
+        if record.note:
+            LOGGER.warning("%s: %s", path, record.note)
+        try:
+            logs[path] = FrictionLog.of(record, given)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+    first = next(iter(logs.values())).goals
+    for path, log in logs.items():
+        if log.goals.robot != first.robot or log.goals.world.friction != first.world.friction:
+            raise InputError(
+                f"{path}: is of another robot or another friction than {paths[0]}; give logs of "
+                "one robot, and --world WORLD if their worlds differ"
+            )
+    name = first.world.name if out is None else out.stem
+    ground = checked(WorldConfig, first.world.model_dump() | {"name": name}, str(out))
+    with ProgressBar("friction", transient=True) as bar:
+        found = fit_friction(
+            [logs[path] for path in paths], workers=workers, on_progress=bar.update
+        )
+    if out is not None:
+        with atomic_write(out) as part:
+            text = template(found.world(ground), "\n".join(found.comment(paths)))
+            part.write_text(text, encoding="utf-8")
+    told, kept = first.world.friction, found.world(ground).friction
+    errors = {str(path): (log.errors(told), log.errors(kept)) for path, log in logs.items()}
+    settings = [
+        f"world.friction.{key}={getattr(kept, key):.4g}"
+        for key in ("along", "across", "back")
+        if key in found.found
+    ]
+    fitted = {str(path) for path in paths}
+    if as_json:
+        result = {
+            "friction": {key: one.value for key, one in found.found.items()},
+            "interval_95": {key: [one.low, one.high] for key, one in found.found.items()},
+            "not_told": [key for key, one in found.found.items() if not one.told],
+            "settings": settings,
+            "errors": {
+                log_name: {
+                    "way_mm": [round(1e3 * way_m, 3) for way_m, _ in both],
+                    "turn_deg": [round(math.degrees(turn_rad), 3) for _, turn_rad in both],
+                }
+                for log_name, both in errors.items()
+            },
+            "fitted": [log_name for log_name in errors if log_name in fitted],
+            "out": out and str(out),
+        }
+        print(json.dumps(result))
+        return
+    table = Table("friction", "value", "95 % interval", "", box=None)
+    for key, one in found.found.items():
+        note = "" if one.told else "these logs do not tell it"
+        interval = f"{one.low:.4g} to {one.high:.4g}"
+        table.add_row(key.replace("_", " "), f"{one.value:.4g}", interval, note)
+    console.print(table)
+    for log_name, ((before_m, before_rad), (after_m, after_rad)) in errors.items():
+        console.print(
+            f"{log_name}: in a second {1e3 * before_m:.1f} mm and {math.degrees(before_rad):.1f} "
+            f"degrees off with the friction of {first.world.name}, {1e3 * after_m:.1f} mm and "
+            f"{math.degrees(after_rad):.1f} degrees with this"
+            f"{'' if log_name in fitted else ' (not fitted)'}"
+        )
+    console.print(" ".join(f"--set {one}" for one in settings), soft_wrap=True)
+
+
+def _servo(
+    logs: list[Path],
+    judge: list[Path],
+    start: Path | None,
+    out: Path | None,
+    *,
+    fit: bool,
+    seed: int,
+    force: bool,
+    as_json: bool,
+) -> None:
     from snakewalk.controller.app.identification.pendulum_fit import (  # noqa: PLC0415  heavy; --help stays quick
         error_deg,
         fit_pendulum,
@@ -51,7 +198,7 @@ def identify(
         raise InputError("--no-fit judges constants: give them with --start FILE")
     refuse_to_overwrite([out], force)
     fitted = [read_pendulum_log(path) for path in logs]
-    judged = [read_pendulum_log(path) for path in judge or []]
+    judged = [read_pendulum_log(path) for path in judge]
     found = None if start is None else read_bam(start)
     if len({log.actuator for log in (*fitted, *judged)}) > 1:
         names = ", ".join(sorted({log.actuator or "?" for log in (*fitted, *judged)}))
