@@ -53,7 +53,7 @@ _MOST: Final = 0.7
 """Longest step of a logarithm: a factor of two (ours)."""
 _ALONE, _TOGETHER = 4, 2
 """Steps with friction alone, then with all that robots differ in (ours)."""
-_TOLD: Final = 0.35
+_DETERMINED: Final = 0.35
 """Standard deviation of a logarithm from which on a friction counts as not told: 95 % would reach
 from half to twice the value (ours)."""
 _NORMAL_95: Final = 1.96
@@ -160,9 +160,9 @@ class Found:
         return Found(math.exp(mean), math.exp(mean - reach), math.exp(mean + reach))
 
     @property
-    def told(self) -> bool:
+    def determined(self) -> bool:
         """Whether the logs say it: the interval is narrower than from half to twice the value."""
-        return self.high < self.value * math.exp(_NORMAL_95 * _TOLD)
+        return self.high < self.value * math.exp(_NORMAL_95 * _DETERMINED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +175,7 @@ class FrictionFit:
 
     def world(self, world: WorldConfig) -> WorldConfig:
         """Return a world with this friction; what the logs do not tell stays."""
-        told = [name for name, one in self.found.items() if one.told and name != RATIO]
+        told = [name for name, one in self.found.items() if one.determined and name != RATIO]
         changes = {name: float(f"{getattr(self.friction, name):.4g}") for name in told}
         friction = world.friction.model_copy(update=changes)
         return world.model_copy(update={"friction": friction})
@@ -184,7 +184,7 @@ class FrictionFit:
         """Lines for the head of a world's file."""
         lines = [f"Friction found by `snakewalk identify` from {', '.join(map(str, paths))}:"]
         for name, one in self.found.items():
-            note = "" if one.told else "; these logs do not tell it"
+            note = "" if one.determined else "; these logs do not tell it"
             lines.append(
                 f"{name.replace('_', ' ')} {one.value:.4g}, 95 % of {one.low:.4g} to "
                 f"{one.high:.4g}{note}"

@@ -141,7 +141,7 @@ def _friction(
         result = {
             "friction": {key: one.value for key, one in found.found.items()},
             "interval_95": {key: [one.low, one.high] for key, one in found.found.items()},
-            "not_told": [key for key, one in found.found.items() if not one.told],
+            "not_told": [key for key, one in found.found.items() if not one.determined],
             "settings": settings,
             "errors": {
                 log_name: {
@@ -157,7 +157,7 @@ def _friction(
         return
     table = Table("friction", "value", "95 % interval", "", box=None)
     for key, one in found.found.items():
-        note = "" if one.told else "these logs do not tell it"
+        note = "" if one.determined else "these logs do not tell it"
         interval = f"{one.low:.4g} to {one.high:.4g}"
         table.add_row(key.replace("_", " "), f"{one.value:.4g}", interval, note)
     console.print(table)
