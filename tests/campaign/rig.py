@@ -86,6 +86,8 @@ class Rig:
         self._low, self._high = self._raw_limits()
         self._cycle = 0
         self._seen: JointState | None = None
+        self._newest_rad = np.full(JOINTS, np.nan)
+        self.chain.on_state = self._take_newest
         self._sent: np.ndarray | None = None
         self._sent_at_s = 0.0
         self._steady = False
@@ -149,6 +151,9 @@ class Rig:
             )
             self._sin("not_held", ~ok & ~held)
 
+    def _take_newest(self, state: JointState) -> None:
+        self._newest_rad = state.position_rad
+
     def _overhear(self, time_s: float, from_host: bool, data: bytes) -> None:
         if not from_host:
             return
@@ -175,8 +180,10 @@ class Rig:
         if last is not None and self._steady:
             dt_s = min(time_s - self._sent_at_s, self.limits.stale_limit_s) + 2e-3
             fast = np.abs(goal - last) > self.limits.goal_rate_rad_s * dt_s + TICK_RAD
-            # a chain that was interrupted holds: its goals are where its joints are
-            held = np.minimum(np.abs(goal - known), np.abs(goal - here)) < HELD_RAD
+            # a chain that was interrupted holds: its goals are where its joints are, or were read
+            # in this very cycle
+            where = (known, here, self._newest_rad)
+            held = np.fmin.reduce([np.abs(goal - each) for each in where]) < HELD_RAD
             self._sin("too_fast", fast & ~held)
         self._sent, self._sent_at_s = goal, time_s
 

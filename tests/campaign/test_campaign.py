@@ -95,3 +95,10 @@ def test_the_table_has_a_line_for_each_kind() -> None:
 def _with(state: JointState, **changes: object) -> JointState:
 
     return state._replace(**changes)  # type: ignore[arg-type]
+
+
+def test_a_hold_where_the_joints_were_just_read_is_not_too_fast() -> None:
+    """The witness compared with the readings of the cycle before, from which fast joints go on."""
+    tally = run_scenario(("drop", "clash"), 1, 240)
+    assert tally.brought_back
+    assert tally.complaints == []
