@@ -5,7 +5,7 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -14,8 +14,11 @@ from benchmarks.rows import Row
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot, load_world
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import PegsObstacle
 from snakewalk.controller.app.runs.rendered_camera import floor_prints
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
+from snakewalk.controller.localization.floor_learning import FloorLearning
 from snakewalk.controller.localization.lens import Lens
 from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadDetector
 from snakewalk.controller.localization.pose_tracking import BodyPrior
@@ -139,6 +142,22 @@ BUMPS: dict[str, Effect] = {
 """What only markers tell."""
 
 
+MINUTES = 10
+_STEP_S = 5.0
+_STANDS_S = 300.0
+_BAR_LIGHT = 0.35  # of the light is left in a bar's shadow: more is taken than ``shade`` explains
+_BAR_M, _BARS_M, _SUN_M_S = 0.08, 0.5, 13e-3 / 60.0
+_CRATE_M, _CRATE_HIGH_M = 0.35, 0.06
+
+
+def _bars(frame: Floats, time_s: float) -> Floats:
+    """Hard shadows of a window's bars, which wander as the sun does on a floor 3 m away from it."""
+    metre = frame.shape[1] / CAMERA.field_width_m
+    v, u = np.mgrid[0.0 : frame.shape[0], 0.0 : frame.shape[1]]
+    along = (u + 0.4 * v) / np.hypot(1.0, 0.4) / metre - _SUN_M_S * time_s
+    return np.asarray(frame * np.where(along % _BARS_M < _BAR_M, _BAR_LIGHT, 1.0)[..., None])
+
+
 @dataclass(frozen=True)
 class Scene:
     picture: Image
@@ -155,6 +174,15 @@ class Found:
     head_max_m: float
     noticed: int
     """Frames in which a bump was told."""
+
+
+@dataclass(frozen=True)
+class Stay:
+    """So long in one pose; its last frame may be judged."""
+
+    scene: Scene
+    lasts_s: float
+    judged: bool = True
 
 
 def scenes(seed: int, camera: CameraConfig) -> tuple[list[Scene], Image]:
@@ -201,6 +229,11 @@ def run() -> list[Row]:
             rows += _told(name, measure(drawn, floor, effect, CAMERA, None))
         for k1 in (-0.1, -0.3):
             rows += _told(f"k1 = {k1:g}", measure(drawn, floor, _gain(1.0), CAMERA, _lens(k1)))
+        for name, runs in in_time(drawn, seed).items():
+            for learn_s in (0.0, CAMERA.learn_s):
+                how = f"learnt in {learn_s:g} s" if learn_s else "as pictured"
+                found = measure_in_time(runs, floor, learn_s, bars="bars" in name)
+                rows += _told(f"{name}, floor {how}", found)
         drawn, floor = scenes(seed, MARKED)
         for name, effect in (EFFECTS | BUMPS).items():
             found = measure(drawn, floor, effect, MARKED, None)
@@ -258,18 +291,100 @@ def measure(
             image = _bent(_whole(effect(scene.picture.astype(float), chance, at)), lens)
         else:
             image = _whole(effect(_bent(scene.picture, lens).astype(float), chance, at))
-        believed = pose_at(
-            scene.head_m + chance.uniform(-0.04, 0.04, 2),
-            scene.heading_rad + float(chance.uniform(-0.1, 0.1)),
-        )
-        guess = body_in_world(robot, believed, scene.joint_rad)
-        prior = BodyPrior(guess.link_m[:, :2], guess.forward[:, :2])
+        prior = _belief(scene, robot, chance)
         found = detector.registered(image).track(image, 0.0, prior, robot)
         noticed += found.bump is not None
         if not found.fault:
             off_m.append(float(np.hypot(*(found.head_m - scene.head_m))))
     wrong = sum(d > WRONG_M for d in off_m)
     return Found(len(off_m), wrong, max(off_m, default=float("nan")), noticed)
+
+
+def in_time(drawn: list[Scene], seed: int) -> dict[str, list[list[Stay]]]:
+    """What the floor must learn, and must not: runs through poses, by name."""
+    stays, taken, still = [], [], []
+    for k, scene in enumerate(drawn):
+        away, here = _with_crate(scene, drawn, seed)
+        before = Stay(away, _STANDS_S, judged=False)
+        stays.append([before, Stay(here, _STEP_S)])
+        taken.append([before, Stay(scene, _STEP_S)])
+        here_first = Stay(scene, _STANDS_S, judged=False)
+        still.append([here_first, Stay(drawn[(k + 1) % POSES], _STEP_S)])
+    return {
+        "shadows of bars wander for 10 minutes": [
+            [Stay(scene, 60.0 * MINUTES / POSES) for scene in drawn]
+        ],
+        "a crate is put down and stays": stays,
+        "a crate that stood for 5 minutes is taken away": taken,
+        "the robot stands still for 5 minutes": still,
+    }
+
+
+def measure_in_time(runs: list[list[Stay]], floor: Image, learn_s: float, *, bars: bool) -> Found:
+    """Track each pose after minutes of injected time, a frame every few seconds."""
+    robot = load_robot("yaw16")
+    model = CameraModel.of_floor(CAMERA, (0.0, 0.0), None, floor)
+    noise = np.random.default_rng(8).normal(0.0, 3.0, (5, *floor.shape)).astype(np.float32)
+    off_m = []
+    for k, run in enumerate(runs):
+        detector = OverheadDetector(model, floor, robot.body_radius_m, CAMERA.shade)
+        learning, now_s = FloorLearning(robot, learn_s), 0.0
+        chance = np.random.default_rng((k, 8))
+        for stay in run if learn_s else [one for one in run if one.judged]:
+            scene = stay.scene
+            for n in range(round(stay.lasts_s / _STEP_S)):
+                now_s += _STEP_S
+                frame = scene.picture + noise[n % len(noise)]
+                image = _whole(_bars(frame, now_s) if bars else frame)
+                prior = _belief(scene, robot, chance)
+                found = detector.track(image, now_s, prior, robot)
+                detector = learning.after(detector, image, prior, found)
+            if stay.judged and not found.fault:
+                off_m.append(float(np.hypot(*(found.head_m - scene.head_m))))
+    wrong = sum(d > WRONG_M for d in off_m)
+    return Found(len(off_m), wrong, max(off_m, default=float("nan")), 0)
+
+
+def _belief(scene: Scene, robot: RobotConfig, chance: np.random.Generator) -> BodyPrior:
+    """Off by up to 40 mm each way and 0.1 rad."""
+    believed = pose_at(
+        scene.head_m + chance.uniform(-0.04, 0.04, 2),
+        scene.heading_rad + float(chance.uniform(-0.1, 0.1)),
+    )
+    guess = body_in_world(robot, believed, scene.joint_rad)
+    return BodyPrior(guess.link_m[:, :2], guess.forward[:, :2])
+
+
+def _with_crate(scene: Scene, drawn: list[Scene], seed: int) -> tuple[Scene, Scene]:
+    """The pose furthest from a round crate, and the given one, which the crate is beside."""
+    robot = load_robot("yaw16")
+    links_m = _links(scene, robot)
+    middle = len(links_m) // 2
+    ahead = links_m[middle - 3] - links_m[middle + 3]
+    side = np.array([-ahead[1], ahead[0]]) / np.hypot(*ahead)
+    near_m = _CRATE_M + robot.body_radius_m
+    ways = links_m[middle] + np.arange(near_m, 2.0, 0.005)[:, None] * side
+    crate_m = next(at for at in ways if _apart_m(links_m, at) >= near_m)
+    away = max(drawn, key=lambda one: _apart_m(_links(one, robot), crate_m))
+    crate = PegsObstacle(
+        radius_m=_CRATE_M, height_m=_CRATE_HIGH_M, spacing_m=1.0, rows=1, row_pegs=1,
+        pattern="square", at_m=(float(crate_m[0]), float(crate_m[1])),
+    )  # fmt: skip
+    world = load_world("flat").model_copy(update={"obstacle": crate})
+    view = TopView(robot, world, CAMERA, (0.0, 0.0), seed)
+    shown = [replace(one, picture=view.picture(one.qpos).copy()) for one in (away, scene)]
+    view.close()
+    return shown[0], shown[1]
+
+
+def _links(scene: Scene, robot: RobotConfig) -> Floats:
+    """(L, 2) centres in the world."""
+    pose = pose_at(scene.head_m, scene.heading_rad)
+    return np.asarray(body_in_world(robot, pose, scene.joint_rad).link_m[:, :2])
+
+
+def _apart_m(links_m: Floats, at_m: Floats) -> float:
+    return float(np.hypot(*(links_m - at_m).T).min())
 
 
 def _told(name: str, found: Found) -> list[Row]:

@@ -16,6 +16,7 @@ from snakewalk.config.arrays import Image
 _ONE: Final = 100.0  # of 255: a ratio of 1; up to 2.5 times the light is told
 _DARKEST: Final = np.uint8(8)  # grey levels: a ratio to less than this says nothing
 _GLARE: Final = 0.3  # by how much light may grow beyond that of the surroundings: soft edges (ours)
+_COARSE: Final = 4  # pixels of a frame a pixel of its wide light
 
 
 def lit_floor(image: Image, floor: Image, body_area_px: float) -> Image:
@@ -27,11 +28,31 @@ def lit_floor(image: Image, floor: Image, body_area_px: float) -> Image:
         body_area_px: that the robot covers.
 
     """
+    light = _light(image, floor, int(np.sqrt(2.0 * body_area_px)) + 1)
+    return np.asarray(cv2.multiply(floor, light, scale=1.0 / _ONE), dtype=np.uint8)
+
+
+def in_light_of(image: Image, floor: Image) -> NDArray[np.float32]:
+    """(H, W[, 3]) a frame as the light of its floor's picture would show it.
+
+    Light is here what a square of a third of the picture's width has in common, told on a smaller
+    picture: what is smaller than half of it is no light.
+    """
+    size = image.shape[1], image.shape[0]
+    small = max(size[0] // _COARSE, 1), max(size[1] // _COARSE, 1)
+    now, then = (cv2.resize(one, small, interpolation=cv2.INTER_AREA) for one in (image, floor))
+    light = _light(np.asarray(now, np.uint8), np.asarray(then, np.uint8), small[0] // 3)
+    whole = cv2.resize(np.maximum(light, 1), size, interpolation=cv2.INTER_LINEAR)
+    return np.asarray(cv2.divide(image, whole, scale=_ONE, dtype=cv2.CV_32F), dtype=np.float32)
+
+
+def _light(image: Image, floor: Image, side_px: int) -> Image:
+    """(H, W[, 3]) what the floor's grey levels are multiplied with in a frame, in hundredths."""
     ratio = cv2.divide(_grey(image), np.maximum(_grey(floor), _DARKEST), scale=_ONE)
-    side = int(np.sqrt(2.0 * body_area_px)) + 1
-    light = cv2.medianBlur(np.asarray(ratio, dtype=np.uint8), min(side | 1, 255))
-    spread = light if floor.ndim == 2 else cv2.merge([light] * 3)
-    return np.asarray(cv2.multiply(floor, spread, scale=1.0 / _ONE), dtype=np.uint8)
+    light = np.asarray(
+        cv2.medianBlur(np.asarray(ratio, dtype=np.uint8), min(side_px | 1, 255)), dtype=np.uint8
+    )
+    return light if floor.ndim == 2 else np.dstack([light] * 3)
 
 
 def unexplained(image: Image, lit: Image, shade: float) -> NDArray[np.float32]:

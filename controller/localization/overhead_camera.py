@@ -223,6 +223,9 @@ class OverheadDetector:
     """Of the camera since its floor was pictured."""
     first: Self | None = None
     """As it was before any bump that markers showed."""
+    pictured: Image | None = None
+    """The floor as it was pictured, where ``background`` has been learnt since: what was put down
+    may be taken away again, and either is floor."""
 
     def detect(self, image: Image, time_s: float) -> LineDetection:
         """Find the body in one frame (H, W[, 3]).
@@ -287,7 +290,7 @@ class OverheadDetector:
             ),
             dtype=np.uint8,
         )  # fmt: skip
-        return replace(self, model=model, background=ground, bump=now, first=first)
+        return replace(self, model=model, background=ground, bump=now, first=first, pictured=None)
 
     def _moved_by_texture(self, image: Image) -> Self:
         """The shift under which the floor's own texture lies best.
@@ -309,18 +312,23 @@ class OverheadDetector:
             return self
         old = self.model.moved_px
         columns, rows = image.shape[1], image.shape[0]
-        moved = np.asarray(
-            cv2.warpAffine(
-                self.background, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]), (columns, rows),
-                flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE,
-            ),
-            dtype=np.uint8,
-        )  # fmt: skip
+
+        def shifted(ground: Image) -> Image:
+            return np.asarray(
+                cv2.warpAffine(
+                    ground, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]), (columns, rows),
+                    flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE,
+                ),
+                dtype=np.uint8,
+            )  # fmt: skip
+
+        moved = shifted(self.background)
         if _parts_explained(now, floor, _texture(moved)) < _LEAST_PARTS:
             return self
         away = old[0] + x, old[1] + y
         model = replace(self.model, moved_px=away)
-        return replace(self, model=model, background=moved, bump=Bump(away), first=self.first)
+        pictured = None if self.pictured is None else shifted(self.pictured)
+        return replace(self, model=model, background=moved, bump=Bump(away), pictured=pictured)
 
     def track(
         self, image: Image, time_s: float, prior: BodyPrior, robot: RobotConfig
@@ -350,16 +358,20 @@ class OverheadDetector:
         left, top = np.clip(np.floor(px.min(axis=0)).astype(int), 0, (columns - 1, rows - 1))
         right, low = np.clip(np.ceil(px.max(axis=0)).astype(int) + 1, 1, (columns, rows))
         window = slice(top, max(low, top + 1)), slice(left, max(right, left + 1))
-        frame, floor = np.ascontiguousarray(image[window]), self.background[window]
+        frame = np.ascontiguousarray(image[window])
         line = to_px(prior.links_m) - (left, top)
         metre = float(np.hypot(*np.diff(line, axis=0).T).sum()) / (
             robot.link_length_m * (len(line) - 1)
         )
         radius = robot.body_radius_m * metre
         area = 2.0 * radius * robot.length_m * metre
-        lit = cv2.GaussianBlur(lit_floor(frame, floor, area), (3, 3), 0.0)
-        now = cv2.GaussianBlur(frame, (3, 3), 0.0)
-        apart = unexplained(np.asarray(now, np.uint8), np.asarray(lit, np.uint8), self.shade)
+        now = np.asarray(cv2.GaussianBlur(frame, (3, 3), 0.0), dtype=np.uint8)
+        apart = np.full(frame.shape[:2], np.inf, dtype=np.float32)
+        for floor in (self.background, self.pictured):
+            if floor is not None:
+                lit = cv2.GaussianBlur(lit_floor(frame, floor[window], area), (3, 3), 0.0)
+                off = unexplained(now, np.asarray(lit, dtype=np.uint8), self.shade)
+                apart = np.minimum(apart, off)
         near = np.zeros(apart.shape, dtype=np.uint8)
         spots = np.rint(line).astype(np.int32).reshape(-1, 1, 2)
         cv2.polylines(near, [spots], False, 255, max(1, round(2.0 * reach_m * metre)))

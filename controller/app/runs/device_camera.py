@@ -24,6 +24,7 @@ from snakewalk.controller.app.runs.rendered_camera import (
 )
 from snakewalk.controller.capture.image.video import read_image
 from snakewalk.controller.localization.camera_pose import PriorAt
+from snakewalk.controller.localization.floor_learning import FloorLearning
 from snakewalk.controller.localization.lens import Lens
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
@@ -63,6 +64,7 @@ class DeviceCamera:
         self._name, self._latency_s = f"camera {camera.device}", camera.latency_s
         self._device = open_device(camera)
         self._robot = robot
+        self._learning = FloorLearning(robot, camera.learn_s)
         self._found: queue.SimpleQueue[LineDetection | TrackedPose | InputError] = (
             queue.SimpleQueue()
         )
@@ -134,7 +136,9 @@ class DeviceCamera:
             prior = None
         if prior is None:
             return self.detector.detect(frame, time_s)
-        return self.detector.track(frame, time_s, prior, self._robot)
+        found = self.detector.track(frame, time_s, prior, self._robot)
+        self.detector = self._learning.after(self.detector, frame, prior, found)
+        return found
 
     def _watch(self) -> None:
         taken = 0

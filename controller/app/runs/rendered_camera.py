@@ -14,6 +14,7 @@ from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.localization.camera_pose import PriorAt
+from snakewalk.controller.localization.floor_learning import FloorLearning
 from snakewalk.controller.localization.floor_markers import marker_picture
 from snakewalk.controller.localization.overhead_camera import (
     CameraModel,
@@ -107,6 +108,7 @@ class RenderedCamera:
         self._next_s = clock.now_s()
         self._coming: deque[LineDetection | TrackedPose] = deque()
         self._robot = robot
+        self._learning = FloorLearning(robot, run.camera.learn_s)
         self._taken = 0
         require_whole_body(self.first(), "the simulated camera")
 
@@ -137,7 +139,9 @@ class RenderedCamera:
             self.detector = self.detector.registered(picture)
         if prior is None:
             return self.detector.detect(picture, now_s)
-        return self.detector.track(picture, now_s, prior, self._robot)
+        found = self.detector.track(picture, now_s, prior, self._robot)
+        self.detector = self._learning.after(self.detector, picture, prior, found)
+        return found
 
     def _detect(self, now_s: float) -> LineDetection:
         return self.detector.detect(self._view.picture(self._qpos()), now_s)
