@@ -17,6 +17,13 @@ from snakewalk.sim.servo.bench import BenchPlant
 from snakewalk.sim.servo.motor import TICKS_PER_RAD
 
 ALL = 0xFE
+PATIENT = {
+    "run.safety.stale_limit_s": 5.0,
+    "run.safety.slow_stale_limit_s": 20.0,
+    "run.safety.watchdog_s": 2.5,
+    "run.safety.following_time_s": 20.0,
+}
+"""Of a run at a pty: servos and run share the processors with other tests, or with a browser."""
 
 
 def a_line(

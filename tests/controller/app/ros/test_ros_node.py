@@ -48,15 +48,10 @@ from snakewalk.controller.runlog.record import PlanSummary
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.sim.serve.servo_bus import ServoBus
+from tests.helpers.bus import PATIENT
 from tests.helpers.ros_client import DOMAIN, LOOPBACK, Client
 
 COMMAND = "from snakewalk.controller.app.cli.main import main; main()"
-PATIENT = {
-    "run.safety.stale_limit_s": 5.0,
-    "run.safety.slow_stale_limit_s": 20.0,
-    "run.safety.watchdog_s": 2.5,
-}
-"""Servos and run share the processors with other tests."""
 ROBOT = 'name = "quartet"\njoint_axes = "yyyy"\nyaw_limit_rad = 1.4\n'
 
 

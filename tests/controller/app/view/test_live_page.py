@@ -41,13 +41,12 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.sim.serve.servo_bus import ServoBus
+from tests.helpers.bus import PATIENT
 
 ROOT = Path(__file__).parents[4]
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 COMMAND = "from snakewalk.controller.app.cli.main import main; main()"
 ROBOT = 'name = "quartet"\njoint_axes = "yyyy"\nyaw_limit_rad = 1.4\n'
-PATIENT = ("stale_limit_s=5", "slow_stale_limit_s=20", "watchdog_s=2.5", "following_time_s=20")
-"""Of a run whose machine also draws a page without a graphics card."""
 
 
 @contextmanager
@@ -299,7 +298,7 @@ def test_on_servos_it_is_the_same(
     commands = [["next=1,0.3"], ["waypoint=99,0"], *[[]] * 5, ["end"]]
     said: list[tuple[str, str]] = []
     finished = execute(
-        prepare_walk("flat-slalom", motion="serpenoid", robot=robot),
+        prepare_walk("flat-slalom", motion="serpenoid", robot=robot, keys=PATIENT),
         tmp_path / "run",
         servo_bus("1-4").path,
         waypoint_commands=lambda: commands.pop(0) if commands else [],
@@ -409,7 +408,7 @@ def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
     (tmp_path / "quartet.toml").write_text(ROBOT)
     words = ["gait", "run", "lateral-undulation", "--seconds", "100"]
     words += ["--robot", "quartet.toml", "--port", bus.path]
-    words += [word for key in PATIENT for word in ("--set", f"run.safety.{key}")]
+    words += [word for key, value in PATIENT.items() for word in ("--set", f"{key}={value}")]
     with run(tmp_path, *words) as child, browsed(child) as page:
         button = page.get_by_role("button", name="E-STOP")
         page.get_by_text("lateral-undulation").wait_for()
