@@ -95,12 +95,17 @@ def _rows(path: Path, data: bytes) -> tuple[Rows, float, bool]:
 
 def _records(path: Path, data: bytes) -> Iterator[McapRecord]:
     """Records of a log, also those in chunks; no chunk is unpacked to more than it says."""
+    chunks = 0
     for record in StreamReader(BytesIO(data), emit_chunks=True, validate_crcs=True).records:
         if not isinstance(record, Chunk):
             yield record
             continue
         if record.compression not in ("zstd", ""):
-            raise LogError(f"{path}: is packed with {record.compression!r}; a log is with zstd")
+            name = f"{record.compression!r}; a log is with zstd"
+            if chunks:  # no CRC covers a chunk's head
+                raise ValueError(f"after {chunks} chunks one is packed with {name}")
+            raise LogError(f"{path}: is packed with {name}")
+        chunks += 1
         yield from breakup_chunk(_unpacked(record), validate_crc=True)
 
 

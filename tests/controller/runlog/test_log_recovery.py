@@ -61,6 +61,18 @@ def test_a_flipped_bit_is_noticed(whole: tuple[bytes, RunRecord], tmp_path: Path
         assert not part.complete
 
 
+def test_a_flipped_bit_in_the_name_of_a_later_chunks_packing_costs_what_comes_after(
+    whole: tuple[bytes, RunRecord], tmp_path: Path
+) -> None:
+    data, full = whole
+    at = data.index(b"zstd", len(data) // 2)
+    path = tmp_path / "bad.mcap"
+    path.write_bytes(data[:at] + b"zctd" + data[at + 4 :])
+    part = read_log(path)
+    assert not part.complete
+    assert 0 < len(part.cycle.time_s) < len(full.cycle.time_s)
+
+
 def test_a_killed_process_loses_less_than_a_second(tmp_path: Path) -> None:
     conftest = Path(__file__).with_name("conftest.py")
     path = tmp_path / "run.mcap"
