@@ -25,7 +25,7 @@ from snakewalk.sim.servo.servo_loops import (
     supply_current_a,
     warm_up,
 )
-from snakewalk.sim.servo.supply import Cabling, Supply, servo_voltages
+from snakewalk.sim.servo.supply import SOURCE_OHM, Cabling, Supply, servo_voltages
 
 SLICE_S = 0.05
 """Period of the checks."""
@@ -55,11 +55,8 @@ class SupplyAndAmbient:
 
     supply_v: float | None = None
     """None: the nominal voltage of each servo's model."""
-    supply_ohm: float = 0.02
-    """Of battery and cable together: the voltage sags with the current of all servos on it.
-
-    Servos of one voltage share a cable.
-    """
+    supply_ohm: float = SOURCE_OHM
+    """Of battery and cable together; servos of one voltage share a cable."""
     ambient_c: float = 25.0
     cabling: Cabling | None = None
     """Cables between the servos, which are then all on one source; None: they take nothing."""

@@ -10,6 +10,8 @@ from snakewalk.config.arrays import Floats, Indices
 from snakewalk.config.robot import PowerConfig, RobotConfig
 from snakewalk.drivers.compiling import compiled, readonly_array
 
+SOURCE_OHM = 0.02
+"""Of battery and cable together: the voltage sags with the current of all servos on it (ours)."""
 _ROW = readonly_array(layout="C")
 
 

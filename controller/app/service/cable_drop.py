@@ -17,7 +17,7 @@ from snakewalk.config.robot import PowerConfig, RobotConfig
 from snakewalk.controller.app.service.finding import Finding
 from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A, VOLTAGE_UNIT_V
 from snakewalk.sim.servo.motor import MOTORS
-from snakewalk.sim.servo.supply import Cabling
+from snakewalk.sim.servo.supply import SOURCE_OHM, Cabling
 
 CHECK: Final = "cables"
 CONTACT_LIMIT_A: Final = 3.0
@@ -38,8 +38,6 @@ _LINE: Final = 5
 """Cables between two leads from which on it is asked how those share the current (ours)."""
 _LEAST_A: Final = 1e-3
 """Less current than this tells nothing of a cable."""
-_SOURCE_OHM: Final = 0.02
-"""Of a battery, which all leads share (ours, as ``sim.servo.protection`` has it)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +171,7 @@ def best_injection(
     for rows in combinations(free, min(count, len(free))):
         lead_ohms = cabling.lead_ohm.copy()
         lead_ohms[list(rows)] = new_ohm
-        servo_v = replace(cabling, lead_ohm=lead_ohms).servo_v(source_v, _SOURCE_OHM, drawn_a)
+        servo_v = replace(cabling, lead_ohm=lead_ohms).servo_v(source_v, SOURCE_OHM, drawn_a)
         if servo_v.min() > best.lowest_v + 1e-9:
             best = Injection(tuple(servo_ids[row] for row in rows), float(servo_v.min()))
     return best
@@ -194,7 +192,7 @@ def drop_along(robot: RobotConfig, power: PowerConfig, current_a: float) -> Drop
     """Voltages where each servo takes ``current_a`` from the supply, beside its electronics."""
     cabling = Cabling.of(robot, power)
     load_a = current_a + _standby_a(robot)
-    servo_v = cabling.servo_v(robot.servo.supply_v, _SOURCE_OHM, load_a)
+    servo_v = cabling.servo_v(robot.servo.supply_v, SOURCE_OHM, load_a)
     return Drop(servo_v, load_a, cabling.cable_a(servo_v))
 
 
@@ -254,7 +252,7 @@ def cable_finding(robot: RobotConfig, voltage_v: Floats, drawn_a: Floats) -> Fin
     if fall_v <= DROP_SHARE * supply_v:
         return Finding(CHECK, "ok", f"at most {fall_v:.1f} V between two servos under load")
     # the source that makes what was measured, through the same cables
-    source_v = float((loaded_v - cabling.servo_v(0.0, _SOURCE_OHM, load_a)).mean())
+    source_v = float((loaded_v - cabling.servo_v(0.0, SOURCE_OHM, load_a)).mean())
     found = f"voltage falls from {shown} under load; {cables}"
     return Finding(CHECK, "warn", found, advice(cabling, ids, source_v, load_a))
 

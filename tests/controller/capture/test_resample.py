@@ -1,10 +1,9 @@
-"""Equal arcs along a body: the same points as by scipy's spline, compiled and as Python."""
+"""Equal arcs along a body."""
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from snakewalk.controller.capture import resample
 from snakewalk.controller.capture.resample import equal_arc_length
 
 
@@ -22,20 +21,6 @@ def test_points_lie_on_the_spline_of_scipy_at_equal_arcs(count: int) -> None:
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(spline(fine), axis=0).T))])
     expected = spline(np.interp(np.linspace(0.0, arc[-1], 101), arc, fine))
     np.testing.assert_allclose(equal_arc_length(body), expected, atol=1e-12 * at[-1])
-
-
-def test_loops_give_the_same_as_python() -> None:
-    body = a_body(9)
-    chord = np.hypot(*np.diff(body, axis=0).T)
-    at = np.concatenate([[0.0], np.cumsum(chord)])
-    slope = np.diff(body[:, 0]) / chord
-    rate = np.ones_like(body)
-    where = np.linspace(0.0, at[-1], 50)
-    for loop, given in (
-        (resample._rates, (chord, slope)),
-        (resample._on_spline, (at, body, rate, where)),
-    ):
-        np.testing.assert_allclose(loop(*given), loop.py_func(*given), rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("body", [np.zeros((9, 2)), a_body(3), np.full((9, 2), np.nan)])

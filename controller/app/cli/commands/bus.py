@@ -448,35 +448,34 @@ def bus_identify(
     refuse_to_overwrite([out], force)
     scan.check_bauds(baud or ())
     with open_lines(port, baud[0] if baud else 1_000_000) as lines:
-        entries, places = [], []
-        for line, _ in lines.lines:
-            on_it = inventory.take_inventory(
+        entries = [
+            (line.name, entry)
+            for line, _ in lines.lines
+            for entry in inventory.take_inventory(
                 line, line.latency_s, baud or (), lambda step: typer.echo(step, err=True)
             )
-            entries += on_it
-            places += [line.name] * len(on_it)
+        ]
     if not entries:
         raise InputError(f"{lines.port}: nobody answers: power? cable? adapter's switch?")
-    told = [entry.found.servo_id for entry in entries]
-    for note in lines.misplaced(zip(places, told, strict=True)):
+    for note in lines.misplaced((name, entry.found.servo_id) for name, entry in entries):
         LOGGER.warning("%s", note)
     if out is not None:
         segments = [
-            (line.name, [i for name, i in zip(places, told, strict=True) if name == line.name])
+            (line.name, [entry.found.servo_id for name, entry in entries if name == line.name])
             for line, _ in lines.lines
         ]
-        text = inventory.robot_skeleton(out.stem, entries, segments if lines.several else ())
+        text = inventory.robot_skeleton(
+            out.stem, [entry for _, entry in entries], segments if lines.several else ()
+        )
         with atomic_write(out) as part:
             part.write_text(text, encoding="utf-8")
     if as_json:
-        servos = [
-            entry.to_dict() | {"port": name} for entry, name in zip(entries, places, strict=True)
-        ]
+        servos = [entry.to_dict() | {"port": name} for name, entry in entries]
         print(json.dumps({"port": lines.port, "servos": servos, "robot": out and str(out)}))
         return
     heads = ("ID", "model", "firmware", "baud", "volt", "Celsius", "torque", "fault")
     table = Table(*heads, *(["port"] if lines.several else []), box=None)
-    for entry, name in zip(entries, places, strict=True):
+    for name, entry in entries:
         found, state = entry.found, entry.report
         state_told = ("-",) * 3
         if state is not None:

@@ -54,7 +54,6 @@ def doctor(
             open_lines(device, described.servo.baud) as lines,
             stderr_console().status("") as status,
         ):
-            progress = lambda step: status.update(f"{device}: {step}")  # noqa: E731
             (line, ids), *others = lines.lines
             if others:
                 segments = [(each, some or ()) for each, some in lines.lines]
@@ -76,6 +75,6 @@ def doctor(
                     latency_timer_ms=line.latency_timer_ms,
                     wiggle=wiggle,
                     on_it=ids,
-                    on_progress=progress,
+                    on_progress=lambda step: status.update(f"{device}: {step}"),
                 )
     show_findings(findings, {"port": device, "robot": described.name}, as_json)

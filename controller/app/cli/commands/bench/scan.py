@@ -22,7 +22,7 @@ def scan(
     from snakewalk.controller.app.service.port_lines import open_lines  # noqa: PLC0415
 
     scanning.check_bauds(baud or ())
-    results, places = [], []
+    found = []
     with (
         open_lines(port, baud[0] if baud else 1_000_000) as lines,
         stderr_console().status("") as status,
@@ -32,22 +32,20 @@ def scan(
             def show_step(step: str, name: str = line.name) -> None:
                 status.update(f"{name}: {step}")
 
-            there = scanning.scan(line, baud or (), show_step)
-            results += there
-            places += [line.name] * len(there)
-    for note in lines.misplaced((n, s.servo_id) for n, s in zip(places, results, strict=True)):
+            found += [(line.name, each) for each in scanning.scan(line, baud or (), show_step)]
+    for note in lines.misplaced((name, servo.servo_id) for name, servo in found):
         LOGGER.warning("%s", note)
     if as_json:
-        servos = [s.to_dict() | {"port": n} for n, s in zip(places, results, strict=True)]
+        servos = [servo.to_dict() | {"port": name} for name, servo in found]
         print(json.dumps({"port": lines.port, "servos": servos}))
-    elif results:
+    elif found:
         heads = ("ID", "model", "firmware", "baud")
         table = Table(*heads, *(["port"] if lines.several else []), box=None)
-        for name, servo in zip(places, results, strict=True):
+        for name, servo in found:
             shown = (servo.servo_id, servo.model, servo.firmware, servo.baud)
             table.add_row(*map(str, shown), *([name] if lines.several else []))
         console.print(table)
-        for servo in results:
+        for _, servo in found:
             if servo.secondary_id is not None:
                 console.print(
                     f"servo {servo.servo_id} obeys ID {servo.secondary_id} as well: its "
@@ -57,5 +55,5 @@ def scan(
         console.print(
             f"{lines.port}: nobody answers at any baud rate: power? cable? adapter's switch?"
         )
-    if not results:
+    if not found:
         raise SystemExit(1)
