@@ -4,7 +4,9 @@ The order is that of ``docs/architecture.md``.
 """
 
 import ast
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import networkx as nx
@@ -47,19 +49,53 @@ def room_of(module: str) -> str:
     return name if name in ORDER[parts[0]] else parts[0]
 
 
-def imported(source: str) -> set[str]:
-    """Modules and names of ours, and of tests, that a source imports, without ``snakewalk``."""
+@dataclass(frozen=True)
+class Source:
+    """What a file says, of what these tests ask; its syntax tree would be kept by the thousand."""
+
+    imported: set[str]
+    """Modules and names of ours, and of tests, that it imports, without ``snakewalk``."""
+    defined: list[tuple[str, int]]
+    """Classes, functions, parameters and attributes, with their lines."""
+    classes: list[str]
+    """On the file's top level."""
+
+
+def read_source(text: str) -> Source:
     names: set[str] = set()
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, "imports are absolute"
-            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    defined: list[tuple[str, int]] = []
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        match node:
+            case ast.Import():
+                names |= {alias.name for alias in node.names}
+            case ast.ImportFrom():
+                assert node.level == 0, "imports are absolute"
+                names |= {f"{node.module}.{alias.name}" for alias in node.names}
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name) | ast.arg(arg=name):
+                defined.append((name, node.lineno))
+            case ast.Attribute(attr=name, ctx=ast.Store()):
+                defined.append((name, node.lineno))
+            case ast.AnnAssign(target=ast.Name(id=name)):
+                defined.append((name, node.lineno))
     bare = {name for name in names if name.split(".")[0] in TOPS}
     assert not bare, f"top folders are imported as snakewalk.*: {bare}"
     ours = {name.removeprefix("snakewalk.") for name in names if name.startswith("snakewalk.")}
-    return ours | {name for name in names if name.split(".")[0] in {"tests", "dynamixel_sdk"}}
+    others = {name for name in names if name.split(".")[0] in {"tests", "dynamixel_sdk"}}
+    classes = [node.name for node in tree.body if isinstance(node, ast.ClassDef)]
+    return Source(ours | others, defined, classes)
+
+
+@cache
+def sources() -> Mapping[str, Source]:
+    """Every module of the rooms (dotted, without ``snakewalk``), read once for all tests."""
+    return {
+        ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): (
+            read_source(file.read_text(encoding="utf-8"))
+        )
+        for top in TOPS
+        for file in sorted((ROOT / top).rglob("*.py"))
+    }
 
 
 def forbidden(module: str, names: Iterable[str]) -> set[str]:
@@ -87,16 +123,6 @@ def forbidden(module: str, names: Iterable[str]) -> set[str]:
     return wrong
 
 
-def modules() -> dict[str, str]:
-    """Every module of the rooms (dotted, without ``snakewalk``), and its source."""
-    return {
-        ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): text
-        for top in TOPS
-        for file in sorted((ROOT / top).rglob("*.py"))
-        if (text := file.read_text(encoding="utf-8")) is not None
-    }
-
-
 def module_of(name: str, known: Iterable[str]) -> str | None:
     """Return the module that an imported name lives in."""
     return name if name in known else name.rpartition(".")[0] or None
@@ -104,18 +130,18 @@ def module_of(name: str, known: Iterable[str]) -> str | None:
 
 @pytest.mark.parametrize("top", TOPS)
 def test_every_import_points_to_a_room_above(top: str) -> None:
-    ours = {m: text for m, text in modules().items() if m.split(".")[0] == top}
+    ours = {m: source for m, source in sources().items() if m.split(".")[0] == top}
     assert ours
-    wrong = {m: bad for m, text in ours.items() if (bad := forbidden(m, imported(text)))}
+    wrong = {m: bad for m, source in ours.items() if (bad := forbidden(m, source.imported))}
     assert wrong == {}
 
 
 def test_no_files_import_each_other_in_a_circle() -> None:
-    ours = modules()
+    ours = sources()
     arrows = nx.DiGraph(
         (m, to)
-        for m, text in ours.items()
-        for name in imported(text)
+        for m, source in ours.items()
+        for name in source.imported
         if (to := module_of(name, ours)) in ours
     )
     assert list(nx.simple_cycles(arrows)) == []
@@ -123,11 +149,11 @@ def test_no_files_import_each_other_in_a_circle() -> None:
 
 def test_every_room_is_in_the_order_and_none_is_crowded() -> None:
     files: dict[str, int] = {}
-    for module in modules():
+    for module in sources():
         folder = module.rpartition(".")[0] or module
         files[folder] = files.get(folder, 0) + 1
     assert {room: count for room, count in files.items() if count > 24} == {}
-    rooms = {".".join(m.split(".")[:2]) for m in modules() if m.count(".") >= 2}
+    rooms = {".".join(m.split(".")[:2]) for m in sources() if m.count(".") >= 2}
     assert rooms <= {room for order in ORDER.values() for room in order}
 
 
@@ -154,4 +180,4 @@ def test_the_check_catches_a_wrong_arrow() -> None:
     assert not forbidden("controller.app.runs.x", {"sim.line.sim_line.SimLine"})
     assert not forbidden("controller.motion.x", {"drivers.types.JointState", "config.robot"})
     with pytest.raises(AssertionError, match=r"snakewalk\.\*"):
-        imported("from drivers.types import JointState")
+        read_source("from drivers.types import JointState")

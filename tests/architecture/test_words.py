@@ -1,12 +1,9 @@
 """Names: one class a name, and none of the words that gave way to the field's."""
 
-import ast
 from collections import defaultdict
-from collections.abc import Iterator
-from functools import cache
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from tests.architecture.test_rooms import sources
+
 _WORDS = """
 agenda alive arrivals climb coming_to_rest company debts easing express eyes faint footing
 glimpse habit hear heard hillside hottest_c house jam judged laid learn listen look_again loops
@@ -22,33 +19,11 @@ log, the turn of a heading, the eye of a snake, the pulse of [PT].
 """
 
 
-@cache
-def trees() -> dict[Path, ast.Module]:
-    """Of each file; parsed by the first test, not by every process that collects it."""
-    return {
-        path.relative_to(ROOT): ast.parse(path.read_text(encoding="utf-8"))
-        for top in ("config", "drivers", "sim", "controller")
-        for path in sorted((ROOT / top).rglob("*.py"))
-    }
-
-
-def names(tree: ast.Module) -> Iterator[tuple[str, int]]:
-    """Classes, functions, parameters and attributes that a file defines, with their lines."""
-    for node in ast.walk(tree):
-        match node:
-            case ast.FunctionDef(name=name) | ast.ClassDef(name=name) | ast.arg(arg=name):
-                yield name, node.lineno
-            case ast.Attribute(attr=name, ctx=ast.Store()):
-                yield name, node.lineno
-            case ast.AnnAssign(target=ast.Name(id=name)):
-                yield name, node.lineno
-
-
 def test_no_name_is_a_retired_word() -> None:
     found = [
-        f"{path}:{line}: {name}"
-        for path, tree in trees().items()
-        for name, line in names(tree)
+        f"{module}:{line}: {name}"
+        for module, source in sources().items()
+        for name, line in source.defined
         if name.strip("_").lower() in RETIRED
     ]
     assert not found, "\n".join(found)
@@ -56,8 +31,8 @@ def test_no_name_is_a_retired_word() -> None:
 
 def test_no_class_name_is_defined_in_two_files() -> None:
     files: dict[str, set[str]] = defaultdict(set)
-    for path, tree in trees().items():
-        for node in tree.body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                files[node.name].add(str(path))
+    for module, source in sources().items():
+        for name in source.classes:
+            if not name.startswith("_"):
+                files[name].add(module)
     assert not {name: sorted(of) for name, of in files.items() if len(of) > 1}
