@@ -5,6 +5,7 @@ branches are pruned by taking the longest path between two ends. The line of pix
 extended to both tips.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -13,10 +14,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from skimage.morphology import skeletonize
 
-from snakewalk.config.arrays import Bools, Floats, Image, Indices
+from snakewalk.config.arrays import Bools, Floats, Image, Ints
 from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
 from snakewalk.controller.capture.image.thin_body_fit import THIN_PX, fitted
+from snakewalk.drivers.compiling import compiled
 
 Level = NDArray[np.float32]
 SEGMENTS = 100
@@ -274,39 +276,58 @@ def _longest_path(thin: Bools) -> tuple[Floats, float] | None:
     rows, columns = np.nonzero(thin)
     if len(rows) < 3:
         return None
-    one = _paths_from(rows, columns, thin.shape, [0])
-    first = int(np.argmax(one[0]))
-    far, before = _paths_from(rows, columns, thin.shape, [first])
-    end = int(np.argmax(far))
-    chain = [end]
+    wide = thin.shape[1]
+    place = np.full(thin.size, -1)
+    flat = np.asarray(rows * wide + columns)
+    place[flat] = np.arange(len(flat))
+
+    def paths_from(start: Sequence[int]) -> tuple[Floats, Ints]:
+        length, before = np.full(len(flat), -1.0), np.full(len(flat), -1)
+        walk_line(place, flat, wide, np.asarray(start), length, before)
+        return length, before
+
+    one, _ = paths_from([0])
+    far, before = paths_from([int(np.argmax(one))])
+    chain = [int(np.argmax(far))]
     while before[chain[-1]] >= 0:
-        chain.append(before[chain[-1]])
-    away, _ = _paths_from(rows, columns, thin.shape, chain)
-    return np.column_stack([columns[chain], rows[chain]]).astype(float), float(max(away))
+        chain.append(int(before[chain[-1]]))
+    away, _ = paths_from(chain)
+    return np.column_stack([columns[chain], rows[chain]]).astype(float), float(away.max())
 
 
-def _paths_from(
-    rows: Indices, columns: Indices, shape: tuple[int, ...], start: list[int]
-) -> tuple[list[float], list[int]]:
-    """Shortest paths over the pixels of a thin line from ``start``: lengths and predecessors."""
-    wide = shape[1]
-    place = {int(r) * wide + int(c): k for k, (r, c) in enumerate(zip(rows, columns, strict=True))}
-    flat = list(place)
+_INTS = "int64[::1]"
+
+
+@compiled(f"void({_INTS}, {_INTS}, int64, {_INTS}, float64[::1], {_INTS})")
+def walk_line(
+    place: Ints, flat: Ints, wide: int, start: Ints, length: Floats, before: Ints
+) -> None:
+    """Walk over the pixels of a thin line from some of them, a pixel further at a time.
+
+    Args:
+        place: (H W,) index of each pixel of the line, -1 beside it; the rim of the image is beside.
+        flat: (N,) where the line's pixels are in it.
+        wide: W.
+        start: (S,) indices of the first pixels.
+        length: (N,) px; out: of the way to each pixel, in place of -1. Slanted steps are longer.
+        before: (N,) out: the pixel before it, in place of -1.
+
+    """
+    front = np.empty(len(flat), np.int64)
+    count = len(start)
+    for k in range(count):
+        front[k] = start[k]
+        length[start[k]] = 0.0
     slanted = 2.0**0.5
-    sides = [(step, 1.0) for step in (1, -1, wide, -wide)]
-    sides += [(step, slanted) for step in (wide + 1, wide - 1, -wide + 1, -wide - 1)]
-    length, before = [-1.0] * len(flat), [-1] * len(flat)
-    for k in start:
-        length[k] = 0.0
-    front = list(start)
-    while front:
-        later = []
-        for k in front:
-            for step, cost in sides:
-                other = place.get(flat[k] + step, -1)
-                if other >= 0 and length[other] < 0.0:
-                    length[other] = length[k] + cost
-                    before[other] = k
-                    later.append(other)
-        front = later
-    return length, before
+    sides = (1, -1, wide, -wide, wide + 1, wide - 1, -wide + 1, -wide - 1)
+    at = 0
+    while at < count:
+        here = front[at]
+        at += 1
+        for side in range(8):
+            other = place[flat[here] + sides[side]]
+            if other >= 0 and length[other] < 0.0:
+                length[other] = length[here] + (1.0 if side < 4 else slanted)
+                before[other] = here
+                front[count] = other
+                count += 1

@@ -179,6 +179,8 @@ def draw_spots(
             for u in range(left, right):
                 cover[v, u] += heavy * across[u]
             for p in range(len(by) - 1):
+                if x_by[p, k] == 0.0 and y_by[p, k] == 0.0 and area_by[p, k] == 0.0:
+                    continue  # of a spline's values a spot hangs on few
                 beside = heavy * x_by[p, k]
                 along = heavy * off / spot * y_by[p, k] + down * area_by[p, k]
                 for u in range(left, right):
