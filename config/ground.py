@@ -57,6 +57,21 @@ def build_ground(world: WorldConfig) -> HeightField | None:
     return HeightField(z - z.min(), spacing_m, -half_w, -half_h)
 
 
+def water_surface_m(world: WorldConfig, ground: HeightField | None) -> tuple[Floats, Floats] | None:
+    """Middle (3,) and size (2,) of the water's surface; None where there is none.
+
+    A shore's reaches to the waterline.
+    """
+    water = world.ground
+    if isinstance(water, WaterGround):
+        west_m, long_m, wide_m = -0.5 * water.size_m, water.size_m, water.size_m
+    elif isinstance(water, ShoreGround) and ground is not None:
+        west_m, long_m, wide_m = ground.x0_m, -ground.x0_m, ground.size_m[1]
+    else:
+        return None
+    return np.array([west_m + 0.5 * long_m, 0.0, water.depth_m]), np.array([long_m, wide_m])
+
+
 def _mapped(world: str, ground: MapGround) -> HeightField:
     try:
         held = read_map(Path(ground.source))

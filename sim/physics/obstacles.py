@@ -1,4 +1,4 @@
-"""Pole, pipe, pegs and walls: their geometry, and how a coiled body is put at the first two.
+"""Pole, pipe, pegs and walls in the model, and how a coiled body is put at the first two.
 
 Bodies touch them with MuJoCo's own cone (``condim`` 3), since an isotropic friction knows no
 direction along a body. The floor keeps the anisotropic friction of ``sim.physics.friction``.
@@ -6,7 +6,6 @@ direction along a body. The floor keeps the anisotropic friction of ``sim.physic
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import mujoco
 import numpy as np
@@ -16,7 +15,6 @@ from scipy.optimize import least_squares
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import (
-    WALL_M,
     CorridorObstacle,
     PegsObstacle,
     PipeObstacle,
@@ -24,12 +22,8 @@ from snakewalk.config.world import (
     WorldConfig,
 )
 from snakewalk.sim.physics.mechanics import Mechanics
+from snakewalk.sim.physics.solids import middle_m, solids
 
-STAVE_COUNT = 24
-"""Of which a pipe is made: its wall is flat by less than 1 % of its radius."""
-STAVE_M = 0.02
-CLEAR_M = 0.2
-"""Between the floor and what lies level, on the outside."""
 TAIL_UP_M = 0.01
 """Of the lowest link above the floor at the start."""
 COIL_MIN_RAD = 2.0
@@ -38,23 +32,6 @@ START_DEPTH_M = 0.005
 """How deep in an obstacle a body may start: contacts are soft, and it is pushed out at once."""
 OBSTACLE = "obstacle"
 """Begins the names of its geoms."""
-WOOD, GLASS = "0.55 0.42 0.30 1", "0.55 0.68 0.78 0.22"
-
-Obstacle = PoleObstacle | PipeObstacle | PegsObstacle | CorridorObstacle
-
-
-@dataclass(frozen=True, slots=True)
-class Solid:
-    """One geom of an obstacle."""
-
-    kind: Literal["cylinder", "box"]
-    half_m: tuple[float, ...]
-    """Radius and half length, or half edges."""
-    centre_m: Floats
-    """(3,)"""
-    axes: Floats
-    """(3, 3) columns."""
-    colour: str
 
 
 def obstacle_mjcf(world: WorldConfig) -> tuple[str, str]:
@@ -64,48 +41,16 @@ def obstacle_mjcf(world: WorldConfig) -> tuple[str, str]:
         return "", ""
     common = f'contype="1" conaffinity="2" condim="3" priority="1" friction="{thing.friction!r}"'
     text = ""
-    for k, part in enumerate(_parts(thing)):
+    for k, part in enumerate(solids(thing)):
         size = " ".join(repr(float(v)) for v in part.half_m)
         xyxes = " ".join(repr(float(v)) for v in (*part.axes[:, 0], *part.axes[:, 1]))
         pos = " ".join(repr(float(v)) for v in part.centre_m)
+        colour = " ".join(f"{v:g}" for v in part.colour)
         text += (
             f'<geom name="{OBSTACLE}{k}" type="{part.kind}" size="{size}" pos="{pos}" '
-            f'xyaxes="{xyxes}" rgba="{part.colour}" {common}/>'
+            f'xyaxes="{xyxes}" rgba="{colour}" {common}/>'
         )
     return ' cone="elliptic" impratio="10"', text
-
-
-def _parts(thing: Obstacle) -> list[Solid]:
-    upright = np.eye(3)
-    if isinstance(thing, PegsObstacle):
-        # as deep below z = 0 as high above it, so that pegs stand in hollows, too
-        size = (thing.radius_m, thing.height_m)
-        return [
-            Solid("cylinder", size, np.array([x, y, 0.0]), upright, WOOD)
-            for x, y in thing.places_m()
-        ]
-    if isinstance(thing, CorridorObstacle):
-        x, y = thing.at_m
-        off_m = 0.5 * (thing.width_m + WALL_M)
-        edges = (0.5 * thing.length_m, 0.5 * WALL_M, thing.height_m)
-        return [
-            Solid("box", edges, np.array([x, y + side * off_m, 0.0]), upright, WOOD)
-            for side in (1.0, -1.0)
-        ]
-    middle = _middle_m(thing)
-    turn = upright if thing.upright else np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]])
-    if isinstance(thing, PoleObstacle):
-        return [Solid("cylinder", (thing.radius_m, thing.length_m / 2), middle, turn, WOOD)]
-    half = (thing.radius_m + STAVE_M) * math.tan(math.pi / STAVE_COUNT)
-    out = thing.radius_m + STAVE_M / 2
-    stave = (STAVE_M / 2, half, thing.length_m / 2)
-    parts = []
-    for angle in 2.0 * math.pi * np.arange(STAVE_COUNT) / STAVE_COUNT:
-        c, s = math.cos(angle), math.sin(angle)
-        place = out * np.array([c, s, 0.0])
-        axes = turn @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        parts.append(Solid("box", stave, middle + turn @ place, axes, GLASS))
-    return parts
 
 
 def start_fault(m: Mechanics, world: WorldConfig) -> str | None:
@@ -126,12 +71,6 @@ def start_fault(m: Mechanics, world: WorldConfig) -> str | None:
                 f"({x:.2f}, {y:.2f}): move start_m, turn start_heading_rad, or move the obstacle"
             )
     return None
-
-
-def _middle_m(thing: PoleObstacle | PipeObstacle) -> Floats:
-    outer = thing.radius_m + (STAVE_M if isinstance(thing, PipeObstacle) else 0.0)
-    height = thing.length_m / 2 if thing.upright else outer + CLEAR_M
-    return np.array([*thing.at_m, height])
 
 
 def place_at_obstacle(
@@ -160,7 +99,7 @@ def place_at_obstacle(
         coil = fit_coil(_links_m(m, q))
     up = np.array([0.0, 0.0, 1.0]) if thing.upright else np.array([1.0, 0.0, 0.0])
     turn = _rotation(coil.axis, up, heading_rad)
-    place = _middle_m(thing) - turn @ coil.centre_m
+    place = middle_m(thing) - turn @ coil.centre_m
     links = _links_m(m, q) @ turn.T + place
     if thing.upright:
         place[2] += robot.body_radius_m + TAIL_UP_M - links[:, 2].min()

@@ -8,9 +8,10 @@ import mujoco
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Image, Ints
+from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import Water, WaterGround, WorldConfig
+from snakewalk.config.world import WorldConfig
 from snakewalk.sim.physics.body import finish, mjcf
 from snakewalk.sim.rendering.shade import SUN_DIRECTION
 
@@ -228,17 +229,14 @@ def _print(spec: mujoco.MjSpec, name: str, sheet: FloorPrint) -> None:
 
 def _water(spec: mujoco.MjSpec, world: WorldConfig, ground: HeightField | None) -> None:
     """Tint the floor by the water above it and draw its surface, which is seen through."""
-    water = world.ground
-    if not isinstance(water, Water):
+    water = water_surface_m(world, ground)
+    if water is None:
         return
-    if isinstance(water, WaterGround):
+    if ground is None:
         spec.texture("ground").rgb1, spec.texture("ground").rgb2 = SHALLOW
-        west_m, wide_m, long_m = -0.5 * water.size_m, water.size_m, water.size_m
-    elif ground is not None:  # a shore: up to the waterline
-        west_m, wide_m, long_m = ground.x0_m, ground.size_m[1], -ground.x0_m
-    surface = 0.5 * long_m, 0.5 * wide_m, 0.001
-    middle = west_m + 0.5 * long_m, 0.0, water.depth_m
-    _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_BOX, surface, middle, SURFACE)
+    middle_m, size_m = water
+    surface = *(0.5 * size_m).tolist(), 0.001
+    _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_BOX, surface, tuple(middle_m.tolist()), SURFACE)
 
 
 def _paint(model: mujoco.MjModel, ground: HeightField) -> None:

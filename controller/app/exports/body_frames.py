@@ -4,6 +4,7 @@ The frame of ``link0``, the head, is its centre; the frame of every other link i
 of it, as in a URDF. x is forward, y left, z up.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -20,12 +21,12 @@ WORLD: Final = "world"
 
 @dataclass(frozen=True, slots=True)
 class BodyFrames:
-    """Frames of the spine's links, each in the one before it; the head's in the world. No legs."""
+    """Frames of all links, each in the one that it hangs on; the head's in the world."""
 
     time_s: Floats
     """(T,)"""
     names: tuple[str, ...]
-    """L names, head first."""
+    """L names, head first; the segments of legs behind the spine, in the order of the bus."""
     parents: tuple[str, ...]
     """L names."""
     translation_m: Floats
@@ -51,21 +52,37 @@ def body_frames(record: RunRecord) -> BodyFrames:
     else:
         time_s = cycle.time_s
         head_m, turn = np.zeros((len(time_s), 3)), np.tile(np.eye(3), (len(time_s), 1, 1))
-    count = robot.link_count
+    count = robot.joint_count + 1
     translation = np.zeros((len(time_s), count, 3))
     quaternion = np.zeros((len(time_s), count, 4))
     translation[:, 0], quaternion[:, 0] = head_m, Rotation.from_matrix(turn).as_quat()
-    lengths_m = robot.link_lengths_m
-    translation[:, 1:, 0] = -np.array([0.5 * lengths_m[0], *lengths_m[1:-1]])
-    for joint, axis in enumerate(robot.joint_axes):
+    for joint, (at_m, axis) in enumerate(_joints(robot)):
         half_rad = 0.5 * _at(time_s, cycle.time_s, cycle.measured_rad[:, joint])
+        translation[:, joint + 1] = at_m
         quaternion[:, joint + 1, 3] = np.cos(half_rad)
-        if axis == "y":
-            quaternion[:, joint + 1, 2] = -np.sin(half_rad)
-        else:
-            quaternion[:, joint + 1, 1] = np.sin(half_rad)
+        quaternion[:, joint + 1, :3] = np.sin(half_rad)[:, None] * axis
     names = tuple(f"link{k}" for k in range(count))
-    return BodyFrames(time_s, names, (WORLD, *names[:-1]), translation, quaternion)
+    parents = tuple(WORLD if k < 0 else names[k] for k in robot.link_parents)
+    return BodyFrames(time_s, names, parents, translation, quaternion)
+
+
+def _joints(robot: RobotConfig) -> Iterator[tuple[Floats, Floats]]:
+    """Where each joint is in the frame of the link before it, and its axis; spine, then legs."""
+    lengths_m = robot.link_lengths_m
+    for long_m, letter in zip(
+        (0.5 * lengths_m[0], *lengths_m[1:-1]), robot.joint_axes, strict=True
+    ):
+        axis = (0.0, 0.0, -1.0) if letter == "y" else (0.0, 1.0, 0.0)
+        yield np.array([-long_m, 0.0, 0.0]), np.array(axis)
+    for joint in robot.limb_joints:
+        pair, side = robot.limbs[joint.pair], 1.0 if joint.side == "left" else -1.0
+        if joint.place:
+            at_m = (0.0, side * pair.segments_m[joint.place - 1], 0.0)
+        else:
+            back_m = 0.5 * lengths_m[pair.link] if pair.link else 0.0
+            at_m = (-back_m, side * pair.hip_m, 0.0)
+        swings = pair.joint_axes[joint.place] == "y"
+        yield np.array(at_m), np.array((0.0, 0.0, -side) if swings else (side, 0.0, 0.0))
 
 
 def _at(time_s: Floats, sampled_s: Floats, angle_rad: Floats) -> Floats:

@@ -12,14 +12,17 @@ from typing import Any, Final
 
 import numpy as np
 from mcap.writer import Writer
+from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.controller.app.exports.body_frames import WORLD, body_frames, joint_names
 from snakewalk.controller.app.exports.foxglove_schema import SCHEMAS
 from snakewalk.controller.app.exports.imu_readings import IMU_TOPIC, imu_readings, recorded_topics
 from snakewalk.controller.runlog.encode import encode, floats, number
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.sim.physics.solids import solids
 
 Json = dict[str, Any]
 Row = tuple[float, str, Json]
@@ -40,10 +43,13 @@ _LINKS: Final = ((0.20, 0.45, 0.70, 1.0), (0.35, 0.65, 0.85, 1.0))
 _PATH: Final = (0.95, 0.75, 0.10, 1.0)
 _WAYPOINT: Final = (0.10, 0.65, 0.30, 0.35)
 _GROUND: Final = ((0.33, 0.36, 0.30, 1.0), (0.80, 0.78, 0.68, 1.0))
+_WATER: Final = (0.55, 0.80, 0.92, 0.25)
 """Colours (ours): red, green, blue, opacity; of the ground's lowest and highest point."""
 _UPRIGHT: Final = (0.0, 0.0, 0.0, 1.0)
 _ALONG: Final = (0.0, 0.5**0.5, 0.0, 0.5**0.5)
 """Turns a cylinder, which stands along z, along x."""
+_ACROSS: Final = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
+"""The same along y."""
 _MARGIN_M: Final = 1.0
 """How far a flat floor is drawn beyond the path (ours)."""
 _WIDTH_PX: Final = 3.0
@@ -76,7 +82,8 @@ def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:
 
 
 def _rows(record: RunRecord) -> Iterator[Row]:
-    yield 0.0, "/scene", _scene([*_body(record), _ground(record)])
+    things = [*_body(record), _ground(record), *_water(record), *_obstacle(record)]
+    yield 0.0, "/scene", _scene(things)
     for time_s, points_m in record.waypoints:
         yield time_s, "/scene", _scene([_waypoints(record, time_s, points_m)])
     for time_s, points_m in record.paths:
@@ -166,7 +173,7 @@ def _joints(record: RunRecord) -> Iterator[Row]:
 
 
 def _body(record: RunRecord) -> Iterator[Json]:
-    """A cylinder for each link of the spine, which moves with its frame."""
+    """A cylinder for each link of spine and legs, which moves with its frame."""
     robot = record.header.robot
     for link, color in zip(range(robot.link_count), cycle(_LINKS), strict=False):
         length_m, width_m = robot.link_lengths_m[link], 2.0 * robot.link_radii_m[link]
@@ -178,6 +185,17 @@ def _body(record: RunRecord) -> Iterator[Json]:
             "bottom_scale": 1.0,
             "top_scale": 1.0 if link else 0.6,  # the head's tip
             "color": _color(_HEAD if link == 0 else color),
+        }
+        yield _entity(f"link{link}", 0.0, frame=f"link{link}", locked=True, cylinders=[cylinder])
+    for link, joint in enumerate(robot.limb_joints, robot.link_count):
+        pair, side = robot.limbs[joint.pair], 1.0 if joint.side == "left" else -1.0
+        length_m, width_m = pair.segments_m[joint.place], 2.0 * pair.foot_radius_m
+        cylinder = {
+            "pose": _pose([0.0, 0.5 * side * length_m, 0.0], _ACROSS),
+            "size": _xyz([width_m, width_m, length_m]),
+            "bottom_scale": 1.0,
+            "top_scale": 1.0,
+            "color": _color(_LINKS[joint.place % 2]),
         }
         yield _entity(f"link{link}", 0.0, frame=f"link{link}", locked=True, cylinders=[cylinder])
 
@@ -197,6 +215,34 @@ def _ground(record: RunRecord) -> Json:
         "indices": faces.ravel().tolist(),
     }
     return _entity("ground", 0.0, triangles=[triangles])
+
+
+def _water(record: RunRecord) -> Iterator[Json]:
+    """The surface, seen through."""
+    surface_m = water_surface_m(record.header.world, record.header.ground)
+    if surface_m is not None:
+        middle_m, size_m = surface_m
+        pose, size = _pose(middle_m.tolist(), _UPRIGHT), _xyz([*size_m.tolist(), 0.002])
+        cube = {"pose": pose, "size": size, "color": _color(_WATER)}
+        yield _entity("water", 0.0, cubes=[cube])
+
+
+def _obstacle(record: RunRecord) -> Iterator[Json]:
+    """Pole, pipe, pegs or walls, of the parts that the body touches."""
+    thing = record.header.world.obstacle
+    if thing is None:
+        return
+    cubes, cylinders = [], []
+    for part in solids(thing):
+        turn = Rotation.from_matrix(part.axes).as_quat().tolist()
+        drawn = {"pose": _pose(part.centre_m.tolist(), turn), "color": _color(part.colour)}
+        if part.kind == "box":
+            cubes.append(drawn | {"size": _xyz(2.0 * np.array(part.half_m))})
+        else:
+            radius_m, half_m = part.half_m
+            size = _xyz([2.0 * radius_m, 2.0 * radius_m, 2.0 * half_m])
+            cylinders.append(drawn | {"size": size, "bottom_scale": 1.0, "top_scale": 1.0})
+    yield _entity("obstacle", 0.0, cubes=cubes, cylinders=cylinders)
 
 
 def _drawn_ground(record: RunRecord) -> HeightField:
@@ -273,7 +319,7 @@ def _time(time_s: float) -> Json:
 
 
 def _xyz(values: Any) -> Json:
-    x, y, z = values
+    x, y, z = map(float, values)
     return {"x": x, "y": y, "z": z}
 
 

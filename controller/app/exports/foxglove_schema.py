@@ -35,6 +35,7 @@ _QUATERNION: Final = _object("foxglove.Quaternion", **_XYZ, w=_NUMBER)
 _COLOR: Final = _object("foxglove.Color", r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
 _POSE: Final = _object("foxglove.Pose", position=_VECTOR, orientation=_QUATERNION)
 _SPHERE: Final = _object("foxglove.SpherePrimitive", pose=_POSE, size=_VECTOR, color=_COLOR)
+_CUBE: Final = _object("foxglove.CubePrimitive", pose=_POSE, size=_VECTOR, color=_COLOR)
 _CYLINDER: Final = _object(
     "foxglove.CylinderPrimitive",
     pose=_POSE,
@@ -73,7 +74,7 @@ _ENTITY: Final = _object(
     frame_locked=_TRUTH,
     metadata=_NONE,
     arrows=_NONE,
-    cubes=_NONE,
+    cubes=_list(_CUBE),
     spheres=_list(_SPHERE),
     cylinders=_list(_CYLINDER),
     lines=_list(_LINE),

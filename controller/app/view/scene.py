@@ -10,11 +10,13 @@ import viser
 from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField, surface
-from snakewalk.config.world import PoleObstacle
+from snakewalk.controller.kinematics.legs import leg_segments_m
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.runlog.record import Header, RunRecord
 from snakewalk.drivers.types import BodyPose
+from snakewalk.sim.physics.solids import Solid, solids
 
 _HEAD: Final = (205, 72, 12)
 _LINKS: Final = ((26, 70, 128), (60, 118, 180)), ((30, 104, 52), (84, 168, 96))
@@ -24,6 +26,7 @@ _GOAL: Final = (250, 190, 40)
 _PATH: Final = (240, 170, 20)
 _OLD_PATH: Final = (165, 160, 150)
 _TRAIL: Final = (120, 120, 132)
+_WATER: Final = (140, 204, 235)
 _WAYPOINT: Final = (40, 160, 80)
 _REACHED: Final = (150, 150, 150)
 _GROUND: Final = np.array([(96, 104, 84), (214, 208, 182)])
@@ -58,6 +61,7 @@ class BodyScene:
         self._waypoints: list[viser.IcosphereHandle] = []
         self._scene.set_up_direction("+z")
         self._draw_ground()
+        self._draw_water()
         self._draw_obstacle()
         links = self._robot.link_count
         colors = [_LINKS[number % 2][k % 2] for k in range(links)]
@@ -67,6 +71,7 @@ class BodyScene:
         self._body = self._links("body", self._colors.astype(np.uint8), radii_m, 0.94)
         line_m = np.full(links, _GOAL_WIDTH * float(radii_m.max()))
         self._goals = self._links("goals", np.array(_GOAL, dtype=np.uint8), line_m, 1.0)
+        self._legs = self._leg_links() if self._robot.limbs else None
         self._joint_of = np.minimum(np.arange(links), links - 2)
 
     def show(self, record: RunRecord, cycle: int, pose: int, *, follow: bool, goals: bool) -> None:
@@ -82,6 +87,11 @@ class BodyScene:
         share = np.clip(load, 0.0, 1.0)[self._joint_of, None]
         shown = self._colors + share * (np.array(_HOT) - self._colors)
         self._body.batched_colors = shown.astype(np.uint8)
+        if self._legs is not None:
+            _place_legs(
+                self._legs,
+                leg_segments_m(self._robot, measured, np.nan_to_num(rows.measured_rad[cycle])),
+            )
         self._goals.visible = goals
         if goals:
             sent = np.nan_to_num(rows.sent_rad[cycle, :spine])
@@ -176,6 +186,25 @@ class BodyScene:
             cast_shadow=False,
         )
 
+    def _leg_links(self) -> viser.BatchedMeshHandle:
+        """One mesh for all segments of legs: a cylinder along x, drawn to their lengths."""
+        joints, limbs = self._robot.limb_joints, self._robot.limbs
+        mesh = trimesh.creation.cylinder(1.0, 1.0, sections=16)
+        long = np.array([limbs[each.pair].segments_m[each.place] for each in joints])
+        radii_m = np.array([limbs[each.pair].foot_radius_m for each in joints])
+        return self._scene.add_batched_meshes_simple(
+            f"{self._root}/legs",
+            np.asarray(mesh.vertices)[:, [2, 0, 1]],
+            np.asarray(mesh.faces),
+            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(joints), 1)),
+            batched_positions=np.zeros((len(joints), 3)),
+            batched_scales=np.column_stack([long, radii_m, radii_m]),
+            batched_colors=self._colors[1 + np.arange(len(joints)) % 2].astype(np.uint8),
+            flat_shading=False,
+            lod="off",
+            cast_shadow=False,
+        )
+
     def _draw_ground(self) -> None:
         if self._ground is None:
             self._floor: viser.SceneNodeHandle = self._scene.add_grid(
@@ -195,21 +224,34 @@ class BodyScene:
             f"{self._root}/ground", _ground_mesh(self._ground)
         )
 
+    def _draw_water(self) -> None:
+        surface_m = water_surface_m(self._header.world, self._ground)
+        if surface_m is not None:
+            middle_m, size_m = surface_m
+            self._scene.add_box(
+                f"{self._root}/water",
+                color=_WATER,
+                dimensions=(*size_m.tolist(), 0.002),
+                opacity=0.25,
+                position=tuple(middle_m),
+                cast_shadow=False,
+            )
+
     def _draw_obstacle(self) -> None:
-        obstacle = self._header.world.obstacle
-        if not isinstance(obstacle, PoleObstacle):
+        thing = self._header.world.obstacle
+        if thing is None:
             return
-        length_m = obstacle.length_m
-        pole = trimesh.creation.cylinder(obstacle.radius_m, length_m, sections=32)
-        turn = (1.0, 0.0, 0.0, 0.0) if obstacle.upright else (0.5**0.5, 0.0, 0.5**0.5, 0.0)
-        height_m = 0.5 * length_m if obstacle.upright else obstacle.radius_m
+        parts = solids(thing)
+        meshes = [_mesh_of(part) for part in parts]
+        starts = np.cumsum([0, *(len(each.vertices) for each in meshes[:-1])])
+        *color, opacity = parts[0].colour
         self._scene.add_mesh_simple(
-            f"{self._root}/pole",
-            np.asarray(pole.vertices),
-            np.asarray(pole.faces),
-            color=(150, 120, 90),
-            wxyz=turn,
-            position=(*obstacle.at_m, height_m),
+            f"{self._root}/obstacle",
+            np.concatenate([each.vertices for each in meshes]),
+            np.concatenate([each.faces + k for each, k in zip(meshes, starts, strict=True)]),
+            color=np.array(color),
+            opacity=opacity if opacity < 1.0 else None,
+            side="double",
         )
 
     def _show_waypoints(self, waypoints_m: Floats, reached: int) -> None:
@@ -257,6 +299,28 @@ def _place(links: viser.BatchedMeshHandle, body: BodyView, above_m: float = 0.0)
     links.batched_positions = (body.link_m + np.array([0.0, 0.0, above_m])).astype(np.float32)
     turns = Rotation.from_matrix(body.rotation).as_quat()
     links.batched_wxyzs = turns[:, [3, 0, 1, 2]].astype(np.float32)
+
+
+def _place_legs(legs: viser.BatchedMeshHandle, ends_m: Floats) -> None:
+    along = ends_m[:, 1] - ends_m[:, 0]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    half = np.column_stack([1.0 + along[:, 0], np.zeros(len(along)), -along[:, 2], along[:, 1]])
+    half[half[:, 0] < 1e-9] = 0.0, 0.0, 0.0, 1.0  # straight back: any half turn
+    legs.batched_positions = ends_m.mean(axis=1).astype(np.float32)
+    turns = half / np.linalg.norm(half, axis=1, keepdims=True)
+    legs.batched_wxyzs = turns.astype(np.float32)
+
+
+def _mesh_of(part: Solid) -> trimesh.Trimesh:
+    place = np.eye(4)
+    place[:3, :3], place[:3, 3] = part.axes, part.centre_m
+    if part.kind == "box":
+        mesh: trimesh.Trimesh = trimesh.creation.box(2.0 * np.array(part.half_m))
+    else:
+        radius_m, half_m = part.half_m
+        mesh = trimesh.creation.cylinder(radius_m, 2.0 * half_m, sections=32)
+    mesh.apply_transform(place)
+    return mesh
 
 
 def _ground_mesh(field: HeightField) -> trimesh.Trimesh:

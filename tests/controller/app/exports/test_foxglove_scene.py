@@ -2,18 +2,24 @@
 
 import json
 from collections import defaultdict
+from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 from scipy.spatial.transform import Rotation
 
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.config.world import WaterGround
 from snakewalk.controller.app.exports.body_frames import body_frames
 from snakewalk.controller.app.exports.foxglove_scene import write_foxglove_scene
 from snakewalk.controller.app.exports.foxglove_schema import SCHEMAS
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.sim.physics.plant import MujocoPlant
 
 Messages = dict[str, list[Any]]
 PYTHON_TYPES = {"number": (int, float), "integer": int, "string": str, "boolean": bool}
@@ -21,7 +27,11 @@ PYTHON_TYPES = {"number": (int, float), "integer": int, "string": str, "boolean"
 
 @pytest.fixture(scope="module")
 def messages(record: RunRecord, tmp_path_factory: pytest.TempPathFactory) -> Messages:
-    path = tmp_path_factory.mktemp("scene") / "scene.mcap"
+    return written(record, tmp_path_factory.mktemp("scene") / "scene.mcap")
+
+
+def written(record: RunRecord, path: Path) -> Messages:
+    """Messages of each topic, every one of them as its schema says."""
     counts = write_foxglove_scene(record, path)
     out: Messages = defaultdict(list)
     with path.open("rb") as file:
@@ -119,6 +129,50 @@ def test_the_ground_has_the_triangles_of_the_physics(messages: Messages, record:
     )
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert (normals[:, 2] > 0).all()  # seen from above
+
+
+@pytest.mark.parametrize("world", ["pegs", "pipe", "pole", "corridor"])
+def test_an_obstacle_has_the_parts_that_the_body_touches(
+    record: RunRecord, tmp_path: Path, world: str
+) -> None:
+    made = load_world(world)
+    header = replace(record.header, world=made, ground=None)
+    first = written(replace(record, header=header), tmp_path / "scene.mcap")["/scene"][0]
+    (entity,) = (e for e in first["entities"] if e["id"] == "obstacle")
+    model = MujocoPlant(load_robot("yaw16"), made).mechanics.model
+    geoms = [model.geom(k) for k in range(model.ngeom)]
+    touched = [geom for geom in geoms if geom.name.startswith("obstacle")]
+    drawn = [*entity["cubes"], *entity["cylinders"]]
+    assert len(drawn) == len(touched)
+    for part, geom in zip(drawn, touched, strict=True):
+        at, size = part["pose"]["position"], list(part["size"].values())
+        np.testing.assert_allclose(list(at.values()), geom.pos, atol=1e-6)
+        turn = Rotation.from_quat(list(part["pose"]["orientation"].values()))
+        same = turn.inv() * Rotation.from_quat(geom.quat, scalar_first=True)
+        assert same.magnitude() < 1e-6
+        if geom.type == mujoco.mjtGeom.mjGEOM_BOX:
+            np.testing.assert_allclose(size, 2.0 * geom.size, atol=1e-6)
+        else:
+            np.testing.assert_allclose(size, 2.0 * geom.size[[0, 0, 1]], atol=1e-6)
+
+
+def test_water_lies_as_high_as_it_is_deep(record: RunRecord, tmp_path: Path) -> None:
+    made = load_world("pool")
+    header = replace(record.header, world=made, ground=None)
+    first = written(replace(record, header=header), tmp_path / "scene.mcap")["/scene"][0]
+    (entity,) = (e for e in first["entities"] if e["id"] == "water")
+    assert isinstance(made.ground, WaterGround)
+    assert entity["cubes"][0]["pose"]["position"]["z"] == made.ground.depth_m
+
+
+def test_legs_have_a_cylinder_each_segment(record: RunRecord, tmp_path: Path) -> None:
+    robot = load_robot("salamander")
+    header = replace(record.header, robot=robot)
+    first = written(replace(record, header=header), tmp_path / "scene.mcap")["/scene"][0]
+    drawn = {e["id"]: e for e in first["entities"]}
+    for link, joint in enumerate(robot.limb_joints, robot.link_count):
+        (cylinder,) = drawn[f"link{link}"]["cylinders"]
+        assert cylinder["size"]["z"] == robot.limbs[joint.pair].segments_m[joint.place]
 
 
 def test_joints_path_and_events(messages: Messages, record: RunRecord) -> None:

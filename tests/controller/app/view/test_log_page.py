@@ -10,11 +10,19 @@ import pytest
 
 pytest.importorskip("viser")
 
+from scipy.spatial.transform import Rotation
+
 from snakewalk.config.errors import InputError
+from snakewalk.config.ground import water_surface_m
+from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.app.cli.main import main
 from snakewalk.controller.app.view.log_page import LogPage
+from snakewalk.controller.kinematics.legs import leg_segments_m
+from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.tables import record_of
+from snakewalk.drivers.types import BodyPose
+from snakewalk.sim.physics.solids import Solid, solids
 
 
 @pytest.fixture
@@ -82,6 +90,57 @@ def test_two_logs_begin_together_and_stand_beside_each_other(record: RunRecord) 
     wide_m = np.ptp(record.pose.centre_m[:, 1])
     between_m = scenes[0]._frame.position[1] - scenes[1]._frame.position[1]
     assert between_m >= wide_m + 0.5 - 1e-9
+    page.server.stop()
+
+
+@pytest.mark.parametrize("world", ["pegs", "pipe", "corridor", "pool"])
+def test_obstacles_and_water_are_drawn_where_the_body_meets_them(
+    record: RunRecord, world: str
+) -> None:
+    made = load_world(world)
+    page = LogPage(
+        {"log": replace(record, header=replace(record.header, world=made, ground=None))},
+        "127.0.0.1",
+        0,
+    )
+    handles = page.server.scene._handle_from_node_name
+    if made.obstacle is None:
+        surface_m = water_surface_m(made, None)
+        assert surface_m is not None
+        np.testing.assert_allclose(handles["/run0/water"].position, surface_m[0])
+    else:
+        corners = handles["/run0/obstacle"].vertices
+        parts = solids(made.obstacle)
+        reach = [np.abs(part.axes) @ _half_m(part) for part in parts]
+        low = np.min([part.centre_m - each for part, each in zip(parts, reach, strict=True)], 0)
+        np.testing.assert_allclose(corners.min(axis=0), low, atol=1e-6)
+    page.server.stop()
+
+
+def _half_m(part: Solid) -> np.ndarray:
+    if part.kind == "box":
+        return np.array(part.half_m)
+    radius_m, half_m = part.half_m
+    return np.array([radius_m, radius_m, half_m])
+
+
+def test_legs_move_with_their_joints(record: RunRecord) -> None:
+    robot = load_robot("salamander")
+    page = LogPage(
+        {"log": replace(record, header=replace(record.header, robot=robot))}, "127.0.0.1", 0
+    )
+    scene = page._shown[0].scene
+    scene.show(record, 7, 7, follow=False, goals=False)
+    pose = BodyPose(0.0, record.pose.head_m[7], record.pose.rotation[7])
+    angles = np.nan_to_num(record.cycle.measured_rad[7])
+    ends_m = leg_segments_m(robot, body_in_world(robot, pose, angles), angles)
+    legs = scene._legs
+    assert legs is not None
+    np.testing.assert_allclose(legs.batched_positions, ends_m.mean(axis=1), atol=1e-6)
+    turn = Rotation.from_quat(legs.batched_wxyzs, scalar_first=True)
+    along = ends_m[:, 1] - ends_m[:, 0]
+    lengths_m = np.linalg.norm(along, axis=1, keepdims=True)
+    np.testing.assert_allclose(turn.apply([1.0, 0.0, 0.0]), along / lengths_m, atol=1e-5)
     page.server.stop()
 
 

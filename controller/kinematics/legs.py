@@ -1,0 +1,36 @@
+"""Where the segments of a robot's legs are, from its spine and the angles of its joints."""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.kinematics.links import BodyView
+
+
+def leg_segments_m(robot: RobotConfig, body: BodyView, joint_rad: Floats) -> Floats:
+    """(S, 2, 3) joint and far end of each segment of the legs, one a joint in the bus's order.
+
+    Args:
+        robot: Whose legs.
+        body: Its spine in the world.
+        joint_rad: (J,) angles of all joints, those of the spine first.
+
+    """
+    found = np.empty((len(robot.limb_joints), 2, 3))
+    turn, end_m = np.eye(3), np.zeros(3)
+    for k, (joint, angle) in enumerate(
+        zip(robot.limb_joints, joint_rad[robot.link_count - 1 :], strict=True)
+    ):
+        pair, side = robot.limbs[joint.pair], 1.0 if joint.side == "left" else -1.0
+        if joint.place == 0:
+            turn = body.rotation[pair.link]
+            end_m = body.link_m[pair.link] + side * pair.hip_m * turn[:, 1]
+        c, s = np.cos(angle), side * np.sin(angle)
+        if pair.joint_axes[joint.place] == "y":  # positive swings forward
+            turn = turn @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        else:  # positive lifts
+            turn = turn @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+        found[k, 0] = end_m
+        end_m = end_m + side * pair.segments_m[joint.place] * turn[:, 1]
+        found[k, 1] = end_m
+    return found

@@ -1,0 +1,84 @@
+"""Pole, pipe, pegs and walls as the cylinders and boxes of which they are made.
+
+What touches them, and what draws them, takes the same; MuJoCo is not needed for it.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.world import (
+    WALL_M,
+    CorridorObstacle,
+    PegsObstacle,
+    PipeObstacle,
+    PoleObstacle,
+)
+
+STAVE_COUNT = 24
+"""Of which a pipe is made: its wall is flat by less than 1 % of its radius."""
+STAVE_M = 0.02
+CLEAR_M = 0.2
+"""Between the floor and what lies level, on the outside."""
+WOOD, GLASS = (0.55, 0.42, 0.30, 1.0), (0.55, 0.68, 0.78, 0.22)
+"""Red, green, blue, opacity (ours)."""
+
+Obstacle = PoleObstacle | PipeObstacle | PegsObstacle | CorridorObstacle
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """One part of an obstacle; a cylinder stands along the third of its axes."""
+
+    kind: Literal["cylinder", "box"]
+    half_m: tuple[float, ...]
+    """Radius and half length, or half edges."""
+    centre_m: Floats
+    """(3,)"""
+    axes: Floats
+    """(3, 3) columns."""
+    colour: tuple[float, float, float, float]
+
+
+def solids(thing: Obstacle) -> list[Solid]:
+    """Parts of an obstacle, in the world."""
+    upright = np.eye(3)
+    if isinstance(thing, PegsObstacle):
+        # as deep below z = 0 as high above it, so that pegs stand in hollows, too
+        size = (thing.radius_m, thing.height_m)
+        return [
+            Solid("cylinder", size, np.array([x, y, 0.0]), upright, WOOD)
+            for x, y in thing.places_m()
+        ]
+    if isinstance(thing, CorridorObstacle):
+        x, y = thing.at_m
+        off_m = 0.5 * (thing.width_m + WALL_M)
+        edges = (0.5 * thing.length_m, 0.5 * WALL_M, thing.height_m)
+        return [
+            Solid("box", edges, np.array([x, y + side * off_m, 0.0]), upright, WOOD)
+            for side in (1.0, -1.0)
+        ]
+    middle = middle_m(thing)
+    turn = upright if thing.upright else np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]])
+    if isinstance(thing, PoleObstacle):
+        return [Solid("cylinder", (thing.radius_m, thing.length_m / 2), middle, turn, WOOD)]
+    half = (thing.radius_m + STAVE_M) * math.tan(math.pi / STAVE_COUNT)
+    out = thing.radius_m + STAVE_M / 2
+    stave = (STAVE_M / 2, half, thing.length_m / 2)
+    parts = []
+    for angle in 2.0 * math.pi * np.arange(STAVE_COUNT) / STAVE_COUNT:
+        c, s = math.cos(angle), math.sin(angle)
+        place = out * np.array([c, s, 0.0])
+        axes = turn @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        parts.append(Solid("box", stave, middle + turn @ place, axes, GLASS))
+    return parts
+
+
+def middle_m(thing: PoleObstacle | PipeObstacle) -> Floats:
+    """(3,) middle of the axis."""
+    outer = thing.radius_m + (STAVE_M if isinstance(thing, PipeObstacle) else 0.0)
+    height = thing.length_m / 2 if thing.upright else outer + CLEAR_M
+    return np.array([*thing.at_m, height])
