@@ -139,6 +139,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def wheel(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """As pip builds it from a clone; ``build`` and package indexes go through the sdist."""
     return build("wheel", source, tmp_path_factory.mktemp("wheel"))
 
 

@@ -2,10 +2,10 @@
 
 They are run as printed, in this process, with a budget that the pages do not show (``budget``):
 
-- a motion on simulated servos is cut ``MOTION_S`` after its ramp, and but for ``plan`` so is the
-  motion that is carried out on paper before; path, start-up, bus, log and summary are whole;
+- a motion on simulated servos is cut ``MOTION_S`` after its ramp, and so is the motion on paper
+  before, and that of ``plan`` with options; path, start-up, bus, log and summary are whole;
 - a camera is looked through for a second;
-- page and film are made for the lines of ``WHOLE`` and by ``report`` only;
+- page and film are made by ``report`` only;
 - of a study's runs the first one is made, in this process; of a graph's walks one; of actions the
   those of ``ACTIONS`` are recorded; a film of a crowd has two frames;
 - ``bus serve`` looks at its port a few times.
@@ -85,18 +85,13 @@ NOT_RUN = {
 }
 """Command, or option, and why no line with it is run here."""
 
-WHOLE = {
-    "snakewalk run flat-slalom --motion serpenoid",
-    "snakewalk run jacksboro-traverse --look animal",
-}
 LINES = [(page, line) for page in PAGES for line in printed(page)]
 
 
 class Budget:
-    """Whether a command plans to the end, makes page and film, and whether it cut a motion."""
+    """Whether a command plans to the end, and whether it cut a motion."""
 
     plans = False
-    whole = False
     was_cut = False
 
 
@@ -124,10 +119,11 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     forecast = walk_run.forecast
 
     def short_forecast(*parts: Any, **options: Any) -> Any:
+        now.was_cut = not now.plans
         return forecast(*parts, **options | ({} if now.plans else {"limit_s": MOTION_S}))
 
     def few_artifacts(record: Any, folder: Path, numbers: Any = None, **options: Any) -> Any:
-        if now.whole or numbers is None:  # of ``report``
+        if numbers is None:  # of ``report``
             return make(record, folder, numbers, **options)
         artifacts.write_summary(numbers, folder)
         return artifacts.Artifacts(None, None, ())
@@ -199,7 +195,7 @@ def _scene(frames: int) -> SnakeScene:
 
 def _film(to: Path) -> None:
     writer = cv2.VideoWriter(str(to), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (200, 160))
-    for frame in film(_scene(12)):
+    for frame in film(_scene(8)):
         writer.write(cv2.cvtColor(frame, cv2.COLOR_GRAY2BGR))
     writer.release()
 
@@ -230,7 +226,7 @@ def _midlines(to: Path) -> None:
 def _fish(to: Path) -> None:
     """Both views of a fish whose every angle is known."""
     assert (
-        snakewalk("fish", "film", "tank", "--side", "--frames", "6", "--length-px", "60").returncode
+        snakewalk("fish", "film", "tank", "--side", "--frames", "4", "--length-px", "60").returncode
         == 0
     )
     for view in ("top", "side"):
@@ -385,7 +381,7 @@ def _run(words: Sequence[str], budget: Budget, left: dict[str, Path]) -> str | N
         return None
     reads = any(Path(word).exists() for word in words)
     before = _files()
-    budget.plans, budget.whole, budget.was_cut = words[0] == "plan", name in WHOLE, False
+    budget.plans, budget.was_cut = name == "plan", False
     done = snakewalk(*words)
     if done.returncode not in ({0, 1} if budget.was_cut else {0}):
         return f"{name}: {done.stderr}"

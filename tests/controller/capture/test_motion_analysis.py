@@ -138,10 +138,12 @@ def test_turned_frames_are_turned_back() -> None:
     assert np.nanstd(seeing) < 0.2 * np.nanstd(blind)
 
 
-def wave_track(travel: float, amplitude: float = 0.5, rate_hz: float = 40.0) -> Track:
+def wave_track(
+    travel: float, amplitude: float = 0.5, rate_hz: float = 40.0, frames: int = 251
+) -> Track:
     """1.4 waves at 0.8 Hz for five cycles, head advancing at ``travel`` of the wave's speed."""
     waves, hz, length = 1.4, 0.8, 0.3
-    time = np.arange(251) / rate_hz
+    time = np.arange(frames) / rate_hz
     s = (N + 0.5) / 100
     angles = amplitude * np.sin(2 * np.pi * (waves * s - hz * time[:, None]))
     step = np.stack([np.cos(angles[:, 0]), np.sin(angles[:, 0])], axis=-1)
@@ -202,10 +204,10 @@ def test_who_holds_station_in_a_flow_has_no_sliding_told(travel: float) -> None:
 
 def test_what_is_not_told_is_no_number_anywhere(tmp_path: Path) -> None:
     """Frames too far apart, and noise: null with the reason in JSON, words in the table."""
-    coarse = wave_track(0.8, rate_hz=2.6)
-    noise = np.random.default_rng(0).normal(0.0, 0.006, (251, 101, 2))
+    coarse = wave_track(0.8, rate_hz=2.6, frames=60)
+    noise = np.random.default_rng(0).normal(0.0, 0.006, (120, 101, 2))
     save_track(tmp_path / "coarse.npz", coarse)
-    points = wave_track(0.8).points + noise
+    points = wave_track(0.8, frames=120).points + noise
     save_track(tmp_path / "noisy.npz", track_from_points("noisy", points, 40.0, scale_m=1.0))
     files = [str(tmp_path / name) for name in ("coarse.npz", "noisy.npz")]
     done = snakewalk("analyse", *files, "--picture", str(tmp_path), "--json")
@@ -261,7 +263,7 @@ def test_a_real_worm_that_backs_up(shared_data: Path) -> None:
 
 
 def test_the_command_takes_names_and_files_and_draws(tmp_path: Path) -> None:
-    save_track(tmp_path / "mine.npz", wave_track(0.8))
+    save_track(tmp_path / "mine.npz", wave_track(0.8, frames=151))
     words = ["analyse", str(tmp_path / "mine.npz"), "lamprey-like", "--picture", str(tmp_path)]
     done = snakewalk(*words, "--json")
     assert done.returncode == 0, done.stderr

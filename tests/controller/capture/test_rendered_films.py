@@ -12,7 +12,7 @@ from snakewalk.controller.capture.image.silhouette import Polarity
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
 
-CLEAN = SnakeScene(rows=240, columns=320, frames=20, wave_hz=0.6)
+CLEAN = SnakeScene(rows=240, columns=320, frames=10, rate_hz=15.0, wave_hz=0.6)
 HARSH = replace(CLEAN, noise=6.0, blur_px=1.2, light=0.3, shadow=0.25, texture=5.0)
 
 
@@ -60,39 +60,39 @@ def test_a_light_animal_on_dark_ground_with_a_given_background() -> None:
 
 
 def test_colours_of_equal_brightness_are_told_apart() -> None:
-    scene = replace(CLEAN, length_px=90.0, frames=12)
+    scene = replace(CLEAN, length_px=90.0, frames=8)
     frames = [np.dstack([f, np.full_like(f, 90), 230 - f]) for f in film(scene)]
     seen = capture(frames, make_detector(frames[::2]), scene.rate_hz)
     assert median_error(scene, seen) < 0.01 * scene.length_px
 
 
 def test_the_head_stays_the_head_after_a_gap() -> None:
-    scene = replace(CLEAN, length_px=130.0, frames=44)
+    scene = replace(CLEAN, length_px=130.0, frames=22)
     frames = list(film(scene))
-    for k in range(16, 28):
+    for k in range(8, 14):
         frames[k] = empty(scene)
-    seen = capture(frames, make_detector(frames[::3], empty(scene)), scene.rate_hz)
+    seen = capture(frames, make_detector(frames[::4], empty(scene)), scene.rate_hz)
     truth = true_midlines(scene)
-    assert np.flatnonzero(~seen.good).tolist() == list(range(16, 28))
-    assert seen.counts["nothing seen"] == 12
-    assert np.isnan(seen.points_px[16:28]).all()
+    assert np.flatnonzero(~seen.good).tolist() == list(range(8, 14))
+    assert seen.counts["nothing seen"] == 6
+    assert np.isnan(seen.points_px[8:14]).all()
     assert not any(swapped(seen.points_px[k], truth[k]) for k in np.flatnonzero(seen.good))
 
 
 def test_the_user_may_say_where_the_head_is() -> None:
-    scene = replace(CLEAN, length_px=80.0, frames=10)
+    scene = replace(CLEAN, length_px=80.0)
     frames = list(film(scene))
     truth = true_midlines(scene)
     tail = (float(truth[0, -1, 0]), float(truth[0, -1, 1]))
-    seen = capture(frames, make_detector(frames), scene.rate_hz, head_px=tail)
+    seen = capture(frames, make_detector(frames[::2]), scene.rate_hz, head_px=tail)
     assert seen.head_by == "given"
     assert all(swapped(found, true) for found, true in zip(seen.points_px, truth, strict=True))
 
 
 def test_a_body_cut_by_the_edge_is_told_not_guessed() -> None:
-    scene = replace(CLEAN, length_px=100.0, frames=20)
+    scene = replace(CLEAN, length_px=100.0)
     # the window's edge runs through the circle on which the animal swims
-    long = replace(scene, frames=40, rate_hz=10.0)
+    long = replace(scene, frames=20, rate_hz=5.0)
     frames = [np.ascontiguousarray(frame[:, 100:]) for frame in film(long)]
     ground = np.ascontiguousarray(empty(scene)[:, 100:])
     seen = capture(frames, make_detector(frames[::4], ground), long.rate_hz)
@@ -104,12 +104,12 @@ def test_a_body_cut_by_the_edge_is_told_not_guessed() -> None:
 
 
 def test_what_cannot_be_used_is_refused_in_one_line() -> None:
-    scene = replace(CLEAN, length_px=80.0, frames=10)
+    scene = replace(CLEAN, length_px=80.0, frames=6)
     frames = list(film(scene))
-    still = [frames[0]] * 8
+    still = [frames[0]] * 5
     with pytest.raises(InputError, match="no motion"):
         capture(still, make_detector(still), 30.0)
-    blank = [empty(replace(scene, seed=k)) for k in range(8)]
+    blank = [empty(replace(scene, seed=k)) for k in range(5)]
     with pytest.raises(InputError, match="no contrast"):
         capture(blank, make_detector(blank), 30.0)
     two = [np.minimum(a, a[::-1, ::-1]) for a in frames]
@@ -124,7 +124,7 @@ def test_what_cannot_be_used_is_refused_in_one_line() -> None:
 def test_the_skeleton_s_thickness_is_the_body_s() -> None:
     from tests.oracles.rendered_snake import half_width
 
-    scene = replace(CLEAN, length_px=150.0, frames=20, blur_px=0.5, noise=1.0)
+    scene = replace(CLEAN, length_px=150.0, blur_px=0.5, noise=1.0)
     seen = watch(scene)
     middle = np.nanmedian(seen.radius_px, axis=0)[15:70]
     assert np.allclose(middle, half_width(scene)[15:70], rtol=0.15)

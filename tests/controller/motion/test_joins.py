@@ -199,16 +199,16 @@ def test_all_pairs_of_sources_join_within_the_limits(name: str) -> None:
         relay = SourceSwitch(robot, make(first, robot))
         seen = [relay.goal_rad()] * 2
         looking = not LOOKING.isdisjoint({first, second})
-        run(relay, robot, int(rng.integers(1, 50)), seen, looking=looking)
+        run(relay, robot, int(rng.integers(1, 30)), seen, looking=looking)
         duration_s = relay.join(make(second, robot))
-        run(relay, robot, 40, seen, looking=looking)
+        run(relay, robot, 28, seen, looking=looking)
         speed, acceleration = worst(robot, seen)
         assert speed < STEP_TOLERANCE, (first, second)
         assert acceleration < STEP_TOLERANCE, (first, second)
         assert duration_s < 5.0, (first, second)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(data=st.data())
 def test_chains_of_joins_at_any_time_stay_within_the_limits(data: st.DataObject) -> None:
     name = data.draw(st.sampled_from(sorted(ROBOTS)))
@@ -227,7 +227,7 @@ def test_chains_of_joins_at_any_time_stay_within_the_limits(data: st.DataObject)
     assert acceleration < STEP_TOLERANCE
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(data=st.data())
 def test_jumps_of_a_gaits_parameters_become_smooth(data: st.DataObject) -> None:
     robot = ROBOTS["alternating16"]

@@ -114,7 +114,7 @@ def test_the_block_has_its_own_length_again_after_clean_reads(servos: Servos) ->
 def test_an_adapter_that_is_late_for_good_never_gives_an_old_value(
     servos: Servos, is_fast: bool, period_s: float
 ) -> None:
-    for lag_s in np.arange(0.0035, 0.4, 0.0035):
+    for lag_s in np.arange(0.0035, 0.4, 0.0073):
         servos = Servos()
         servos.late_s = dict.fromkeys(range(5, 200), float(lag_s))
         port = ScriptedPort(servos)

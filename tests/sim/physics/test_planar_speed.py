@@ -12,7 +12,7 @@ from snakewalk.sim.physics.body import belly_points_m
 from tests.helpers.physics import HZ, ROBOT, Floats, a_body, a_drive, serpenoid
 from tests.oracles.planar_reference import PlanarBody, simulate
 
-SECONDS = 1.0 + 2.0 / HZ
+SECONDS = 1.0 + 1.0 / HZ
 
 
 def crawl(mu: tuple[float, ...], step_s: float) -> tuple[Floats, Floats, Floats]:
@@ -68,7 +68,7 @@ def test_speed_is_that_of_the_independent_model(mu: tuple[float, float], step_s:
     way = expected[2] - expected[1]
     made = centre[-1] - centre[round(1.0 / step_s)]
     print(f"mu {mu} step {step_s * 1e3:g} ms: {made[0] / way[0] - 1.0:+.2%} of {way[0]:.4f} m")
-    assert (way[0] > 0.3) if mu[0] < mu[1] else (way[0] < -0.03)
+    assert (way[0] > 0.15) if mu[0] < mu[1] else (way[0] < -0.015)
     assert made[0] == pytest.approx(way[0], rel=0.02 if step_s < 0.005 else 0.025)
     assert np.hypot(*(made - way)) < 0.02 * np.hypot(*way) + 0.003
 

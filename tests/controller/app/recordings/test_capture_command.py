@@ -18,11 +18,11 @@ from snakewalk.controller.capture.scale import scale_of_marker
 from tests.helpers.command import snakewalk
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 
-SCENE = SnakeScene(rows=160, columns=200, length_px=70.0, frames=24, wave_hz=1.0)
+SCENE = SnakeScene(rows=160, columns=200, length_px=70.0, frames=12, wave_hz=1.0, rate_hz=15.0)
 
 
 def write_film(path: Path, frames: Iterable[np.ndarray]) -> Path:
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (200, 160))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (200, 160))
     for frame in frames:
         writer.write(cv2.cvtColor(frame, cv2.COLOR_GRAY2BGR))
     writer.release()
@@ -42,11 +42,11 @@ def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Pat
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     facts = json.loads(done.stdout)
-    assert facts["frames"] == facts["frames_used"] == 24
-    assert facts["verdicts"] == {"good": 24}
+    assert facts["frames"] == facts["frames_used"] == 12
+    assert facts["verdicts"] == {"good": 12}
     assert facts["length_m"] == pytest.approx(0.35)
     loaded = load_track(str(track))
-    assert loaded.rate_hz == 30.0
+    assert loaded.rate_hz == 15.0
     assert loaded.length_m == pytest.approx(0.35, rel=0.02)
     truth = true_midlines(SCENE) * [1.0, -1.0]
     step = -np.diff(truth, axis=1)
@@ -54,11 +54,11 @@ def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Pat
     error = np.angle(np.exp(1j * (loaded.angles_rad - angles)))
     assert np.median(np.abs(error)) < 0.08
     with np.load(track) as held:
-        assert held["verdict"].tolist() == ["good"] * 24
-        assert held["points_px"].shape == (24, 101, 2)
-        assert held["head_margin"].shape == (24,)
-    assert cv2.imread(str(sheet)).shape == (800, 1200, 3)
-    assert open_footage(overlay).count == 24
+        assert held["verdict"].tolist() == ["good"] * 12
+        assert held["points_px"].shape == (12, 101, 2)
+        assert held["head_margin"].shape == (12,)
+    assert cv2.imread(str(sheet)).shape == (400, 1200, 3)
+    assert open_footage(overlay).count == 12
     assert sorted(p.name for p in tmp_path.iterdir()) == ["o.avi", "s.png", "t.npz"]
 
 
@@ -79,7 +79,7 @@ def test_a_fault_leaves_nothing_behind(swim: Path, tmp_path: Path) -> None:
     whole = swim.read_bytes()
     cut = tmp_path / "cut.avi"
     cut.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match=r"ends after \d+ of 24 frames"):
+    with pytest.raises(InputError, match=r"ends after \d+ of 12 frames"):
         capture_recording(CaptureOptions(cut, folder / "t.npz"))
     assert list(folder.iterdir()) == []
 
@@ -126,10 +126,10 @@ def test_a_folder_of_images_is_taken_in_the_order_of_its_numbers(tmp_path: Path)
         cv2.imwrite(str(tmp_path / f"frame{number}.png"), frame)
     (tmp_path / "notes.txt").write_text("not an image")
     footage = open_footage(tmp_path, 25.0)
-    assert footage.count == 24
+    assert footage.count == 12
     assert footage.rate_hz == 25.0
     assert [f.name for f in footage.files][:3] == ["frame0.png", "frame1.png", "frame2.png"]
-    assert footage.files[-1].name == "frame23.png"
+    assert footage.files[-1].name == "frame11.png"
     assert np.array_equal(next(footage.read()), next(film(SCENE)))
 
 
@@ -138,7 +138,7 @@ def test_a_given_background_is_used(swim: Path, tmp_path: Path) -> None:
     cv2.imwrite(str(ground), empty(SCENE))
     facts = capture_recording(CaptureOptions(swim, tmp_path / "t.npz", background=ground))
     assert facts.background == "given"
-    assert facts.frames_used == 24
+    assert facts.frames_used == 12
 
 
 def test_markers_give_the_scale(tmp_path: Path) -> None:
