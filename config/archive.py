@@ -1,21 +1,24 @@
-"""Compressed files that come from outside: how far they may expand, and ``.npz`` read within that.
+"""Files that come from outside: how much of them is read, and how far they may expand.
 
 A few kilobytes of zeros, well packed, fill the memory of a robot's computer. What a file says it
 expands to is compared with its size before anything is unpacked, and no more than that is unpacked.
+A device has no end: of what is text no more is read than such a text can be long.
 """
 
+import json
 import math
+import re
 import struct
 import zipfile
 import zlib
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any, Final
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, Final
 
 from snakewalk.config.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 FREE_BYTES: Final = 16_000_000
 """Any file may expand to this (ours): a mask of zeros is packed a thousandfold."""
@@ -25,6 +28,14 @@ MOST_BYTES: Final = 1_000_000_000
 MOST_TEXT_RATIO: Final = 20
 MOST_TEXT_BYTES: Final = 500_000_000
 """The same of JSON (ours): it takes several times its size in memory."""
+MOST_JSON_BYTES: Final = 64_000_000
+"""Of a JSON that is read at once (ours)."""
+MOST_STORAGE_BYTES: Final = 1_000_000
+"""Of a calibration (ours)."""
+_MOST_NESTED, _MOST_MATRICES, _MOST_SIDE = 100, 1000, 100
+_NESTING: Final = re.compile(r"[\[\]{}]|<\w|</|/>")
+_ENDS: Final = ("]", "}", "</", "/>")
+_SIDES: Final = re.compile(r"\b(?:rows|cols|sizes)\b[\"'>:\[\s]{1,20}([\d,\s]+)")
 DAMAGE: Final = (
     ValueError,
     EOFError,
@@ -36,6 +47,75 @@ DAMAGE: Final = (
     zlib.error,
 )
 """What reading a damaged archive raises, besides ``OSError``."""
+
+
+def read_bytes(file: Path, most_bytes: int = MOST_BYTES) -> bytes:
+    """Bytes of a file, which may be a device or a pipe, up to a size.
+
+    Raises:
+        InputError: it is larger.
+        OSError: it cannot be read.
+
+    """
+    with file.open("rb") as stream:
+        data = stream.read(most_bytes + 1)
+    if len(data) > most_bytes:
+        raise InputError(f"{file}: is larger than the {most_bytes / 1e6:g} MB that are read of it")
+    return data
+
+
+def read_text(file: Path, most_bytes: int = MOST_TEXT_BYTES) -> str:
+    """Text in UTF-8 of a file, up to a size; an editor's byte order mark is no content.
+
+    Raises:
+        InputError: it is larger.
+        OSError: it cannot be read.
+        UnicodeDecodeError: it is no UTF-8.
+
+    """
+    return read_bytes(file, most_bytes).decode("utf-8-sig")
+
+
+def parse_json(text: str | bytes) -> Any:
+    """Value of a JSON text.
+
+    Raises:
+        ValueError: it is none, or is nested too deeply to be one of ours.
+
+    """
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+
+
+def check_matrices(file: Path) -> None:
+    """Check a file of OpenCV's FileStorage before OpenCV reads it.
+
+    OpenCV takes the memory that a matrix says it needs, and deep nesting ends the process.
+
+    Raises:
+        InputError: it is too large, holds too many or too large matrices, or is nested too deeply.
+        OSError: it cannot be read.
+
+    """
+    text = read_bytes(file, MOST_STORAGE_BYTES).decode("utf-8", errors="replace")
+    depth = deepest = 0
+    for mark in _NESTING.findall(text):
+        depth += -1 if mark in _ENDS else 1
+        deepest = max(deepest, depth)
+    if deepest > _MOST_NESTED:
+        raise InputError(f"{file}: is no file of a calibration: nested {deepest} deep")
+    matrices = [
+        [int(side[:9]) for side in said.replace(",", " ").split()] for said in _SIDES.findall(text)
+    ]
+    if len(matrices) > _MOST_MATRICES or any(
+        len(sides) > 2 or max(sides, default=0) > _MOST_SIDE for sides in matrices
+    ):
+        raise InputError(
+            f"{file}: is no file of a calibration: its matrices have {_MOST_SIDE} rows and columns "
+            "at most"
+        )
 
 
 def check_expansion(file: Path, packed: int, unpacked: int, *, text: bool = False) -> None:
@@ -103,8 +183,10 @@ def read_arrays(
     return held, [name for name in members if name not in held]
 
 
-def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
+def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> "NDArray[Any]":
     """One array; its header may not promise more than the archive holds."""
+    import numpy as np  # noqa: PLC0415  a TOML file needs none
+
     with archive.open(member) as stream:
         version = np.lib.format.read_magic(stream)
         if version not in ((1, 0), (2, 0)):

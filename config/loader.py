@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args, get_or
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticSerializationError, to_json
 
+from snakewalk.config.archive import read_text
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.gait import GaitSetConfig
 
@@ -58,7 +59,8 @@ def load(path: Path, model: type[M]) -> M:
 
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")  # an editor's byte order mark is no content
+        text = read_text(path, _MOST_BYTES)
+        _check_keys(text)
         data = tomllib.loads(text)
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}") from None
@@ -66,7 +68,9 @@ def load(path: Path, model: type[M]) -> M:
         place = _PLACE.search(str(error))
         where = f"{path}:{place[1]}" if place else str(path)
         raise ConfigError(f"{where}: not TOML: {_PLACE.sub('', str(error))}") from None
-    except UnicodeDecodeError as error:
+    except RecursionError:
+        raise ConfigError(f"{path}: not TOML: nested too deeply") from None
+    except ValueError as error:
         raise ConfigError(f"{path}: not TOML: {error}") from None
     return checked(model, data, str(path), text)
 
@@ -177,10 +181,28 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"{type(value).__name__} is no value of a configuration")
 
 
+def _check_keys(text: str) -> None:
+    """Refuse keys of hundreds of tables, for which ``tomllib`` takes minutes.
+
+    Raises:
+        ValueError: there is one.
+
+    """
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.count(".") > _MOST_TABLES and any(
+            key.count(".") > _MOST_TABLES for key in _NO_KEY.split(line)
+        ):
+            raise ValueError(f"a key of over {_MOST_TABLES} tables in line {number}")
+
+
 def _folder(kind: Kind) -> Path:
     return Path(__file__).parent / kind
 
 
+_MOST_BYTES: Final = 4_000_000
+_MOST_TABLES: Final = 100
+"""Of a TOML file, and of a dotted key in it (ours)."""
+_NO_KEY: Final = re.compile(r"[^\w.\s\"'-]+")
 _PLACE: Final = re.compile(r" ?\(at line (\d+), column \d+\)")
 _TABLE: Final = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]")
 _KEY: Final = re.compile(r"""^\s*([\w."' -]+?)\s*=""")

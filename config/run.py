@@ -194,6 +194,7 @@ class RunConfig(Strict):
     )
     waypoints_m: tuple[tuple[float, float], ...] = Field(
         (),
+        max_length=1000,
         description="in order; playback and source need none; with them a gait of legs is steered "
         "along its path",
     )

@@ -4,7 +4,6 @@ The page of ``snakewalk capture --review`` writes them as JSON, and ``apply_corr
 corrected recording of them. The file names the track that it belongs to by its fingerprint.
 """
 
-import json
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Final
 import numpy as np
 from pydantic import Field
 
+from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
@@ -58,10 +58,10 @@ def read_corrections(path: Path) -> Corrections:
 
     """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = parse_json(read_bytes(path, MOST_JSON_BYTES))
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
-    except (ValueError, RecursionError):
+    except ValueError:
         raise InputError(f"{path}: is no JSON; corrections are what a review page saves") from None
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected a JSON object, as a review page saves it")

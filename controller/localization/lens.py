@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.archive import check_matrices
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 
-_MOST_BYTES: Final = 1_000_000
 _ENDINGS: Final = (".yml", ".yaml", ".xml", ".json")
 _COEFFICIENTS: Final = (4, 5, 8, 12, 14)
 _STEPS: Final = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-9)
@@ -67,8 +67,7 @@ class Lens:
             raise InputError(f"{file}: the file of a lens ends in {', '.join(_ENDINGS)}")
         if not file.is_file():
             raise InputError(f"{file}: no such file")
-        if file.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{file}: is too large for the file of a lens")
+        check_matrices(file)
         try:
             store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
             size = [store.getNode(f"image_{side}").real() for side in ("width", "height")]

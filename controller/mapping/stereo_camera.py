@@ -13,7 +13,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from snakewalk.config.archive import read_arrays
+from snakewalk.config.archive import check_matrices, read_arrays
 from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.errors import InputError
 
@@ -116,6 +116,7 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
 
 def _storage(file: Path) -> dict[str, Any]:
     """Matrices of a file of OpenCV by name."""
+    check_matrices(file)
     try:
         store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
         nodes = {name: store.getNode(name) for name in store.root().keys()}  # noqa: SIM118  no dict

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from snakewalk.config.archive import read_arrays
+from snakewalk.config.archive import parse_json, read_arrays
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.repertoire.segment import Segment
@@ -88,7 +88,7 @@ def load_repertoire(path: Path) -> Repertoire:
         )
     try:
         held, _ = read_arrays(path)
-        about = json.loads(str(held["about"]))
+        about = parse_json(str(held["about"]))
         if about.get("format") != FORMAT:
             raise InputError(f"{path}: format {about.get('format')}; expected {FORMAT}")
         about = {key: about[key] for key in (*_HEAD, "segments")}

@@ -1,9 +1,9 @@
 """A console of simulated servos: registers, loads, faults and the pace, changed while they run."""
 
-import json
 from collections.abc import Callable
 from typing import Final
 
+from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import checked
@@ -108,7 +108,7 @@ class Console:
             key, equals, value = word.partition("=")
             if not equals:
                 raise ValueError
-            table[key] = json.loads(value)
+            table[key] = parse_json(value)
         plan = checked(FaultPlan, {"fault": [table]}, "fault")
         self._faults.add(plan)
         return f"{words[0]}: from now on"

@@ -5,7 +5,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
+from snakewalk.config.archive import parse_json, read_bytes
 from snakewalk.config.errors import InputError
+
+_MOST_BYTES = 200_000_000
+"""Of a recording (ours)."""
 
 
 class TraceWriter:
@@ -30,14 +34,14 @@ def read_exchange(path: Path) -> Iterator[tuple[float, bool, bytes]]:
 
     """
     try:
-        text = path.read_text(encoding="ascii")
+        text = read_bytes(path, _MOST_BYTES).decode("ascii")
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: is no exchange of bus serve --record") from None
     for number, line in enumerate(text.splitlines(), 1):
         try:
-            entry = json.loads(line)
+            entry = parse_json(line)
             time_s, side, data = float(entry["t"]), entry["from"], bytes.fromhex(entry["hex"])
         except (ValueError, KeyError, TypeError):
             raise InputError(
@@ -56,7 +60,7 @@ def read_trace(path: Path) -> Iterator[tuple[float, bytes]]:
 
     """
     try:
-        data = path.read_bytes()
+        data = read_bytes(path, _MOST_BYTES)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
     try:
@@ -70,7 +74,7 @@ def read_trace(path: Path) -> Iterator[tuple[float, bytes]]:
             continue
         try:
             if shown.startswith("{"):
-                entry = json.loads(shown)
+                entry = parse_json(shown)
                 yield float(entry["t"]), bytes.fromhex(entry["hex"])
             else:
                 yield 0.0, bytes.fromhex(shown)

@@ -10,19 +10,21 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import trimesh
 from mcap.writer import Writer
 from PIL import Image as Pillow
 
-from snakewalk.config.archive import FREE_BYTES, check_expansion, read_arrays
+from snakewalk.config.archive import FREE_BYTES, check_expansion, read_arrays, read_bytes
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import _elevation_m
 from snakewalk.controller.capture.fish.postures import load_postures
 from snakewalk.controller.capture.mesh.body_model import read_silhouettes
 from snakewalk.controller.capture.mesh.mesh_files import read_mesh
 from snakewalk.controller.capture.readers.load import load_track
+from snakewalk.controller.localization.lens import Lens
 from snakewalk.controller.repertoire.repertoire import load_repertoire
 from snakewalk.controller.runlog.reader import LogError, read_log
 
@@ -192,6 +194,61 @@ def test_what_would_expand_too_far_is_refused_before_it_is_unpacked(
     make(tmp_path / name)
     assert (tmp_path / name).stat().st_size < 2_000_000
     assert " MB would expand to " in _refused(load, tmp_path / name)
+
+
+def test_what_has_no_end_is_not_read_to_it() -> None:
+    with pytest.raises(InputError, match=r"/dev/zero: is larger than the 1 MB that are read"):
+        read_bytes(Path("/dev/zero"), 1_000_000)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "%YAML:1.0\n---\na: " + 99_999 * "[",
+        "<opencv_storage>" + 99_999 * "<a>",
+        "%YAML:1.0\n---\na: !!opencv-matrix\n   rows: 20000\n   cols: 20000\n   dt: d\n",
+        '{"a": {"type_id": "opencv-matrix", "rows": 1, "cols": 99999999999999999999}}',
+        "%YAML:1.0\n---\na: !!opencv-nd-matrix\n   sizes: [ 999, 999, 999 ]\n   dt: d\n",
+    ],
+    ids=["nested", "nested XML", "large", "too large for a number", "three axes"],
+)
+def test_a_calibration_that_opencv_would_crash_on_is_refused(text: str, tmp_path: Path) -> None:
+    (tmp_path / "lens.yml").write_text(text)
+    with pytest.raises(InputError, match=r"lens\.yml: is no file of a calibration: "):
+        Lens.read(tmp_path / "lens.yml")
+
+
+def test_an_array_in_another_file_is_not_followed(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as held:
+        held["group/tracks"] = h5py.ExternalLink("b.h5", "/tracks")
+    with pytest.raises(InputError, match=r"a\.h5: group/tracks is in b\.h5; copy it into this one"):
+        load_track(str(tmp_path / "a.h5"))
+
+
+def test_a_table_that_is_a_group_is_none(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as held:
+        held["found/table"] = h5py.SoftLink("/found")
+    with pytest.raises(InputError, match=r"a\.h5: holds no arrays"):
+        load_track(str(tmp_path / "a.h5"))
+
+
+def test_json_from_outside_is_parsed_in_one_place() -> None:
+    """Elsewhere deep nesting would end the program: what is left reads rows of our own processes,
+    or catches it.
+    """
+    own = {
+        *("config/archive.py", "controller/runlog/reader.py", "drivers/safety/stop_button.py"),
+        *("controller/app/ros/command_codec.py", "controller/app/view/row_line.py"),
+        *("controller/app/view/browser_gamepad.py", "controller/app/view/watcher.py"),
+    }
+    root = Path(__file__).parents[2]
+    found = {
+        str(file.relative_to(root))
+        for room in ("config", "drivers", "sim", "controller")
+        for file in (root / room).rglob("*.py")
+        if "json.load" in file.read_text(encoding="utf-8")
+    }
+    assert found == own
 
 
 @pytest.mark.parametrize(("make", "name", "load"), LIES)

@@ -301,6 +301,7 @@ app.command(
     epilog=_examples(
         "identify kp200.json kp800.json -o xl330.json",
         "identify kp400.json --start xl330.json --no-fit --json",
+        "identify runs/flat-slalom-walk-seed0/log.mcap -o found.toml",
     ),
     rich_help_panel=_BUS,
 )(identify)

@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.messages import LOGGER
@@ -207,8 +208,8 @@ def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") ->
         if not (key and equals and value):
             raise InputError(f"{option} {text}: expected {form}")
         try:
-            values[key] = json.loads(value)
-        except (ValueError, RecursionError):  # no JSON; too long a number; too deep a list
+            values[key] = parse_json(value)
+        except ValueError:  # no JSON; too long a number; too deep a list
             values[key] = value
     return values
 

@@ -18,6 +18,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 
@@ -158,10 +159,10 @@ def read_json(path: Path) -> dict[str, object]:
 
     """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = parse_json(read_bytes(path, MOST_JSON_BYTES))
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
-    except (ValueError, RecursionError):
+    except ValueError:
         raise InputError(f"{path}: is not JSON") from None
     if not isinstance(data, Mapping):
         raise InputError(f"{path}: expected a JSON object")

@@ -20,6 +20,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
+from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.exports.ros_messages import ERROR, OK, WARNING, RosMessages
@@ -380,7 +381,7 @@ def _value(word: str) -> tuple[str, Any]:
     if not (key and equals and text):
         raise InputError(f"gait: {word}: expected PARAM=VALUE")
     try:
-        return key, json.loads(text)
+        return key, parse_json(text)
     except ValueError:
         return key, text
 

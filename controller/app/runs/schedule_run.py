@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from snakewalk.config.archive import MOST_JSON_BYTES, read_text
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked, load
@@ -38,7 +39,7 @@ def read_schedule(path: Path) -> ScheduleConfig:
     if path.suffix != ".csv":
         return load(path, ScheduleConfig)
     try:
-        rows = csv.DictReader(io.StringIO(path.read_text(encoding="utf-8-sig")))
+        rows = csv.DictReader(io.StringIO(read_text(path, MOST_JSON_BYTES)))
         if tuple(rows.fieldnames or ()) != COLUMNS:
             raise InputError(f"{path}: expected the columns {','.join(COLUMNS)}")
         table = [[_number(path, line, row[name]) for name in COLUMNS] for line, row in _lines(rows)]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
 from snakewalk.config.base import Strict
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.loader import checked
@@ -100,7 +101,7 @@ def load_backup(path: Path) -> BackupFile:
 
     """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = parse_json(read_bytes(path, MOST_JSON_BYTES))
     except ValueError as error:
         raise ConfigError(f"{path}: not JSON: {error}") from None
     if not isinstance(data, dict):

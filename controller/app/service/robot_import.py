@@ -7,14 +7,18 @@ lies along its own axis makes no difference to the motion, so anchors are moved 
 """
 
 import math
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from tempfile import TemporaryDirectory
+from typing import Final, Literal
 
 import mujoco
 import numpy as np
 
+from snakewalk.config.archive import read_text
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.config.loader import checked
@@ -33,6 +37,28 @@ _SPREAD = 0.2
 _NEXT_TO_NOTHING_KG = 2e-4
 """Of what lies between two hinges of one body (ours): physics needs a mass."""
 _POSES = 20
+_MOST_BYTES, _MOST_PARTS = 20_000_000, 1000
+"""Of a model's file; and bodies and joints (ours)."""
+_MOST_MEMORY_BYTES, _MOST_CPU_S = 2_000_000_000, 10
+"""Of MuJoCo's compiler (ours)."""
+_SAID: Final = 3
+_COMPILER: Final = f"""
+import sys
+source, made, memory_bytes, cpu_s = sys.argv[1:]
+try:
+    import resource
+except ImportError:  # Windows
+    pass
+else:
+    for which, most in (("AS", memory_bytes), ("CPU", cpu_s), ("FSIZE", memory_bytes)):
+        resource.setrlimit(getattr(resource, "RLIMIT_" + which), (int(most), int(most)))
+import mujoco
+try:
+    mujoco.mj_saveModel(mujoco.MjModel.from_xml_path(source), made, None)
+except (ValueError, RuntimeError, MemoryError) as error:
+    print(error or type(error).__name__)
+    sys.exit({_SAID})
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +174,7 @@ def _read(
 
 def _load(path: Path) -> mujoco.MjModel:
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path, _MOST_BYTES)
         root = ET.fromstring(text)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
@@ -156,17 +182,42 @@ def _load(path: Path) -> mujoco.MjModel:
         raise InputError(f"{path}: is no XML: {error}") from None
     if "xacro" in text and any("xacro" in each.tag for each in root.iter()):
         raise InputError(f"{path}: is xacro; write its URDF first: xacro {path.name} > FILE.urdf")
-    try:
+    parts = sum(each.tag in ("body", "link", "joint") for each in root.iter())
+    if parts > _MOST_PARTS:
+        raise InputError(
+            f"{path}: holds {parts} bodies and joints; a chain has at most {_MOST_PARTS}"
+        )
+    if root.tag not in ("robot", "mujoco"):
+        raise InputError(
+            f"{path}: begins with <{root.tag}>, not with <mujoco> (MJCF) or <robot> (URDF)"
+        )
+    with TemporaryDirectory() as folder:
+        source, made = path, Path(folder) / "model.mjb"
         if root.tag == "robot":
-            return mujoco.MjModel.from_xml_string(_free_urdf(root, path))
-        if root.tag == "mujoco":
-            return mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        said = " ".join(str(error).split())
-        raise InputError(f"{path}: MuJoCo cannot read it: {said}") from None
-    raise InputError(
-        f"{path}: begins with <{root.tag}>, not with <mujoco> (MJCF) or <robot> (URDF)"
-    )
+            source = Path(folder) / "model.urdf"
+            source.write_text(_free_urdf(root, path), encoding="utf-8")
+        said = _compile(source, made)
+        if said is not None:
+            raise InputError(f"{path}: MuJoCo cannot read it: {' '.join(said.split())}")
+        return mujoco.MjModel.from_binary_path(str(made))
+
+
+def _compile(source: Path, made: Path) -> str | None:
+    """Let MuJoCo compile a model in a process of its own; what it says against it, or None.
+
+    A model may ask for any memory and time, and crash the compiler; that process is limited in all.
+    """
+    limits = str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)
+    command = [sys.executable, "-c", _COMPILER, str(source), str(made), *limits]
+    ended = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    if ended.returncode == _SAID:
+        return ended.stdout
+    if ended.returncode or not made.is_file():
+        return (
+            f"its compiler gave up: {_MOST_MEMORY_BYTES / 1e9:g} GB of memory and {_MOST_CPU_S} s "
+            "are enough for a robot's model"
+        )
+    return None
 
 
 def _free_urdf(root: ET.Element, path: Path) -> str:

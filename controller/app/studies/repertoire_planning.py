@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked, load_robot, load_run, load_world
 from snakewalk.config.robot import RobotConfig
@@ -152,7 +153,7 @@ def load_plan(path: Path, *, replan: bool = True) -> RepertoireRun:
     if not path.is_file():
         raise InputError(f"{path}: no such plan; snakewalk plan --with repertoire -o makes one")
     try:
-        about = json.loads(path.read_text(encoding="utf-8"))
+        about = parse_json(read_bytes(path, MOST_JSON_BYTES))
         if about["format"] != FORMAT:
             raise InputError(f"{path}: format {about['format']}; expected {FORMAT}")
         file = Path(about["repertoire"])

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from snakewalk.config.archive import read_text
 from snakewalk.config.errors import InputError
 
 
@@ -19,7 +20,7 @@ def read_csv_table(path: Path, columns: Sequence[str], command: str) -> list[dic
 
     """
     try:
-        text = path.read_text()
+        text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or 'is no text'}") from None
     whole = text[: text.rfind("\n") + 1]

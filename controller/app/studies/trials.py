@@ -1,6 +1,5 @@
 """Runs and gaits over many seeds, motions, robots, grounds and frictions, on a process pool."""
 
-import json
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import digest
 from snakewalk.controller.app.runs.execute import execute
@@ -167,7 +167,7 @@ def parse_over(text: str) -> tuple[str, tuple[Value, ...]]:
 
 def _value(word: str) -> Value:
     try:
-        value = json.loads(word)
+        value = parse_json(word)
     except ValueError:
         return word
     return value if isinstance(value, int | float | bool) else word

@@ -1,7 +1,6 @@
 """A mesh as files: Wavefront OBJ with its material and texture beside it, or one binary glTF."""
 
 import io
-import json
 import struct
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 import trimesh
 from PIL import Image as Pillow
 
-from snakewalk.config.archive import check_expansion
+from snakewalk.config.archive import check_expansion, parse_json
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.mesh.mesh import Mesh
@@ -103,7 +102,7 @@ def _unpacked_glb(file: Path) -> int:
     """
     with file.open("rb") as stream:
         _, _, _, length, _ = struct.unpack("<5I", stream.read(20))
-        said = json.loads(stream.read(length))
+        said = parse_json(stream.read(length))
     views = [abs(int(view["byteLength"])) for view in said.get("bufferViews", [])]
     accessors = [
         abs(int(a["count"])) * _WIDTH[a["type"]] * _ITEM_BYTES[a["componentType"]]

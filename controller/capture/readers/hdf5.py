@@ -24,12 +24,15 @@ def load_hdf5(
         with h5py.File(file, "r") as held:
             sizes: list[int] = []
             held.visititems(lambda _, data: sizes.append(getattr(data, "nbytes", 0)))
+            elsewhere = held.visititems_links(_other_file)
+            if elsewhere is not None:
+                raise InputError(f"{file}: {elsewhere}; copy it into this one")
             check_expansion(file, file.stat().st_size, sum(sizes))
             if "tracks" in held and "track_occupancy" in held:
                 return load_analysis(file, held, rate_hz, least_score, choice)
             if "metadata" in held and "instances" in held:
                 return load_project(file, held, rate_hz, least_score, choice)
-            tables = [g for g in held.values() if isinstance(g, h5py.Group) and "table" in g]
+            tables = [g for g in held.values() if _holds_table(g)]
             if tables:
                 return load_group(file, tables[0], rate_hz, least_score, choice)
             if any(isinstance(g, h5py.Group) and "block0_values" in g for g in held.values()):
@@ -46,6 +49,15 @@ def load_hdf5(
         raise InputError(f"{file}: holds no arrays, and no table of DeepLabCut; known: {KNOWN}")
     choice.only(file, "a MATLAB file")
     return track_from_arrays(file, arrays, rate_hz, least_score)
+
+
+def _other_file(name: str, link: object) -> str | None:
+    """What a link to another file says: nobody knows how far that one expands."""
+    return f"{name} is in {link.filename}" if isinstance(link, h5py.ExternalLink) else None
+
+
+def _holds_table(group: object) -> bool:
+    return isinstance(group, h5py.Group) and isinstance(group.get("table"), h5py.Dataset)
 
 
 def _from_matlab(data: h5py.Dataset) -> NDArray[np.generic]:

@@ -6,13 +6,13 @@ bytes. A project holds ``frames``, ``instances`` and their ``points`` (set by ha
 ``pred_points`` as tables that point into each other, and names as JSON. Pixel rows count downwards.
 """
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.keypoints import Choice, Keypoints
@@ -135,7 +135,7 @@ def _stated_rate(held: Any) -> float | None:
 def _stated(held: Any, name: str) -> Any:
     """What an attribute says as JSON; None where it is not there or no JSON."""
     try:
-        return json.loads(_text(held.attrs[name]))
+        return parse_json(_text(held.attrs[name]))
     except (KeyError, ValueError):
         return None
 
@@ -149,13 +149,13 @@ def load_project(
 ) -> Keypoints:
     """Load the open project ``held`` (.slp); see ``load.load_file``."""
     try:
-        about = json.loads(_text(held["metadata"].attrs["json"]))
+        about = parse_json(_text(held["metadata"].attrs["json"]))
         version = float(held["metadata"].attrs.get("format_id", 1.0))
         skeletons = [
             [str(about["nodes"][int(node["id"])]["name"]) for node in one["nodes"]]
             for one in about["skeletons"]
         ]
-        tracks = [str(json.loads(_text(one))[1]) for one in held["tracks_json"][:]]
+        tracks = [str(parse_json(_text(one))[1]) for one in held["tracks_json"][:]]
         frames, instances = held["frames"][:], held["instances"][:]
         tables = {False: held["points"][:], True: held["pred_points"][:]}
         stated = _rate(held)
@@ -213,7 +213,7 @@ def load_project(
 def _rate(held: Any) -> float | None:
     """Frames a second that a project states of its video; older ones state none."""
     for one in held["videos_json"][:] if "videos_json" in held else []:
-        rate = json.loads(_text(one)).get("backend", {}).get("fps")
+        rate = parse_json(_text(one)).get("backend", {}).get("fps")
         if rate:
             return float(rate)
     return None

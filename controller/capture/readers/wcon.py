@@ -5,7 +5,6 @@ with an ``id``, one or more times ``t`` and as many lists ``x`` and ``y``; ``hea
 point and "R" the last; ``ox, oy`` (else ``cx, cy``) is added to the points; null is missing.
 """
 
-import json
 import math
 import re
 import zipfile
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from snakewalk.config.archive import DAMAGE, check_members
+from snakewalk.config.archive import DAMAGE, check_members, parse_json
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.readers.keypoints import Choice
@@ -25,8 +24,8 @@ from snakewalk.controller.capture.track import Track, frame_numbers, track_from_
 def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> Track:
     """Load the text of a WCON file; see ``load.load_file``."""
     try:
-        held = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
+        held = parse_json(text)
+    except ValueError as error:
         raise InputError(f"{file}: is no JSON: {error}") from None
     units = held.get("units") if isinstance(held, dict) else None
     if not isinstance(units, dict) or "data" not in held:

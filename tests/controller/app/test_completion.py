@@ -1,5 +1,7 @@
 """What the shell completes, and that neither this nor a page of help loads what is slow to load."""
 
+import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -95,3 +97,20 @@ heavy([], slow, _SNAKEWALK_COMPLETE="complete_bash", **words)
     lines = done.stdout.splitlines()
     assert len(lines) == 5
     assert [line for line in lines if not line.endswith(" []")] == []
+
+
+def test_help_loses_no_words_to_markup() -> None:
+    """Text in brackets is a style to what draws the help: ``[power]`` would not be shown."""
+
+    folder = Path(main.__code__.co_filename).parent
+    said: list[str] = []
+    for file in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and file.parent != folder:
+                said.append(ast.get_docstring(node) or "")
+            if isinstance(node, ast.keyword) and node.arg == "help":
+                said += [
+                    str(part.value) for part in ast.walk(node) if isinstance(part, ast.Constant)
+                ]
+    assert len(said) > 400
+    assert [text for text in said if re.search(r"\[[a-z#/@]", text)] == []

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -12,6 +13,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.app.cli.command_line import app
+from snakewalk.controller.app.service import robot_import
 from snakewalk.controller.app.service.robot_export import mjcf_text, urdf_text
 from snakewalk.controller.app.service.robot_import import ImportedRobot, import_robot
 from tests.helpers.uneven import UNEVEN
@@ -37,6 +39,23 @@ def swimmer(segments: int) -> str:
         f'<geom type="box" size=".001 .05 .01" mass=".01"/>{ROOT}{inner}</body>'
         "</worldbody></mujoco>"
     )
+
+
+COMPILE = robot_import._compile
+
+
+@pytest.fixture(autouse=True)
+def compile_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a process of its own, which imports MuJoCo again for half a second."""
+
+    def compile_(source: Path, made: Path) -> str | None:
+        try:
+            mujoco.mj_saveModel(mujoco.MjModel.from_xml_path(str(source)), str(made), None)
+        except ValueError as error:
+            return str(error)
+        return None
+
+    monkeypatch.setattr(robot_import, "_compile", compile_)
 
 
 def chain(*joints: str, root: str = "<freejoint/>", extra: str = "") -> str:
@@ -198,3 +217,37 @@ def test_the_command_writes_a_file_that_loads_and_tells_what_was_left_out(tmp_pa
     assert load_robot(str(out)).limit_rad == pytest.approx(np.radians([80.0, 30.0]))
     assert "joint b: turns" in out.read_text()
     assert isinstance(CliRunner().invoke(app, words).exception, InputError)  # it exists
+
+
+@pytest.mark.parametrize(
+    ("inside", "said"),
+    [
+        ('<size nuserdata="500000000"/>', "Could not allocate memory"),
+        (
+            '<asset><texture name="t" type="2d" builtin="flat" width="60000" height="60000"/>'
+            "</asset>",
+            "Could not allocate memory for texture",
+        ),
+        ('<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>', ""),
+    ],
+)
+def test_a_model_that_asks_for_all_memory_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inside: str, said: str
+) -> None:
+    monkeypatch.setattr(robot_import, "_compile", COMPILE)
+    with pytest.raises(InputError, match=f"MuJoCo cannot read it: .*{said}"):
+        imported(tmp_path, chain(yaw("a"), yaw("b"), extra=inside))
+
+
+def test_a_compiler_that_crashes_or_never_ends_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robot_import, "_compile", COMPILE)
+    monkeypatch.setattr(robot_import, "_COMPILER", "import os; os.abort()")
+    with pytest.raises(InputError, match=r"its compiler gave up: 2 GB of memory and 10 s"):
+        imported(tmp_path, chain(yaw("a"), yaw("b")))
+
+
+def test_more_parts_than_a_chain_has_are_not_compiled(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"holds 1003 bodies and joints; a chain has at most 1000"):
+        imported(tmp_path, chain(*(yaw(f"j{k}") for k in range(501))))

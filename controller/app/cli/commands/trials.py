@@ -48,7 +48,7 @@ def trials(
     runs: Annotated[
         list[str] | None,
         typer.Argument(
-            help=f"shipped runs, RUN.toml, or gaits [default: {DEFAULT_RUN}]",
+            help=f"shipped runs, RUN.toml, or gaits; default: {DEFAULT_RUN}",
             metavar="RUN",
             autocompletion=completion.RUNS_OR_GAITS,
         ),

@@ -172,6 +172,7 @@ def test_a_wrong_key_is_refused_before_any_run(key: str, value: object, fault: s
 def test_values_to_go_over_are_numbers_words_and_switches() -> None:
     assert study.parse_over("a.b=5, 0.5,5") == ("a.b", (5, 0.5))
     assert study.parse_over("a=yp,true,[1]") == ("a", ("yp", True, "[1]"))
+    assert study.parse_over("a=" + 99_999 * "[") == ("a", (99_999 * "[",))
     for bad in ("a", "a=", "=1", "a=1,,2"):
         with pytest.raises(InputError, match="KEY=VALUE"):
             study.parse_over(bad)

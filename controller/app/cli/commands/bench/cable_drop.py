@@ -23,7 +23,7 @@ def power(
 ) -> None:
     """Compute the voltage of each servo under a load, and where to inject power.
 
-    Cables and leads are those of the robot's table [power]; without one, cables as they are sold,
+    Cables and leads are those of the robot's table `power`; without one, cables as they are sold,
     and power at the first servo.
     """
     from snakewalk.config.loader import load_robot  # noqa: PLC0415  --help stays quick

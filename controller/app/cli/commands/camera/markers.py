@@ -21,8 +21,8 @@ def markers(
 ) -> None:
     """Draw markers for the floor under the camera; print them without scaling.
 
-    Four or more, flat on the floor, as far apart as the picture allows: `[camera.markers_m]` of a
-    run names their places.
+    Four or more, flat on the floor, as far apart as the picture allows: the table
+    `camera.markers_m` of a run names their places.
     """
     require_extra("markers need", "cv2", "PIL")
     from snakewalk.controller.app.result_files import (  # noqa: PLC0415  --help stays quick

@@ -51,10 +51,6 @@ def identify(
 
     Of a servo: resistance, torque constant, friction, inertia and P unit. Of runs: friction along
     and across the body, on the ground --world (default: the logs'). All with 95 % intervals.
-
-    Example: snakewalk identify kp200.json kp800.json -o xl330.json
-
-    Example: snakewalk identify runs/flat-slalom-walk-seed0/log.mcap -o found.toml
     """
     judge = judge or []
     of_runs = [path for path in (*logs, *judge) if _is_run(path)]

@@ -28,13 +28,13 @@ from snakewalk.controller.app.result_files import check_picture, refuse_to_overw
 def play_actions(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
     speed: Annotated[
-        float | None, typer.Option(help="wanted, m/s; negative: tail first  [default: 0.4]")
+        float | None, typer.Option(help="wanted, m/s; negative: tail first; default: 0.4")
     ] = None,
     turn: Annotated[
-        float | None, typer.Option(help="wanted, rad/s, positive to the left  [default: 0]")
+        float | None, typer.Option(help="wanted, rad/s, positive to the left; default: 0")
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option(help="then it comes to rest  [default: 20]")
+        float | None, typer.Option(help="then it comes to rest; default: 20")
     ] = None,
     schedule: Annotated[
         Path | None,
