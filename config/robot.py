@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from snakewalk.config.base import Name, Strict
 from snakewalk.config.camera import StereoHeadConfig
+from snakewalk.config.motor import MotorConfig
 
 N = TypeVar("N", int, float)
 Baud = Literal[9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000]
@@ -89,6 +90,10 @@ class ServoConfig(Strict):
     )
     gear_drag_n_m_s: float = Field(
         0.03, ge=0.0, le=10.0, description="viscous loss of the gears at the shaft, in simulation"
+    )
+    motor: MotorConfig | None = Field(
+        None,
+        description="a table [servo.motor]; default: the catalogue's constants, and no friction",
     )
 
     @model_validator(mode="after")
@@ -771,6 +776,12 @@ class RobotConfig(Strict):
         if not self.joints:
             return (self.servo.model,) * self.joint_count
         return tuple(joint.model or self.servo.model for joint in self.joints)
+
+    @property
+    def motors(self) -> tuple[MotorConfig | None, ...]:
+        """Constants of each joint's servo, head first; None where they are the catalogue's."""
+        own, of = self.servo.motor, self.servo.model
+        return tuple(own if model == of else None for model in self.servo_models)
 
     @property
     def models_by_id(self) -> dict[int, str]:

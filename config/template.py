@@ -1,5 +1,6 @@
-"""A configuration as a TOML file to begin with: its values, and every other key as a comment."""
+"""Configurations as TOML: a file to begin with, every key in it, or a robot's, without defaults."""
 
+import json
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Final, Literal, get_args, get_origin
@@ -9,7 +10,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from snakewalk.config.document import row_model, table_models, value_kind
-from snakewalk.config.robot_file import toml_value
+from snakewalk.config.robot import RobotConfig
 
 _COLUMN: Final = 42
 """Where the words behind a key begin."""
@@ -96,3 +97,38 @@ def _line(key: str, value: Any, field: FieldInfo, is_given: bool) -> str:
     kind = re.sub(r"`(-?\d+)`", r"\1", value_kind(field)).replace("`", '"')
     words = [kind, field.description or ""]
     return f"{left:<{_COLUMN}} # {'; '.join(word for word in words if word)}"
+
+
+def robot_toml(robot: RobotConfig, comment: str = "") -> str:
+    """Text of a robot's file: what is as by default is left out; ``comment`` stands at the head."""
+    lines = [f"# {line}".rstrip() for line in comment.splitlines()]
+    lines += _plain_table(robot.model_dump(exclude_defaults=True), "")
+    return "\n".join(lines) + "\n"
+
+
+def _plain_table(data: Mapping[str, Any], place: str) -> Iterator[str]:
+    """Lines of a table's values, then of the tables in it, then of its rows of tables."""
+    tables = {key: value for key, value in data.items() if isinstance(value, Mapping)}
+    rows = {key: value for key, value in data.items() if _is_rows(value)}
+    for key, value in data.items():
+        if key not in tables and key not in rows and value is not None:
+            yield f"{key} = {toml_value(value)}"
+    for key, table in tables.items():
+        where = f"{place}.{key}".removeprefix(".")
+        yield from ("", f"[{where}]", *_plain_table(table, where))
+    for key, several in rows.items():
+        for row in several:
+            yield from ("", f"[[{key}]]", *_plain_table(row, key))
+
+
+def _is_rows(value: Any) -> bool:
+    return isinstance(value, tuple | list) and bool(value) and isinstance(value[0], Mapping)
+
+
+def toml_value(value: Any) -> str:
+    """A value as TOML writes it: text, numbers and lists as JSON does."""
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(toml_value, value))}]"
+    return json.dumps(value, ensure_ascii=False)

@@ -17,6 +17,7 @@ from snakewalk.sim.line.wire import Wire
 from snakewalk.sim.plant import Mounting, Plant
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.firmware import Firmware
+from snakewalk.sim.servo.motor import MotorModel
 from snakewalk.sim.servo.protection import SupplyAndAmbient
 
 Tamper = Callable[[bytes], Sequence[bytes]]
@@ -39,12 +40,13 @@ class SimLine(Wire):
         *,
         supply_and_ambient: SupplyAndAmbient | None = None,
         mounting: Mounting | None = None,
+        motors: Sequence[MotorModel] | None = None,
         tamper: Tamper | None = None,
         usb_latency_s: float = 0.0,
         imu: Imu | None = None,
     ) -> None:
         super().__init__(clock if clock is not None else SimClock(plant.time_s), usb_latency_s)
-        self.firmware = Firmware(bank, plant, supply_and_ambient, mounting)
+        self.firmware = Firmware(bank, plant, supply_and_ambient, mounting, motors)
         self.bank = bank
         self.tamper = tamper
         self._handler = InstructionHandler(self.firmware, baud, imu)

@@ -32,6 +32,10 @@ between them is a fifth of the radius deep."""
 CONTACT_TIME_S = 0.015
 """Of the contact spring; MuJoCo wants at least two steps. Sinks 0.03 mm under the body's weight."""
 
+GEAR_IMPEDANCE = "0.999 0.999"
+"""Of what friction in the gears holds: a joint that it holds creeps at a thousandth of its free
+acceleration times the step."""
+
 
 def build_model(
     robot: RobotConfig,
@@ -154,6 +158,7 @@ def mjcf(
 ) -> str:
     """Write the model as MJCF text (a height field's samples are filled in by ``finish``)."""
     soft = f'solref="{max(CONTACT_TIME_S, 2.0 * step_s)} 1" solimp="0.9 0.95 0.001"'
+    held = f'solreffriction="{2.0 * step_s} 1" solimpfriction="{GEAR_IMPEDANCE} 0.001"'
     asset, floor = _ground(world, ground)
     options, obstacle = obstacle_mjcf(world)
     if robot.limbs:
@@ -167,7 +172,7 @@ def mjcf(
     {options}/>
   <asset>{asset}</asset>
   <default>
-    <joint type="hinge"/>
+    <joint type="hinge" {held}/>
     <geom condim="1" {soft}/>
   </default>
   <worldbody>

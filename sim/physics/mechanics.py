@@ -12,6 +12,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.physics.tangent_planes import TangentPlanes
 from snakewalk.sim.physics.water import water_constants
+from snakewalk.sim.servo.motor import Gearbox, gears_of
 
 LEAST_DEPTH_M = 1e-9
 """Contacts of one link share its load by depth; this is the depth of one that just touches."""
@@ -42,8 +43,9 @@ class Mechanics:
     """(L,) of each link; a leg's counts as a plain one of the spine."""
     radius_m: float
     """Of the body."""
-    gear_drag_n_m_s: Floats
-    """(J,) viscous loss of each gearbox, powered or not."""
+    gears: Floats
+    """(12, J) friction of each gearbox, powered or not, as ``sim.servo.motor.friction_n_m`` has it.
+    The inertia of the rotors is MuJoCo's."""
     planes: TangentPlanes
     """What bears the body on a height field."""
     contact_role: NDArray[np.int32]
@@ -56,7 +58,7 @@ class Mechanics:
     """(L, 7) ``sim.physics.water.water_constants``."""
     totals: Floats = field(default_factory=lambda: np.zeros(3))
     """Energy lost to ground friction and water, J; mean distance slipped across the links, m;
-    energy lost to the drag of the gears, J."""
+    energy lost to the friction of the gears, J."""
 
     @classmethod
     def of(
@@ -79,8 +81,8 @@ class Mechanics:
         role[model.geom("ground").id] = GROUND
         role[planes.planes] = GROUND
         role[foot_geoms(model, robot)] = FOOT
-        gear_drag = np.array(robot.gear_drags_n_m_s)
-        about = robot.link_count, mass, robot.body_radius_m, gear_drag
+        gears = Gearbox.columns(gears_of(robot)).rows()
+        about = robot.link_count, mass, robot.body_radius_m, gears
         return cls(model, data, grip, *about, planes, role, load, before, water)
 
     @property
@@ -95,6 +97,7 @@ class Mechanics:
 
     def start_at_rest(self) -> None:
         """Set up the memory for a state that was set, not stepped to, after ``mj_forward``."""
+        self.model.dof_frictionloss[:] = 0.0  # it grows with torques, and there are none yet
         self.before_m[:] = self.data.xipos[1:] - self.step_s * velocities(self.model, self.data)[0]
         self.measure_loads()
 

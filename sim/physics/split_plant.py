@@ -6,7 +6,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.sim.plant import Plant, ServoDrive
-from snakewalk.sim.servo.motor import MOTORS, make_drive
+from snakewalk.sim.servo.motor import MotorModel, make_drive
 
 FOLLOW_GAIN_PER_RAD = 20.0
 """Of the motors that make shafts follow: full output at 0.05 rad (ours)."""
@@ -26,19 +26,18 @@ class SplitPlant:
     weight, contacts and friction act on the simulated ones, and nothing acts back on the real ones.
     """
 
-    def __init__(self, plant: Plant, models: Sequence[str], real: Sequence[int]) -> None:
+    def __init__(self, plant: Plant, motors: Sequence[MotorModel], real: Sequence[int]) -> None:
         """Prepare; the shafts that follow are limp until the first ``follow``.
 
         Args:
             plant: the whole body, J shafts.
-            models: of the J servos.
+            motors: of the J servos.
             real: places of the shafts that follow.
 
         """
         self._plant = plant
         self._real = np.array(sorted(real), np.intp)
-        self._simulated = np.setdiff1d(np.arange(len(models)), self._real)
-        motors = [MOTORS[model] for model in models]
+        self._simulated = np.setdiff1d(np.arange(len(motors)), self._real)
         supply_v = FOLLOW_STRENGTH * np.array([motor.nominal_v for motor in motors])
         self._drive = make_drive(motors, supply_v)
         self._drive.p_gain_per_rad[self._real] = FOLLOW_GAIN_PER_RAD / FOLLOW_STRENGTH

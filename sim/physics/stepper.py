@@ -6,6 +6,9 @@ the contacts of a link share by depth. A link slides at the rate at which it *mo
 step. Its generalised velocity is not that rate: Euler's step moves the head along its velocity and
 leaves out the turning of the links within the step, which reads as 1 mm/s of phantom motion per
 millisecond of step, and as a loss of 6 % of speed under isotropic friction at 2 ms.
+
+Where a robot's file has friction of the gears, MuJoCo holds the joints by as much as torque and
+load of the last step make it (``dof_frictionloss``: BAM's own simulation does the same).
 """
 
 from typing import Any
@@ -31,6 +34,7 @@ from snakewalk.sim.physics.mechanics import (
 from snakewalk.sim.physics.tangent_planes import PLANES, lay_planes
 from snakewalk.sim.physics.water import add_water, immersed
 from snakewalk.sim.plant import ServoDrive, shaft_torque
+from snakewalk.sim.servo.motor import friction_n_m
 
 register_jitable(ellipse_force)
 
@@ -41,6 +45,10 @@ register_jitable(shaft_torque)
 register_jitable(immersed)
 
 register_jitable(add_water)
+
+
+LEAST_FRICTION_N_M = 1e-9
+"""A joint without any would have no constraint, and the others' would count otherwise."""
 
 
 def _pointer(typing: Any, address: Any) -> Any:
@@ -211,6 +219,15 @@ def _weigh(
             load[geom_body[integers[2 * at[0] * c + at[4] + 1]] - 1] += force_n[row]
 
 
+def _has_friction(gear: Floats) -> bool:
+    """Whether any gearbox has other friction than a viscous one."""
+    terms = 0.0
+    for j in range(gear.shape[1]):
+        terms += gear[1, j] + gear[3, j] + gear[5, j] + gear[6, j] + gear[7, j] + gear[8, j]
+        terms += gear[10, j] + gear[11, j]
+    return terms > 0.0
+
+
 def _steps(
     steps: int,
     where: NDArray[np.int64],
@@ -220,7 +237,7 @@ def _steps(
     geoms: tuple[NDArray[np.int32], ...],
     ground: tuple[Any, ...],
     law: tuple[float, ...],
-    gear_drag: Floats,
+    gears: tuple[Floats, ...],
     drive: tuple[Floats, ...],
     load: Floats,
     totals: Floats,
@@ -233,8 +250,10 @@ def _steps(
     on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit = drive[:9]
     current, torque, pwm, drawn_j, returned_j, heat_j, work_j = drive[9:]
     places, balls, ball_m, z_m, corner, planes, plane_m, plane_quat = ground
+    gear, friction, bias, constraint = gears
     joints = len(goal)
-    speed = np.empty(joints)
+    speed, ground_n_m = np.empty(joints), np.empty(joints)
+    has_friction = _has_friction(gear)
     step_s = law[4]
     step1, step2, model, data = where[0], where[1], where[2], where[3]
     at = (
@@ -269,7 +288,8 @@ def _steps(
                 k_e[j],
                 current_limit[j],
             )
-            qfrc[6 + j] = torque[j] - gear_drag[j] * qvel[6 + j]
+            qfrc[6 + j] = torque[j] - gear[2, j] * qvel[6 + j]
+            ground_n_m[j] = -qfrc[6 + j]
         count = ncon[0]
         address = pointer(contact_list[0])
         contacts = (
@@ -281,7 +301,10 @@ def _steps(
         _add_friction(
             *(contacts, qfrc, qvel, chain, work, geoms, law, load, totals, mass_kg, water, spine)
         )
+        for j in range(joints):
+            ground_n_m[j] += qfrc[6 + j]
         call(step2, model, data)
+        force_n = carray(pointer(force_list[0]), (1 << 30,), np.float64)
         for j in range(joints):
             # a force does its work at the mean of the speeds before and after Euler's step
             middle = 0.5 * (speed[j] + qvel[6 + j])
@@ -291,9 +314,16 @@ def _steps(
             returned_j[j] -= min(input_w, 0.0) * step_s
             heat_j[j] += heat_w * step_s
             work_j[j] += torque[j] * middle * step_s
-            totals[2] += gear_drag[j] * speed[j] * middle * step_s
+            totals[2] += gear[2, j] * speed[j] * middle * step_s
+            if has_friction:
+                held_n_m = 0.0
+                if friction[6 + j] > 0.0:  # MuJoCo's first constraints are these, in their order
+                    held_n_m = force_n[j]
+                    totals[2] -= held_n_m * middle * step_s
+                outside_n_m = ground_n_m[j] - bias[6 + j] + constraint[6 + j] - held_n_m
+                most_n_m = friction_n_m(gear[:, j], qvel[6 + j], torque[j], outside_n_m)
+                friction[6 + j] = max(most_n_m, LEAST_FRICTION_N_M)
         load[:] = 0.0
-        force_n = carray(pointer(force_list[0]), (1 << 30,), np.float64)
         _weigh(load, contacts, force_n, geoms)
 
 
@@ -358,13 +388,18 @@ def _run(
         carray(pointer(arrays[36]), (joints,), np.float64),
         carray(pointer(arrays[37]), (joints,), np.float64),
     )
-    gear_drag = carray(pointer(arrays[38]), (joints,), np.float64)
+    gears = (
+        carray(pointer(arrays[38]), (12, joints), np.float64),
+        carray(pointer(arrays[43]), (joints + 6,), np.float64),
+        carray(pointer(arrays[44]), (joints + 6,), np.float64),
+        carray(pointer(arrays[45]), (joints + 6,), np.float64),
+    )
     mass_kg = carray(pointer(arrays[41]), (links,), np.float64)
     water = carray(pointer(arrays[42]), (links, 7), np.float64)
     law = (constants[0], constants[1], constants[2], constants[3], constants[4])
     state = (at, rate, force)
     _steps(
-        *(steps, where, state, chain, work, geoms, ground, law, gear_drag, drive, load, totals),
+        *(steps, where, state, chain, work, geoms, ground, law, gears, drive, load, totals),
         *(mass_kg, water, sizes[6]),
     )
 
@@ -377,6 +412,8 @@ register_jitable(_sliding_link)
 register_jitable(_add_friction)
 
 register_jitable(_weigh)
+
+register_jitable(_has_friction)
 
 register_jitable(_steps)
 
@@ -447,8 +484,9 @@ class CompiledSteps:
         if drive is not self._drive:
             self._drive = drive
             m = self._m
-            motors = (*drive.columns(), m.gear_drag_n_m_s)
+            motors = (*drive.columns(), m.gears)
             links = m.model.body_parentid, m.planes.radius_m, m.link_mass_kg, m.water
-            arrays = (*self._arrays, *motors, *links)
+            joints = m.model.dof_frictionloss, m.data.qfrc_bias, m.data.qfrc_constraint
+            arrays = (*self._arrays, *motors, *links, *joints)
             self._addresses = np.array([each.ctypes.data for each in arrays], dtype=np.int64)
         run_steps(steps, self._where, self._addresses, self._sizes, self._constants)

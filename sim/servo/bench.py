@@ -1,7 +1,6 @@
 """A bench of independent shafts: enough mechanics to serve and test the bus without MuJoCo."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,8 +38,7 @@ class BenchPlant:
         self._steps = 0
         bare = Gearbox(0.0, dry_n_m, viscous_n_m_s, 0.0, 1.0, 0.0, 0.0, 0.0)
         gears = [gear] * joints if isinstance(gear, Gearbox) or gear is None else list(gear)
-        terms = Gearbox.columns([each or bare for each in gears])
-        self._gear = np.array([getattr(terms, each.name) for each in fields(Gearbox)])
+        self._gear = Gearbox.columns([each or bare for each in gears]).rows()
         self._gear[0] += inertia_kg_m2
         self._constant_load = np.zeros(joints)
         self._load = load_n_m
@@ -113,7 +111,7 @@ def _step(
 ) -> None:
     """Make ``steps`` steps of ``h`` under a constant load; the columns of a drive in their order.
 
-    ``gear`` (8, J): the fields of ``Gearbox``, the shaft's own inertia added to the rotor's.
+    ``gear`` (12, J): the fields of ``Gearbox``, the shaft's own inertia added to the rotor's.
     """
     for k in range(len(position)):
         inertia, viscous = gear[0, k], gear[2, k]
@@ -130,7 +128,8 @@ def _step(
                 push = stiff * share * supply_v[k]
                 damping = viscous + stiff * back_emf_v_s[k]
             free = (inertia * w + h * (push + load)) / (inertia + h * damping)
-            friction = friction_n_m(gear[:, k], w, push - damping * w, load)
+            motor = push - (damping - viscous) * w
+            friction = friction_n_m(gear[:, k], w, motor, load)
             brake = h * friction / (inertia + h * damping)
             w = np.sign(free) * max(abs(free) - brake, 0.0)
             velocity[k] = w

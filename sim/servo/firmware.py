@@ -4,6 +4,8 @@ Physics is always stepped first to the time of an access (with stops where a wat
 protection is due); only then are registers read or written.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,6 +30,7 @@ from snakewalk.sim.servo.motor import (
     TICKS_PER_RAD,
     TICKS_PER_REV,
     MotorColumns,
+    MotorModel,
     make_drive,
 )
 from snakewalk.sim.servo.motor_output import MotorOutput
@@ -46,7 +49,10 @@ STARTUP_TORQUE_ON, STARTUP_RAM_RESTORE = 0x01, 0x02
 
 
 class Firmware:
-    """Servos of ``bank`` on the shafts of ``plant``, in the order of the bank's rows."""
+    """Servos of ``bank`` on the shafts of ``plant``, in the order of the bank's rows.
+
+    ``motors`` (S,) are the catalogue's where none are given.
+    """
 
     def __init__(
         self,
@@ -54,6 +60,7 @@ class Firmware:
         plant: Plant,
         supply_and_ambient: SupplyAndAmbient | None = None,
         mounting: Mounting | None = None,
+        motors: Sequence[MotorModel] | None = None,
     ) -> None:
         joints = len(bank)
         mounted = mounting or Mounting(np.ones(joints), np.zeros(joints))
@@ -62,7 +69,8 @@ class Firmware:
         self._mounted_ticks = np.rint(mounted.zero_rad * TICKS_PER_RAD)
         self.bank = bank
         self.plant = plant
-        motors = [MOTORS[model] for model in bank.models]
+        if motors is None:
+            motors = [MOTORS[model] for model in bank.models]
         self._motor = motor = MotorColumns(motors)
         around = supply_and_ambient or SupplyAndAmbient()
         usual_v = motor.nominal_v if around.supply_v is None else around.supply_v

@@ -1,4 +1,4 @@
-"""Constants of motors and gearboxes by servo model, and the drive that they make.
+"""Constants of motors and gearboxes by servo model or by a robot's file, and the drive of them.
 
 Torque, current and speed figures are those of the e-manual's specification tables at the voltage
 that ROBOTIS recommends (``sim.servo.models``); everything else is derived from them here. Thermal
@@ -8,17 +8,18 @@ moves.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import AnyInts, Floats
-from snakewalk.config.robot import STALL_CURRENT_A
+from snakewalk.config.motor import MotorConfig
+from snakewalk.config.robot import STALL_CURRENT_A, RobotConfig
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A, PWM_FULL
 from snakewalk.sim.plant import ServoDrive
-from snakewalk.sim.servo.models import MODELS, ModelFacts
+from snakewalk.sim.servo.models import MODELS, ModelFacts, facts_of
 
 TICKS_PER_REV = 4096
 TICKS_PER_RAD = TICKS_PER_REV / math.tau
@@ -66,6 +67,25 @@ class MotorModel:
         """k_e in V s/rad: at no-load speed the back-EMF is the supply."""
         return self.nominal_v / self.no_load_rad_s
 
+    def with_constants(self, own: MotorConfig | None) -> "MotorModel":
+        """Return the motor with constants of a robot's file; the rest stays the model's."""
+        if own is None:
+            return self
+        k_t, k_e = self.torque_constant_n_m_a, self.back_emf_v_s
+        if own.torque_constant_n_m_a is not None:  # one winding: the two are the same
+            k_t = k_e = own.torque_constant_n_m_a
+        stall_a = self.nominal_v / (own.resistance_ohm or self.resistance_ohm)
+        divisor = self.p_gain_divisor
+        if own.p_unit_per_rad is not None:
+            divisor = TICKS_PER_RAD / PWM_FULL / own.p_unit_per_rad
+        return replace(
+            self,
+            stall_torque_n_m=k_t * stall_a,
+            stall_current_a=stall_a,
+            no_load_rad_s=self.nominal_v / (own.back_emf_v_s or k_e),
+            p_gain_divisor=divisor,
+        )
+
 
 def _motor(model: str, facts: ModelFacts) -> MotorModel:
     small = facts.pwm_slope is not None
@@ -85,6 +105,24 @@ def _motor(model: str, facts: ModelFacts) -> MotorModel:
 
 
 MOTORS: Mapping[str, MotorModel] = {model: _motor(model, facts) for model, facts in MODELS.items()}
+
+
+def known_motors(robot: RobotConfig) -> list[MotorModel | None]:
+    """Motors of a robot's J servos: the catalogue's, with the constants of its file; None: none."""
+    models = zip(robot.servo_models, robot.motors, strict=True)
+    return [MOTORS[model].with_constants(own) if model in MOTORS else None for model, own in models]
+
+
+def motors_of(robot: RobotConfig) -> list[MotorModel]:
+    """Motors of a robot's J servos.
+
+    Raises:
+        ControlTableError: a model cannot be simulated.
+
+    """
+    for model in robot.servo_models:
+        facts_of(model)
+    return [motor for motor in known_motors(robot) if motor is not None]
 
 
 class MotorColumns:
@@ -135,10 +173,12 @@ class Gearbox:
 
     The greatest friction torque is ``dry + |by_load t_load - by_motor t_motor|``: teeth press
     harder the more they carry, and most when motor and load strive against each other. While the
-    shaft is slow it is ``(stribeck + by_load_slow |t_load|) exp(-(w / stribeck_speed)^2)`` more
-    (Duclusaud et al., "Extended Friction Models for the Physics Simulation of Servo Actuators",
-    ICRA 2025, model M5, without its slow share of the motor's torque, which the fit made nothing).
-    It never reverses a shaft; a shaft that it can hold rests.
+    shaft is slow it is ``stribeck + |by_load_slow t_load - by_motor_slow t_motor|`` more, times
+    ``exp(-(|w| / stribeck_rad_s)^stribeck_exponent)``. Where motor and load strive against each
+    other, the slow share has a square as well: ``by_load_square t_load^2`` while the motor is the
+    stronger, ``by_motor_square t_motor^2`` while the load is (Duclusaud et al., "Extended Friction
+    Models for the Physics Simulation of Servo Actuators", ICRA 2025: models M1 to M6). It never
+    reverses a shaft; a shaft that it can hold rests.
     """
 
     armature_kg_m2: Floats | float
@@ -153,6 +193,11 @@ class Gearbox:
     """Share of the load's torque that friction takes."""
     by_load_slow: Floats | float
     """Share that it takes more while the shaft is slow."""
+    by_motor_slow: Floats | float = 0.0
+    stribeck_exponent: Floats | float = 2.0
+    by_motor_square: Floats | float = 0.0
+    by_load_square: Floats | float = 0.0
+    """In 1/(N m)."""
 
     @staticmethod
     def columns(gears: "Sequence[Gearbox]") -> "Gearbox":
@@ -160,17 +205,26 @@ class Gearbox:
         names = [each.name for each in fields(Gearbox)]
         return Gearbox(*(np.array([getattr(gear, name) for gear in gears]) for name in names))
 
+    def rows(self) -> Floats:
+        """(12, J) its fields in their order, for ``friction_n_m``."""
+        return np.array([np.atleast_1d(getattr(self, each.name)) for each in fields(self)], float)
+
 
 @compiled(f"float64({readonly_array()}, float64, float64, float64)")
 def friction_n_m(gear: Floats, speed_rad_s: float, motor_n_m: float, load_n_m: float) -> float:
     """Greatest friction torque but for the viscous part, which grows with the speed.
 
-    ``gear`` (8,) holds the fields of a ``Gearbox`` in their order.
+    ``gear`` (12,) holds the fields of a ``Gearbox`` in their order.
     """
     friction = gear[1] + abs(gear[6] * load_n_m - gear[5] * motor_n_m)
-    slow = gear[3] + gear[7] * abs(load_n_m)
+    slow = gear[3] + abs(gear[7] * load_n_m - gear[8] * motor_n_m)
+    if load_n_m * motor_n_m < 0.0:
+        if abs(load_n_m) < abs(motor_n_m):
+            slow += gear[11] * load_n_m * load_n_m
+        else:
+            slow += gear[10] * motor_n_m * motor_n_m
     if slow > 0.0:
-        friction += slow * np.exp(-((speed_rad_s / gear[4]) ** 2))
+        friction += slow * np.exp(-((abs(speed_rad_s) / gear[4]) ** gear[9]))
     return float(friction)
 
 
@@ -180,3 +234,22 @@ GEARBOXES: Mapping[str, Gearbox] = {
     "XL330-M288": Gearbox(1.48e-3, 0.0084, 0.0020, 0.0188, 0.376, 0.320, 0.173, 0.121),
 }
 """Models whose friction somebody has measured."""
+
+
+def gears_of(robot: RobotConfig) -> list[Gearbox]:
+    """Gearboxes of a robot's J servos, as its file says: without friction where it has none."""
+    terms = [
+        Gearbox(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+        if own is None
+        else Gearbox(
+            *(0.0, own.dry_n_m, 0.0, own.stribeck_n_m, own.stribeck_rad_s),
+            *(own.by_motor, own.by_load, own.by_load_slow, own.by_motor_slow),
+            *(own.stribeck_exponent, own.by_motor_square, own.by_load_square),
+        )
+        for own in robot.motors
+    ]
+    inertia_and_drag = zip(robot.armatures_kg_m2, robot.gear_drags_n_m_s, strict=True)
+    return [
+        replace(gear, armature_kg_m2=armature, viscous_n_m_s=drag)
+        for gear, (armature, drag) in zip(terms, inertia_and_drag, strict=True)
+    ]

@@ -9,7 +9,7 @@ import pytest
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.loader import checked, load_robot
 from snakewalk.config.robot import JointConfig, RobotConfig
-from snakewalk.config.robot_file import robot_toml
+from snakewalk.config.template import robot_toml
 from tests.helpers.uneven import UNEVEN, spelt_out
 
 OWN = """

@@ -35,10 +35,12 @@ class NumpySteps:
             force = friction_forces(m)
             rate = m.data.qvel[6:]
             before = rate.copy()
-            force[6:] += drive_shafts(drive, m.data.qpos[7:], rate) - m.gear_drag_n_m_s * rate
+            ground_n_m = force[6:].copy()
+            force[6:] += drive_shafts(drive, m.data.qpos[7:], rate) - m.gears[2] * rate
             m.data.qfrc_applied[:] = force
             mujoco.mj_step2(m.model, m.data)
             add_energies(m, drive, before)
+            hold_joints(m, drive, ground_n_m, before)
             m.measure_loads()
 
 
@@ -50,7 +52,26 @@ def add_energies(m: Mechanics, drive: ServoDrive, before_rad_s: Floats) -> None:
     drive.returned_j[:] += np.where(input_w < 0.0, -input_w, 0.0) * step_s
     drive.heat_j[:] += drive.resistance_ohm * amps**2 * step_s
     drive.work_j[:] += drive.torque_n_m * middle * step_s
-    m.totals[2] += float((m.gear_drag_n_m_s * before_rad_s) @ middle) * step_s
+    m.totals[2] += float((m.gears[2] * before_rad_s) @ middle) * step_s
+
+
+def hold_joints(m: Mechanics, drive: ServoDrive, ground_n_m: Floats, before_rad_s: Floats) -> None:
+    """Set what the gears' friction may hold in the next step; its loss in this one is added."""
+    gear, rate = m.gears, m.data.qvel[6:]
+    if not np.delete(gear, (0, 2, 4, 9), axis=0).any():
+        return
+    held = np.zeros(len(rate))
+    if m.model.dof_frictionloss[6:].all():
+        held = m.data.efc_force[: len(rate)].copy()
+        m.totals[2] -= float(held @ (0.5 * (before_rad_s + rate))) * m.step_s
+    load = ground_n_m - m.data.qfrc_bias[6:] + m.data.qfrc_constraint[6:] - held
+    motor = drive.torque_n_m
+    slow = gear[3] + np.abs(gear[7] * load - gear[8] * motor)
+    square = np.where(np.abs(load) < np.abs(motor), gear[11] * load**2, gear[10] * motor**2)
+    slow = slow + np.where(load * motor < 0.0, square, 0.0)
+    speed = np.exp(-((np.abs(rate) / gear[4]) ** gear[9]))
+    friction = gear[1] + np.abs(gear[6] * load - gear[5] * motor) + slow * speed
+    m.model.dof_frictionloss[6:] = np.maximum(friction, 1e-9)
 
 
 def friction_forces(m: Mechanics) -> Floats:

@@ -300,6 +300,7 @@ app.command(
 app.command(
     epilog=_examples(
         "identify kp200.json kp800.json -o xl330.json",
+        "identify kp200.json kp800.json --robot xl330-16 --robot-out mine.toml",
         "identify kp400.json --start xl330.json --no-fit --json",
         "identify runs/flat-slalom-walk-seed0/log.mcap -o found.toml",
     ),

@@ -5,6 +5,7 @@ fits has the servo's motion, not its next sample. Many starts find the basin, st
 ones its ground; all chance comes from one seed.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Final
 
@@ -13,8 +14,13 @@ from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.app.identification.pendulum_log import PendulumLog
-from snakewalk.controller.app.identification.pendulum_swing import FINE_S, swing_rad
+from snakewalk.controller.app.identification.pendulum_swing import (
+    FINE_S,
+    robot_swing_rad,
+    swing_rad,
+)
 from snakewalk.controller.app.identification.servo_constants import (
     CONSTANTS,
     FITTED,
@@ -38,18 +44,33 @@ _FIRST: Final = 4
 _OUTLIER_RAD: Final = 0.02
 """Errors above this count linearly, as in a mean absolute error."""
 _TURN: Final = 1e-3
-"""Of a constant's range: step of the derivatives."""
+"""Of a constant's range: step of the search's derivatives."""
+_FINE_TURN: Final = 1e-4
+"""Of a constant, or of a hundredth of its range: step of the intervals' derivatives. Where
+constants trade against each other exactly, a long step's error would pass for knowledge."""
 _BLOCK_S: Final = 0.5
 """Errors within this are not independent: they count as one in the intervals (ours)."""
 _COVERAGE: Final = 0.95
 _LEAST_SHARE: Final = 0.01
 """No constant is known better than mass, arm and supply, which are given to a per cent (ours)."""
+_FACTOR: Final = 1.05
+"""Step along constants that move a servo alike (ours)."""
+_CHI_SQUARE: Final = 3.84
+"""Of one constant: what is less likely than 5 %."""
+_TORQUE_CONSTANT: Final = NAMES.index("torque_constant_n_m_a")
+_RESISTANCE: Final = NAMES.index("resistance_ohm")
+_P_UNIT: Final = NAMES.index("p_unit_per_rad")
 _SLOW_TERMS: Final = ("stribeck_n_m", "by_motor_slow", "by_load_slow")
 
 
 def error_deg(constants: ServoConstants, log: PendulumLog) -> float:
     """Mean absolute error of the angle over a log, in degrees."""
     return float(np.degrees(np.abs(swing_rad(constants.values, log) - log.position_rad).mean()))
+
+
+def robot_error_deg(robot: RobotConfig, log: PendulumLog, bench: ServoConstants) -> float:
+    """Mean absolute error of the angle of a robot's simulated servo over a log, in degrees."""
+    return float(np.degrees(np.abs(robot_swing_rad(robot, log, bench) - log.position_rad).mean()))
 
 
 def fit_pendulum(
@@ -94,8 +115,14 @@ def fit_pendulum(
         on_progress(starts + k + 1, total)
     values = np.asarray(_fit(logs, pool[0].x, squares, FINE_S, _FINE_TURNS).x)
     on_progress(total, total)
+    least, most = _alike(logs, values, squares)
+    chosen = float(np.clip(first[_P_UNIT] / values[_P_UNIT], least, most))
+    smallest, greatest = _scaled(values, least), _scaled(values, most)
+    values = _scaled(values, chosen)
+    low, high = _intervals(logs, values, squares)
     unknown = np.full(len(squares), np.nan)
-    low, high = (np.append(end, unknown) for end in _intervals(logs, values, squares))
+    low = np.append(np.minimum(low, smallest), unknown)
+    high = np.append(np.maximum(high, greatest), unknown)
     return ServoConstants(np.append(values, squares), low, high, logs[0].actuator)
 
 
@@ -123,6 +150,40 @@ def _fit(
     )
 
 
+def _scaled(values: Floats, factor: float) -> Floats:
+    """Return the constants with torque constant and P unit times a factor, resistance its square.
+
+    Where the output never comes to its limit, such a servo moves in the same way: with less
+    current, by more volts.
+    """
+    out = values.copy()
+    out[[_TORQUE_CONSTANT, _P_UNIT]] *= factor
+    out[_RESISTANCE] *= factor**2
+    return out
+
+
+def _alike(logs: Sequence[PendulumLog], values: Floats, squares: Floats) -> tuple[float, float]:
+    """Least and greatest factor of ``_scaled`` that the recordings do not tell from 1."""
+
+    def cost(of: Floats) -> float:
+        errors = _errors(of, logs, squares, FINE_S) / _OUTLIER_RAD
+        return float((np.sqrt(1.0 + errors**2) - 1.0).sum())
+
+    blocks = sum(math.ceil(log.time_s[-1] / _BLOCK_S) for log in logs)
+    limit = cost(values) * (1.0 + _CHI_SQUARE / blocks)
+    ends = []
+    for step in (1.0 / _FACTOR, _FACTOR):
+        factor = 1.0
+        while True:
+            further = _scaled(values, factor * step)
+            inside = (further >= _LOW).all() and (further <= _HIGH).all()
+            if not inside or cost(further) > limit:
+                break
+            factor *= step
+        ends.append(factor)
+    return ends[0], ends[1]
+
+
 def _intervals(
     logs: Sequence[PendulumLog], values: Floats, squares: Floats
 ) -> tuple[Floats, Floats]:
@@ -133,16 +194,18 @@ def _intervals(
     not tell has an interval as wide as its range.
     """
     width = _HIGH - _LOW
-    jacobian = np.stack(
-        [
-            (
+    steps = _FINE_TURN * np.maximum(np.abs(values), 0.01 * width)
+    jacobian = (
+        width
+        / (2.0 * steps)
+        * np.stack(
+            [
                 _errors(values + turn, logs, squares, FINE_S)
                 - _errors(values - turn, logs, squares, FINE_S)
-            )
-            / (2.0 * _TURN)
-            for turn in np.diag(_TURN * width)
-        ],
-        axis=1,
+                for turn in np.diag(steps)
+            ],
+            axis=1,
+        )
     )  # of each constant in units of its range
     errors = _errors(values, logs, squares, FINE_S)
     weight = 1.0 / np.sqrt(1.0 + (errors / _OUTLIER_RAD) ** 2)

@@ -11,7 +11,7 @@ Friction Models for the Physics Simulation of Servo Actuators", ICRA 2025: model
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -21,6 +21,9 @@ import numpy as np
 from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.loader import with_keys
+from snakewalk.config.motor import MotorConfig
+from snakewalk.config.robot import RobotConfig
 
 
 class Constant(NamedTuple):
@@ -149,6 +152,61 @@ def read_bam(path: Path) -> ServoConstants:
         raise InputError(faults)
     unknown = np.full(len(CONSTANTS), np.nan)
     return ServoConstants(values, unknown, unknown, str(data.get("actuator", "")))
+
+
+def check_servo(robot: RobotConfig, actuator: str) -> None:
+    """Refuse constants of a servo that is not the robot's; one without a name is taken for it.
+
+    Raises:
+        InputError: it is another one.
+
+    """
+    model = robot.servo.model
+    if not model.lower().replace("-", "").startswith(actuator.lower().replace("-", "")):
+        raise InputError(
+            f"the constants are of a servo {actuator}, robot {robot.name} has {model}; give "
+            "recordings of its own (their motor is the model's name, or its beginning)"
+        )
+
+
+def robot_with(robot: RobotConfig, constants: ServoConstants) -> RobotConfig:
+    """Return the robot with these constants, for every joint with a servo of ``servo.model``.
+
+    Raises:
+        InputError: the constants are of another servo.
+
+    """
+    check_servo(robot, constants.actuator)
+    found = {name: float(f"{constants[name]:.5g}") for name in NAMES}
+    known = {name: found[name] for name in MotorConfig.model_fields if name in found}
+    changes: dict[str, object] = {
+        "servo.motor": known,
+        "servo.armature_kg_m2": found["armature_kg_m2"],
+        "servo.gear_drag_n_m_s": found["viscous_n_m_s"],
+    }
+    own = robot.servo.model
+    if set(robot.servo_models) != {own}:  # joints with another servo keep what they had
+        kept = zip(robot.armatures_kg_m2, robot.gear_drags_n_m_s, strict=True)
+        changes["joints"] = [
+            joint.model_dump(exclude_defaults=True)
+            | ({} if model == own else {"armature_kg_m2": armature, "gear_drag_n_m_s": drag})
+            for joint, model, (armature, drag) in zip(
+                robot.joints, robot.servo_models, kept, strict=True
+            )
+        ]
+    return with_keys(robot, changes, robot.name)
+
+
+def robot_comment(constants: ServoConstants, paths: Sequence[Path]) -> str:
+    """Words for the head of a robot's file: where its constants are from, and their intervals."""
+    lines = [f"Servo constants found by `snakewalk identify` from {', '.join(map(str, paths))}."]
+    lines += [
+        f"{constant.name.replace('_', ' ')} {constants[constant.name]:.4g}, 95 % of {low:.4g} to "
+        f"{high:.4g}"
+        for constant, low, high in zip(CONSTANTS, constants.low, constants.high, strict=True)
+        if math.isfinite(low)
+    ]
+    return "\n".join(lines)
 
 
 def read_json(path: Path) -> dict[str, object]:

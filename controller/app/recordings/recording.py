@@ -16,7 +16,7 @@ from snakewalk.controller.capture.wave import measure_wave
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.shape.states import energy_kept, to_angles, to_states
 from snakewalk.controller.walk.shape_filters import shape_filters
-from snakewalk.sim.servo.motor import MOTORS
+from snakewalk.sim.servo.motor import known_motors
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +138,7 @@ def _pace(track: Track, shapes: Floats, wave_hz: float, robot: RobotConfig) -> P
     demand = joint_demand(joints, track.time_s, track.rate_hz, wave_hz)
     slow = slowing(demand, robot.joint_speed_limit_rad_s, robot.joint_acceleration_limit_rad_s2)
     fastest = float(demand.speed_rad_s.max())
-    no_load = [MOTORS[m].no_load_rad_s for m in robot.servo_models if m in MOTORS]
+    no_load = [motor.no_load_rad_s for motor in known_motors(robot) if motor is not None]
     return PaceFacts(
         joint_speed_rad_s=round(fastest, 2),
         joint_speed_95_rad_s=round(float(np.percentile(demand.speed_rad_s, 95.0)), 2),

@@ -73,6 +73,7 @@ def simulated(
     from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
     from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
+    from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
     from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
     plant = MujocoPlant(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s)
@@ -84,6 +85,7 @@ def simulated(
         plant,
         baud=servo.baud,
         mounting=deviation.mounting(robot),
+        motors=motors_of(robot),
         supply_and_ambient=SupplyAndAmbient.of(robot),
         imu=plant_imu(robot, plant, servo.baud, run.seed),
     )
@@ -172,15 +174,15 @@ def split(
     from snakewalk.sim.physics.split_plant import SplitPlant  # noqa: PLC0415
     from snakewalk.sim.plant import Mounting  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
+    from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
     from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
     (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)
     rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in here]
     plant = MujocoPlant(robot, world, ground, run.physics_step_s)
     plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
-    body = SplitPlant(
-        plant, robot.servo_models, [j for j in range(robot.joint_count) if j not in rows]
-    )
+    motors = motors_of(robot)
+    body = SplitPlant(plant, motors, [j for j in range(robot.joint_count) if j not in rows])
     baud, mounting, clock = robot.servo.baud, Mounting.of(robot), RealTimeClock()
     imu = plant_imu(robot, plant, baud, run.seed)
     bank = ServoBank(
@@ -192,6 +194,7 @@ def split(
         clock,
         baud=baud,
         mounting=Mounting(mounting.sign[rows], mounting.zero_rad[rows]),
+        motors=[motors[row] for row in rows],
         supply_and_ambient=SupplyAndAmbient(supply_v=robot.servo.supply_v),
         imu=imu if imu is not None and imu.config.id in here else None,
     )

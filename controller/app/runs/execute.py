@@ -290,11 +290,10 @@ def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
 
 def _current_gain_a_rad(robot: RobotConfig) -> float:
     """Current of the stiffest joint per radian of lead; 0 where no motor is known."""
-    from snakewalk.sim.servo.motor import MOTORS, p_gain_per_rad  # noqa: PLC0415  figures only
+    from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad  # noqa: PLC0415  figures only
 
     gains_a_rad = [0.0]
-    for model, gain in zip(robot.servo_models, robot.position_p_gains, strict=True):
-        motor = MOTORS.get(model)
+    for motor, gain in zip(known_motors(robot), robot.position_p_gains, strict=True):
         if motor is not None:
             per_rad = float(p_gain_per_rad(gain, motor))
             gains_a_rad.append(per_rad * robot.servo.supply_v / motor.resistance_ohm)
@@ -306,10 +305,10 @@ def _motor(robot: RobotConfig) -> tuple[float, Winding | None]:
 
     NaN and None where the simulator has no such model, or the servos are of several.
     """
-    from snakewalk.sim.servo.motor import MOTORS  # noqa: PLC0415  only for these figures
+    from snakewalk.sim.servo.motor import known_motors  # noqa: PLC0415  only for these figures
 
-    models = set(robot.servo_models)
-    motor = MOTORS.get(models.pop())
-    if motor is None or models:
+    motors = set(known_motors(robot))
+    motor = motors.pop()
+    if motor is None or motors:
         return float("nan"), None
     return motor.torque_constant_n_m_a, Winding(motor.resistance_ohm, motor.back_emf_v_s)

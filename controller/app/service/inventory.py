@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.robot_file import robot_toml
+from snakewalk.config.template import robot_toml
 from snakewalk.controller.app.service.scan import ScanResult, scan
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.start_up import ServoReport, read_report

@@ -17,7 +17,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import JointConfig, RobotConfig
-from snakewalk.config.robot_file import robot_toml
+from snakewalk.config.template import robot_toml
 from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.app.cli.commands.bench import calibrate as calibrate_command
 from snakewalk.controller.app.runs.execute import execute

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, shipped
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.robot_file import robot_toml
+from snakewalk.config.template import robot_toml
 from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.app.service.robot_export import mjcf_text, urdf_text
 from snakewalk.controller.kinematics.links import body_in_world

@@ -5,7 +5,7 @@ import pytest
 from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.robot_file import robot_toml
+from snakewalk.config.template import robot_toml
 from snakewalk.drivers.port.port_map import is_port_map, parse_port_map, port_map_text, ports_in
 
 TWO = [{"port": "/dev/ttyUSB0", "ids": [1, 2]}, {"port": "socket://host:5000", "ids": [3, 4]}]

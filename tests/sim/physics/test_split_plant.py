@@ -7,7 +7,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.physics.split_plant import SplitPlant
-from snakewalk.sim.servo.motor import MOTORS, make_drive
+from snakewalk.sim.servo.motor import MOTORS, make_drive, motors_of
 
 ROBOT = RobotConfig(name="six", joint_axes="yyyyyy")
 REAL = (1, 4, 5)
@@ -16,7 +16,7 @@ STEP_S = 0.02
 
 def a_body() -> tuple[MujocoPlant, SplitPlant]:
     plant = MujocoPlant(ROBOT, WorldConfig(name="flat"))
-    return plant, SplitPlant(plant, ROBOT.servo_models, REAL)
+    return plant, SplitPlant(plant, motors_of(ROBOT), REAL)
 
 
 def measured(time_s: float) -> tuple[np.ndarray, np.ndarray]:

@@ -9,8 +9,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from snakewalk.config.loader import load_robot, with_keys
 from snakewalk.drivers.protocol.registers import PWM_FULL
-from snakewalk.sim.servo.motor import GEARBOXES, MOTORS, friction_n_m, p_gain_per_rad
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+from snakewalk.sim.servo.motor import GEARBOXES, MOTORS, friction_n_m, motors_of, p_gain_per_rad
 
 XL330 = MOTORS["XL330-M288"]
 GEAR = GEARBOXES["XL330-M288"]
@@ -66,7 +70,7 @@ def test_friction_is_least_where_motor_and_load_pull_together_and_small_without_
     gear, still = np.array(astuple(GEAR)), 0.0
     holds = friction_n_m(gear, still, 0.3, -0.3)
     lets_down = friction_n_m(gear, still, 0.3, 0.3)
-    by_motor, by_load, by_load_slow = gear[5:]
+    by_motor, by_load, by_load_slow = gear[5:8]
     assert holds - lets_down == pytest.approx(0.3 * 2.0 * min(by_motor, by_load))
     assert friction_n_m(gear, still, 0.0, 0.0) == gear[1] + gear[3]
     # a P gain of 100 pulls with 0.22 N m/rad: what sticks without torque is 0.13 rad there
@@ -115,3 +119,26 @@ def test_one_set_of_xm430_constants_gives_its_data_sheet_at_every_voltage(
     assert amps == pytest.approx(stall_a, rel=0.06)
     assert motor.torque_constant_n_m_a * amps == pytest.approx(stall_n_m, rel=0.06)
     assert volts / motor.back_emf_v_s * 60.0 / (2.0 * np.pi) == pytest.approx(rpm, rel=0.02)
+
+
+def test_a_robots_file_changes_what_a_servo_does_not_who_it_is() -> None:
+    """Its line: registers and limits of the model, torque and gain of the file."""
+    robot = load_robot("xl330-16")
+    own = {"torque_constant_n_m_a": 0.25, "resistance_ohm": 5.0, "p_unit_per_rad": 0.004}
+    changed = with_keys(robot, {"servo.motor": own}, "mine")
+    lines = [
+        SimLine(
+            ServoBank(each.servo_ids, each.servo_models),
+            BenchPlant(each.joint_count),
+            motors=motors_of(each),
+        )
+        for each in (robot, changed)
+    ]
+    plain, drive = (line.firmware.drive for line in lines)
+    np.testing.assert_array_equal(lines[0].bank.table, lines[1].bank.table)
+    assert (drive.torque_constant_n_m_a == 0.25).all()
+    assert (drive.back_emf_v_s == 0.25).all()
+    np.testing.assert_allclose(drive.resistance_ohm, 5.0)
+    register = lines[1].bank["Position P Gain"]
+    np.testing.assert_allclose(drive.p_gain_per_rad, 0.004 * register)
+    assert (plain.resistance_ohm == XL330.resistance_ohm).all()

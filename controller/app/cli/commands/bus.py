@@ -253,6 +253,7 @@ def _robot_line(name: str, baud: int | None) -> "SimLine":
     from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
     from snakewalk.sim.plant import Mounting  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
+    from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
     from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
     robot = load_robot(name)
@@ -264,6 +265,7 @@ def _robot_line(name: str, baud: int | None) -> "SimLine":
         plant,
         baud=rate,
         mounting=Mounting.of(robot),
+        motors=motors_of(robot),
         supply_and_ambient=SupplyAndAmbient.of(robot),
         imu=plant_imu(robot, plant, rate),
     )

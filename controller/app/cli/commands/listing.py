@@ -109,7 +109,7 @@ def import_robot(
 ) -> None:
     """Make a robot's file of another program's model; what cannot be said there is told."""
     from snakewalk.config.extras import require_extra  # noqa: PLC0415  --help stays quick
-    from snakewalk.config.robot_file import robot_toml  # noqa: PLC0415
+    from snakewalk.config.template import robot_toml  # noqa: PLC0415
 
     require_extra("MuJoCo models and URDF need", "mujoco")
     from snakewalk.controller.app.service import robot_import  # noqa: PLC0415

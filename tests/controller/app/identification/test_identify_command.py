@@ -3,11 +3,19 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot, with_keys
 from snakewalk.controller.app.cli.command_line import app
+from snakewalk.controller.app.identification.servo_constants import (
+    CONSTANTS,
+    ServoConstants,
+    robot_with,
+)
+from snakewalk.sim.servo.motor import gears_of, motors_of, p_gain_per_rad
 from tests.controller.app.identification.conftest import PLANTED
 
 BAM = {
@@ -72,6 +80,56 @@ def test_a_model_with_squares_comes_back(files: list[Path], tmp_path: Path) -> N
     assert written["model"] == "m6"
     assert {key: written[key] for key in squares} == squares
     assert told["constants"]["by_load_square"] == 0.3
+
+
+def test_a_robots_file_gets_the_constants(files: list[Path], tmp_path: Path) -> None:
+    start, out = tmp_path / "bam.json", tmp_path / "mine.toml"
+    start.write_text(json.dumps(BAM))
+    words = (files[0], "--start", start, "--no-fit", "--robot", "xl330-16", "--robot-out", out)
+    told = json.loads(run(*words, "--json"))
+    before_deg, after_deg = told["robot_errors_deg"][str(files[0])]
+    assert after_deg < 0.3 < before_deg
+    robot, was = load_robot(str(out)), load_robot("xl330-16")
+    motor = motors_of(robot)[3]
+    for name in ("torque_constant_n_m_a", "resistance_ohm"):
+        assert getattr(motor, name) == pytest.approx(PLANTED[name])
+    assert float(p_gain_per_rad(400, motor)) == pytest.approx(400 * PLANTED["p_unit_per_rad"])
+    assert gears_of(robot)[3].dry_n_m == PLANTED["dry_n_m"]
+    assert gears_of(robot)[3].armature_kg_m2 == PLANTED["armature_kg_m2"]
+    assert robot.over_current_a == was.over_current_a
+    assert robot.model_copy(update={"name": was.name, "servo": was.servo}) == was
+    assert "mine.toml: exists; --force" in refused(*words)
+    assert "its simulated servo is" in run(*words, "--force")
+
+
+def test_joints_with_another_servo_keep_theirs() -> None:
+    joints = [{}] * 15 + [{"model": "XL430-W250"}]
+    robot = with_keys(load_robot("xl330-16"), {"joints": joints}, "mixed")
+    values = np.array([constant.start for constant in CONSTANTS])
+    unknown = np.full(len(values), np.nan)
+    known = robot_with(robot, ServoConstants(values, unknown, unknown, "xl330"))
+    assert known.motors[0] is not None
+    assert known.motors[15] is None
+    assert known.armatures_kg_m2 == (0.002,) * 16
+    assert known.gear_drags_n_m_s == (0.02,) * 15 + (0.006,)
+    assert motors_of(known)[15] == motors_of(robot)[15]
+
+
+def test_what_is_refused_of_a_robot(files: list[Path], tmp_path: Path) -> None:
+    start, out = tmp_path / "bam.json", tmp_path / "mine.toml"
+    start.write_text(json.dumps(BAM))
+    words = (files[0], "--start", start, "--no-fit")
+    assert "go together" in refused(*words, "--robot", "xl330-16")
+    assert "go together" in refused(*words, "--robot-out", out)
+    json_out = tmp_path / "mine.json"
+    assert "end its name with .toml" in refused(
+        *words, "--robot", "xl330-16", "--robot-out", json_out
+    )
+    assert "of a servo xl330, robot yaw16 has XM430-W350" in refused(
+        *words, "--robot", "yaw16", "--robot-out", out
+    )
+    assert "take a servo's constants" in refused("a.mcap", "--robot-out", out)
+    assert not out.exists()
 
 
 def test_what_is_refused(files: list[Path], tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from snakewalk.controller.app.identification.pendulum_fit import error_deg, fit_pendulum
 from snakewalk.controller.app.identification.pendulum_log import PendulumLog
-from snakewalk.controller.app.identification.pendulum_swing import _swing, swing_rad
+from snakewalk.controller.app.identification.pendulum_swing import _GEAR, _swing, swing_rad
 from snakewalk.controller.app.identification.servo_constants import (
     CONSTANTS,
     HIGH,
@@ -72,6 +72,19 @@ def test_a_fit_leaves_squares_as_they_are_given(logs: list[PendulumLog]) -> None
     assert np.isnan(found.low[-2:]).all()
 
 
+def test_without_full_output_a_strong_motor_is_not_told_from_a_quick_one(
+    logs: list[PendulumLog],
+) -> None:
+    """More torque constant and P unit, and resistance by the square, move it alike."""
+    found = fit_pendulum(logs[1:2], starts=2, hops=0)
+    for name, times in (("torque_constant_n_m_a", 2.0), ("resistance_ohm", 4.0)):
+        k = NAMES.index(name)
+        assert found.low[k] < PLANTED[name] / times
+        assert found.high[k] > PLANTED[name] * times
+    k = NAMES.index("p_unit_per_rad")
+    assert found.values[k] == pytest.approx(CONSTANTS[k].start)  # what is not told is as it was
+
+
 def test_a_log_that_tells_little_has_wide_intervals(logs: list[PendulumLog]) -> None:
     found = fit_pendulum(logs[2:], starts=2, hops=0)  # one gain, never let go
     width = (found.high - found.low) / (HIGH - LOW)
@@ -97,5 +110,5 @@ def test_a_free_pendulum_swings_at_its_frequency(logs: list[PendulumLog]) -> Non
     np.testing.assert_allclose(angle, expected, atol=1e-4)
     out = np.empty(50)
     rows = (free.time_s[:50], free.goal_rad[:50], free.supply_v[:50], free.torque_on[:50])
-    _swing.py_func(values, *rows, 0.01, 0.5, 0.1, 400.0, 1e-3, out)
+    _swing.py_func(values, values[_GEAR], *rows, 0.01, 0.5, 0.1, 400.0, 1e-3, out)
     np.testing.assert_allclose(out, angle[:50], rtol=1e-12)

@@ -10,7 +10,7 @@ import pytest
 from snakewalk.config.arrays import Floats
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import checked, load_robot, with_keys
-from snakewalk.config.robot_file import robot_toml
+from snakewalk.config.template import robot_toml
 from snakewalk.controller.app.runs import backend
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait, prepare_walk

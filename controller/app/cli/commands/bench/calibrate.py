@@ -50,7 +50,7 @@ def calibrate(
     """
     from snakewalk.config.errors import InputError  # noqa: PLC0415  --help stays quick
     from snakewalk.config.loader import load_robot  # noqa: PLC0415
-    from snakewalk.config.robot_file import robot_toml  # noqa: PLC0415
+    from snakewalk.config.template import robot_toml  # noqa: PLC0415
     from snakewalk.controller.app.result_files import refuse_to_overwrite  # noqa: PLC0415
     from snakewalk.controller.app.service import chain_calibration  # noqa: PLC0415
     from snakewalk.controller.app.service.eeprom_backup import back_up, backup_text  # noqa: PLC0415

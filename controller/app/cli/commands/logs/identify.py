@@ -4,16 +4,27 @@ import json
 import math
 from pathlib import Path
 from statistics import fmean
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.app.cli.options import Force, Json, World, check_files, console
+from snakewalk.controller.app.cli.options import Force, Json, Robot, World, check_files, console
 from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwrite
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
+    from snakewalk.controller.app.identification.servo_constants import ServoConstants
+
+
+class _RobotFile(NamedTuple):
+    """A robot to be written with what is found of it."""
+
+    before: "RobotConfig"
+    out: Path
 
 
 def identify(
@@ -43,6 +54,10 @@ def identify(
         ),
     ] = None,
     world: World = None,
+    robot: Robot = None,
+    robot_out: Annotated[
+        Path | None, typer.Option(help="write --robot with a servo's constants, for its next runs")
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, help="processes, for logs of runs")] = 2,
     force: Force = False,
     as_json: Json = False,
@@ -62,15 +77,36 @@ def identify(
             )
         if start is not None or not fit:
             raise InputError("--start and --no-fit are of pendulums; for a run's log take --world")
+        if robot is not None or robot_out is not None:
+            raise InputError(
+                "--robot and --robot-out take a servo's constants, from its pendulum; a run's log "
+                "(.mcap) tells the ground's friction"
+            )
         _friction(logs, judge, world, out, force=force, workers=workers, as_json=as_json)
         return
     if world is not None:
         raise InputError("--world is the ground of a run's log (.mcap); a pendulum has none")
-    _servo(logs, judge, start, out, fit=fit, seed=seed, force=force, as_json=as_json)
+    robot_file = _robot_file(robot, robot_out)
+    _servo(logs, judge, start, out, robot_file, fit=fit, seed=seed, force=force, as_json=as_json)
 
 
 def _is_run(path: Path) -> bool:
     return ".mcap" in path.suffixes
+
+
+def _robot_file(robot: str | None, out: Path | None) -> _RobotFile | None:
+    if robot is None and out is None:
+        return None
+    if robot is None or out is None:
+        raise InputError(
+            "--robot ROBOT and --robot-out FILE go together: the robot, and the file to write it "
+            "to with the constants"
+        )
+    if out.suffix != ".toml":
+        raise InputError(f"{out}: --robot-out is a robot's file; end its name with .toml")
+    from snakewalk.config.loader import load_robot  # noqa: PLC0415  heavy; --help stays quick
+
+    return _RobotFile(load_robot(robot), out)
 
 
 def _friction(
@@ -172,6 +208,7 @@ def _servo(
     judge: list[Path],
     start: Path | None,
     out: Path | None,
+    robot_file: _RobotFile | None,
     *,
     fit: bool,
     seed: int,
@@ -181,30 +218,43 @@ def _servo(
     from snakewalk.controller.app.identification.pendulum_fit import (  # noqa: PLC0415  heavy; --help stays quick
         error_deg,
         fit_pendulum,
+        robot_error_deg,
     )
     from snakewalk.controller.app.identification.pendulum_log import read_pendulum_log  # noqa: PLC0415
     from snakewalk.controller.app.identification.servo_constants import (  # noqa: PLC0415
         CONSTANTS,
         bam_text,
+        check_servo,
         read_bam,
     )
     from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
 
     if not fit and start is None:
         raise InputError("--no-fit judges constants: give them with --start FILE")
-    refuse_to_overwrite([out], force)
+    refuse_to_overwrite([out, robot_file and robot_file.out], force)
     fitted = [read_pendulum_log(path) for path in logs]
     judged = [read_pendulum_log(path) for path in judge]
     found = None if start is None else read_bam(start)
     if len({log.actuator for log in (*fitted, *judged)}) > 1:
         names = ", ".join(sorted({log.actuator or "?" for log in (*fitted, *judged)}))
         raise InputError(f"the recordings are of several servos: {names}; give those of one")
+    if robot_file is not None:  # before a minute of fits, whether the servo is the robot's
+        check_servo(robot_file.before, fitted[0].actuator if found is None else found.actuator)
     if fit or found is None:
         with ProgressBar("fits", transient=True) as bar:
             found = fit_pendulum(fitted, found, seed=seed, on_progress=bar.update)
     if out is not None:
         with atomic_write(out) as part:
             part.write_text(bam_text(found), encoding="utf-8")
+    forecasts = {}
+    if robot_file is not None:
+        after = _write_robot(robot_file, found, logs)
+        forecasts = {
+            str(log.path): [
+                round(robot_error_deg(robot, log, found), 3) for robot in (robot_file.before, after)
+            ]
+            for log in (*fitted, *judged)
+        }
     errors = {
         str(log.path): (round(error_deg(found, log), 3), fit and k < len(fitted))
         for k, log in enumerate((*fitted, *judged))
@@ -223,6 +273,8 @@ def _servo(
             "fitted": [path for path, (_, used) in errors.items() if used],
             "out": out and str(out),
         }
+        if robot_file is not None:
+            result |= {"robot_out": str(robot_file.out), "robot_errors_deg": forecasts}
         print(json.dumps(result))
         return
     table = Table("constant", "value", "95 % interval", box=None)
@@ -235,3 +287,24 @@ def _servo(
             f"{path}: {error:.2f} degrees off on average{'' if used else ' (not fitted)'}"
         )
     console.print(f"mean {mean_deg:.2f} degrees")
+    if robot_file is not None:
+        before_deg, after_deg = (fmean(each) for each in zip(*forecasts.values(), strict=True))
+        console.print(
+            f"{robot_file.out}: its simulated servo is {after_deg:.2f} degrees off on average, "
+            f"that of {robot_file.before.name} {before_deg:.2f}",
+            soft_wrap=True,
+        )
+
+
+def _write_robot(file: _RobotFile, found: "ServoConstants", logs: list[Path]) -> "RobotConfig":
+    from snakewalk.config.loader import with_keys  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.config.template import robot_toml  # noqa: PLC0415
+    from snakewalk.controller.app.identification.servo_constants import (  # noqa: PLC0415
+        robot_comment,
+        robot_with,
+    )
+
+    after = with_keys(robot_with(file.before, found), {"name": file.out.stem}, str(file.out))
+    with atomic_write(file.out) as part:
+        part.write_text(robot_toml(after, robot_comment(found, logs)), encoding="utf-8")
+    return after

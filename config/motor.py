@@ -1,0 +1,53 @@
+"""Constants of a chain's motors and gears, where they are known better than from the catalogue."""
+
+from pydantic import Field
+
+from snakewalk.config.base import Strict
+
+
+class MotorConfig(Strict):
+    """Constants of the motors and gears of one's own servos, in simulation (docs/identify.md).
+
+    They stand in place of those of ``servo.model``, for each joint that has a servo of this model;
+    inertia and viscous friction are ``armature_kg_m2`` and ``gear_drag_n_m_s`` of ``[servo]``.
+    """
+
+    torque_constant_n_m_a: float | None = Field(
+        None, gt=0.001, le=100.0, description="at the output shaft; default: the model's"
+    )
+    back_emf_v_s: float | None = Field(
+        None,
+        gt=0.001,
+        le=100.0,
+        description="at the output shaft; default: torque_constant_n_m_a, else the model's",
+    )
+    resistance_ohm: float | None = Field(
+        None, gt=0.01, le=1000.0, description="of winding and bridge; default: the model's"
+    )
+    p_unit_per_rad: float | None = Field(
+        None,
+        gt=0.0,
+        le=1.0,
+        description="share of the supply for a radian of error and a unit of the P gain; default: "
+        "the model's",
+    )
+    dry_n_m: float = Field(0.0, ge=0.0, le=10.0, description="friction without load")
+    stribeck_n_m: float = Field(
+        0.0, ge=0.0, le=10.0, description="that much more while the shaft is slow"
+    )
+    stribeck_rad_s: float = Field(0.3, gt=0.0, le=100.0, description="up to which it is slow")
+    stribeck_exponent: float = Field(2.0, gt=0.0, le=20.0, description="how sharply that ends")
+    by_motor: float = Field(0.0, ge=0.0, lt=1.0, description="share of the motor's torque")
+    by_load: float = Field(0.0, ge=0.0, lt=1.0, description="share of the load's torque")
+    by_motor_slow: float = Field(
+        0.0, ge=0.0, lt=1.0, description="share of the motor's more while the shaft is slow"
+    )
+    by_load_slow: float = Field(
+        0.0, ge=0.0, lt=1.0, description="share of the load's more while the shaft is slow"
+    )
+    by_motor_square: float = Field(
+        0.0, ge=0.0, le=10.0, description="a N m: of its square, while the load is the stronger"
+    )
+    by_load_square: float = Field(
+        0.0, ge=0.0, le=10.0, description="a N m: of its square, while the motor is the stronger"
+    )
