@@ -147,7 +147,7 @@ def arguments(command: str, out: Path) -> list[str]:
         "mesh": ["body", "worm-like", "-o", str(out)],
         "skin": ["body", "snake", "--animate", "worm-like", "-o", str(out)],
         "gait": ["gait", "show", "rolling", "--picture", str(out)],
-        "analysis": ["analyse", "worm-like", "--picture", str(out)],
+        "analysis": ["analyse", "midlines.npz", "--picture", str(out)],
     }[command]
 
 

@@ -18,7 +18,8 @@ from snakewalk.controller.runlog.reader import read_log
 
 
 def short(**changes: object) -> WalkRun:
-    return prepare_walk("flat-slalom", waypoints_m=((1.2, 0.3),), time_limit_s=30.0, **changes)
+    near = {"waypoints_m": ((1.2, 0.3),), "time_limit_s": 30.0}
+    return prepare_walk("flat-slalom", **near | changes)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +74,7 @@ def test_another_seed_gives_other_commands(finished, tmp_path: Path) -> None:
 
 
 def test_isotropic_ground_sounds_the_alarm_for_missing_advance(tmp_path: Path) -> None:
-    prepared = short(motion="serpenoid")
+    prepared = short(motion="serpenoid", time_limit_s=15.0)
     same = FrictionConfig(along=0.4, across=0.4)
 
     class Slippery(WalkRun):

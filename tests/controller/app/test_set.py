@@ -71,6 +71,7 @@ def test_what_is_set_moves_the_body_stands_in_the_log_and_replays(
 
 def test_a_plan_is_made_with_what_is_set() -> None:
     plan = ["plan", "flat-square", "--motion", "serpenoid"]
+    plan += ["--set", "run.waypoints_m=[[1.2,0.2]]"]
     one = call(*plan)
     slow = call(*plan, "--set", "run.behaviour.pulse_body_lengths_s=0.125", "--set", "run.seed=5")
     assert slow["seed"] == 5

@@ -173,7 +173,7 @@ def test_a_salamander_swims_thrice_as_far_with_its_legs_folded() -> None:
 
 def test_compiled_and_numpy_water_agree() -> None:
     ends = [
-        follow(Anguilliform(), "yaw16", "pool", 1.0, grow_s=0.5, make_plant=make).centre_m
+        follow(Anguilliform(), "yaw16", "pool", 0.5, grow_s=0.25, make_plant=make).centre_m
         for make in (MujocoPlant, numpy_plant)
     ]
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)

@@ -35,7 +35,7 @@ SMALL = {"width_px": 320, "height_px": 240, "field_width_m": 3.0, "height_m": 3.
 def drawn() -> None:
     prepared = short()
     try:
-        view = TopView(prepared.robot, prepared.world, CameraConfig(), (0.0, 0.0))
+        view = TopView(prepared.robot, prepared.world, CameraConfig(**SMALL), (0.0, 0.0))
     except OffscreenError as error:
         pytest.skip(str(error))
     view.close()

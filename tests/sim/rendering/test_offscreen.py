@@ -17,7 +17,7 @@ AT_REST = np.concatenate([[0.0, 0.0, ROBOT.body_radius_m, 1.0, 0.0, 0.0, 0.0], n
 
 def view() -> TopView:
     try:
-        return TopView(ROBOT, WORLD, CameraConfig(), (0.0, 0.0))
+        return TopView(ROBOT, WORLD, CameraConfig(width_px=320, height_px=240), (0.0, 0.0))
     except OffscreenError as error:
         pytest.skip(str(error))
 

@@ -51,7 +51,7 @@ def test_film_match_and_picture(tmp_path: Path) -> None:
     assert track.frames == 6
 
 
-def film_of_station(folder: Path, marks: float, frames: int = 12, length_px: float = 60.0) -> None:
+def film_of_station(folder: Path, marks: float, frames: int = 9, length_px: float = 60.0) -> None:
     """Film a fish that beats on one spot, over a ground with a pattern of ``marks`` grey levels."""
     truth, unit, model = swim(), fish_model("carp"), fish_model("carp", length_px)
     rows, columns = round(1.8 * length_px), round(2.4 * length_px)
@@ -71,7 +71,7 @@ def test_a_fish_that_holds_station_is_found_or_the_film_is_refused(tmp_path: Pat
     out = ("--rate", 30, "-o", tmp_path / "found.npz")
     found = snakewalk("match", tmp_path / "calm", *out)
     assert "painted out" in str(found["background"])
-    assert found["matched"] == 12
+    assert found["matched"] == 9
     assert 0.85 * 60.0 < found["length_px"] < 1.1 * 60.0  # type: ignore[operator]
     film_of_station(tmp_path / "pattern", 60.0)
     out = ("--rate", 30, "-o", tmp_path / "none.npz")

@@ -190,7 +190,7 @@ def test_a_walk_goes_on_with_some_servos_real_and_the_others_simulated(
     monkeypatch.setattr("snakewalk.sim.physics.split_plant.SplitPlant", Watched)
     monkeypatch.setattr("snakewalk.sim.line.clock.RealTimeClock", lambda: bench.clock)
     bench.lines[1].taps.append(tap)
-    walk = prepare_walk("flat-square", robot="yaw16", keys={"run.time_limit_s": 8.0})
+    walk = prepare_walk("flat-square", robot="yaw16", keys={"run.time_limit_s": 6.0})
     port = f"1-8=sim,9-16={bench.paths[1]}"
     finished = execute(walk, tmp_path, port, stoppable=False)
     assert finished.outcome.tripped is None
@@ -202,7 +202,7 @@ def test_a_walk_goes_on_with_some_servos_real_and_the_others_simulated(
         np.linalg.norm(np.diff(each.pose.head_m[[0, -1], :2], axis=0)) for each in (record, whole)
     ]
     assert ways_m[0] == pytest.approx(ways_m[1], rel=0.2)
-    assert ways_m[1] > 0.3
+    assert ways_m[1] > 0.2
     # and its joints are where the real servos are
     assert np.sqrt(np.mean(np.square(off_rad[100:]))) < 0.02
     named = {each.servo_id for each in heard}
