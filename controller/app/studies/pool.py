@@ -95,11 +95,11 @@ def _on_cluster(work: Callable[[A], B], items: Sequence[A], address: str) -> Ite
     from distributed import as_completed as finished  # noqa: PLC0415
 
     try:
-        client = Client(address, timeout="5s")  # type: ignore[no-untyped-call]
+        client = Client(address, timeout="5s")
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(f"--dask {address}: no scheduler answers there ({error})") from None
     with client:
         futures = client.map(work, items, pure=False)
         waiting = {future.key: item for future, item in zip(futures, items, strict=True)}
-        for future in finished(futures):  # type: ignore[no-untyped-call]
+        for future in finished(futures):
             yield waiting[future.key], future.result()
