@@ -5,7 +5,7 @@ They are run as printed, in this process, with a budget that the pages do not sh
 - a motion on simulated servos is cut ``MOTION_S`` after its ramp, and so is the motion on paper
   before, and that of ``plan`` with options; path, start-up, bus, log and summary are whole;
 - a camera is looked through for a second;
-- page and film are made by ``report`` only;
+- a film is made by ``report`` only, and a page without pictures;
 - of a study's runs the first one is made, in this process; of a graph's walks one; of actions the
   those of ``ACTIONS`` are recorded; a film of a crowd has two frames;
 - ``bus serve`` looks at its port a few times.
@@ -81,6 +81,10 @@ NOT_RUN = {
     "policy trials": "takes whole runs: tests/controller/app/studies/test_policy_trials.py",
     "--dask": "needs a cluster: tests/controller/app/studies/test_pool.py",
     "terrain from-stereo": "needs a calibrated pair: test_terrain_command.py",
+    "--map": "looks through two cameras: tests/controller/app/runs/test_stereo_head.py",
+    "camera check flat-square": "looks for seconds: test_camera_check_command.py",
+    "synthesise -o": "walks over all hills: test_synthesise_command.py",
+    "fish match top.mp4 -o": "searches every frame: test_fish_command.py",
     "identify": PENDULUM,
 }
 """Command, or option, and why no line with it is run here."""
@@ -137,6 +141,7 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     monkeypatch.setattr(execute, "Drive", short_drive)
     monkeypatch.setattr(walk_run, "forecast", short_forecast)
     monkeypatch.setattr(artifacts, "make_artifacts", few_artifacts)
+    monkeypatch.setattr(artifacts, "_draw", lambda record, made="": artifacts._Drawn([], "", made))
     monkeypatch.setattr(pool, "each", first_of)
     monkeypatch.setattr(trials, "each", first_of)
     monkeypatch.setattr(

@@ -139,9 +139,9 @@ def test_turned_frames_are_turned_back() -> None:
 
 
 def wave_track(
-    travel: float, amplitude: float = 0.5, rate_hz: float = 40.0, frames: int = 251
+    travel: float, amplitude: float = 0.5, rate_hz: float = 40.0, frames: int = 151
 ) -> Track:
-    """1.4 waves at 0.8 Hz for five cycles, head advancing at ``travel`` of the wave's speed."""
+    """1.4 waves at 0.8 Hz for three cycles, head advancing at ``travel`` of the wave's speed."""
     waves, hz, length = 1.4, 0.8, 0.3
     time = np.arange(frames) / rate_hz
     s = (N + 0.5) / 100
@@ -263,7 +263,7 @@ def test_a_real_worm_that_backs_up(shared_data: Path) -> None:
 
 
 def test_the_command_takes_names_and_files_and_draws(tmp_path: Path) -> None:
-    save_track(tmp_path / "mine.npz", wave_track(0.8, frames=151))
+    save_track(tmp_path / "mine.npz", wave_track(0.8))
     words = ["analyse", str(tmp_path / "mine.npz"), "lamprey-like", "--picture", str(tmp_path)]
     done = snakewalk(*words, "--json")
     assert done.returncode == 0, done.stderr
