@@ -5,6 +5,9 @@ and with servos, masses and horns that differ a little. Its physics has half the
 simulator that finds the friction, and a camera measures its links with noise. The next run is the
 same gait, wound less and with more waves: its speed is forecast with the world's friction and
 with the friction that was found.
+
+With ``--mass`` each robot weighs 0.7 to 1.4 times what its file says, and the mass is found, too;
+the next run lifts higher, and is forecast for the currents that it needs.
 """
 
 import argparse
@@ -22,7 +25,11 @@ from rich.table import Table
 from benchmarks.shadow import planted
 from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.app.identification.friction_fit import FrictionLog, fit_friction
+from snakewalk.controller.app.identification.friction_fit import (
+    FrictionLog,
+    fit_friction,
+    with_mass,
+)
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait
 from snakewalk.controller.app.shadow.deviation import NO_DEVIATION, Deviation
@@ -30,6 +37,7 @@ from snakewalk.controller.app.shadow.diagnosis import Goals, goals_of
 from snakewalk.sim.physics.plant import FLOOR_STEP_S
 
 NEXT = {"winding_rad": 0.5, "waves": 1.5}
+NEXT_LIFTED = {"winding_rad": 0.5, "lift_rad": 0.2}
 
 
 def goals_of_gait(gait: str, robot: str, seconds: float, parameters: dict[str, float]) -> Goals:
@@ -47,12 +55,21 @@ def links_seen(noise_m: float, seed: int, links_m: Floats) -> Floats:
     return np.asarray(links_m + shift_m)
 
 
-def speed_m_s(goals: Goals, deviation: Deviation, friction: FrictionConfig | None = None) -> float:
+def speed_m_s(log: FrictionLog) -> float:
     """Mean speed of the body ahead."""
-    if friction is not None:
-        goals = replace(goals, world=goals.world.model_copy(update={"friction": friction}))
-    motion = FrictionLog.simulated(goals, deviation).motion
-    return float(motion[:, 0].mean())
+    return float(log.motion[:, 0].mean())
+
+
+def current_a(log: FrictionLog) -> float:
+    """Mean size of the currents."""
+    return float(np.abs(log.answers[0]).mean())
+
+
+def forecast(goals: Goals, friction: FrictionConfig, mass: float = 1.0) -> FrictionLog:
+    """Simulate a run with a friction, and a mass over the file's."""
+    world = goals.world.model_copy(update={"friction": friction})
+    goals = replace(goals, world=world, robot=with_mass(goals.robot, mass))
+    return FrictionLog.simulated(goals, NO_DEVIATION)
 
 
 def robot_of(goals: Goals, seed: int) -> Deviation:
@@ -61,6 +78,14 @@ def robot_of(goals: Goals, seed: int) -> Deviation:
     chance = np.random.default_rng([seed, 2])
     along, across = np.exp(chance.uniform(math.log(0.5), math.log(2.5), 2))
     return replace(healthy, along=float(along), across=float(across))
+
+
+def heavier(goals: Goals, robot: Deviation, seed: int) -> tuple[Deviation, float]:
+    """Draw a robot's mass over its file's: what its links differ by is a part of it."""
+    share = float(np.random.default_rng([seed, 3]).uniform(0.7, 1.4))
+    file_kg, own_kg = np.array(goals.robot.link_masses_kg), robot.load_kg
+    load_kg = (share - 1.0) * file_kg + (0.0 if own_kg is None else own_kg)
+    return replace(robot, load_kg=load_kg), 1.0 + float(load_kg.sum() / file_kg.sum())
 
 
 def finer(goals: Goals) -> Goals:
@@ -76,43 +101,50 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--robot", default="yaw16")
     parser.add_argument("--seconds", type=float, default=8.0)
     parser.add_argument("--noise-mm", type=float, default=1.0, help="of the camera")
+    parser.add_argument("--mass", action="store_true", help="find the mass as well")
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first-seed", type=int, default=0)
     given = parser.parse_args(arguments)
     goals = goals_of_gait(given.gait, given.robot, given.seconds, {})
-    next_goals = goals_of_gait(given.gait, given.robot, given.seconds, NEXT)
+    next_goals = goals_of_gait(
+        given.gait, given.robot, given.seconds, NEXT_LIFTED if given.mass else NEXT
+    )
     told = goals.world.friction
     console = Console(width=200)
-    names = ("along", "across", "across_over_along")
+    names = ("along", "across", "across_over_along", *["mass"] * given.mass)
+    what = current_a if given.mass else speed_m_s
     within, off, forecasts = dict.fromkeys(names, 0), [], []
     for seed in range(given.first_seed, given.first_seed + given.seeds):
-        robot = robot_of(goals, seed)
+        robot, true_mass = robot_of(goals, seed), 1.0
+        if given.mass:
+            robot, true_mass = heavier(goals, robot, seed)
         seen = partial(links_seen, 1e-3 * given.noise_mm, seed)
         log = FrictionLog.simulated(finer(goals), robot, seen)
-        fit = fit_friction([replace(log, goals=goals)])
+        fit = fit_friction([replace(log, goals=goals)], mass=given.mass)
         true = {"along": told.along * robot.along, "across": told.across * robot.across}
-        true["across_over_along"] = true["across"] / true["along"]
+        true |= {"across_over_along": true["across"] / true["along"], "mass": true_mass}
+        every, mass = fit.found, 1.0
+        if fit.mass is not None:
+            every, mass = every | {"mass": fit.mass}, fit.mass.value
         words = []
         for name in names:
-            found = fit.found[name]
+            found = every[name]
             inside = found.low <= true[name] <= found.high
             within[name] += inside
             words.append(
                 f"{name} {true[name]:.4f}: {found.value:.4f} ({found.low:.4f} to {found.high:.4f})"
                 f"{'' if inside else ' OUTSIDE'}"
             )
-        off.append([abs(fit.found[name].value / true[name] - 1.0) for name in names])
-        is_m_s = speed_m_s(finer(next_goals), robot)
-        forecasts.append(
-            [
-                speed_m_s(next_goals, NO_DEVIATION, friction) / is_m_s - 1.0
-                for friction in (told, fit.friction)
-            ]
-        )
+        off.append([abs(every[name].value / true[name] - 1.0) for name in names])
+        is_so = what(FrictionLog.simulated(finer(next_goals), robot))
+        told_so = what(forecast(next_goals, told))
+        found_so = what(forecast(next_goals, fit.friction, mass))
+        forecasts.append([told_so / is_so - 1.0, found_so / is_so - 1.0])
         before, after = forecasts[-1]
         console.print(
-            f"seed {seed}: {'; '.join(words)}; next run's speed {is_m_s:.4f} m/s, forecast "
-            f"{before:+.1%} with the world's, {after:+.1%} with the found"
+            f"seed {seed}: {'; '.join(words)}; next run's {what.__name__} {is_so:.4f}, forecast "
+            f"{before:+.1%} with the files', {after:+.1%} with what was found",
+            soft_wrap=True,
         )
     table = Table("", "inside its interval", "off, median", "off, most", box=None)
     for k, name in enumerate(names):
@@ -122,9 +154,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     console.print(table)
     before, after = np.abs(forecasts).T
     console.print(
-        f"speed of the next run, off: {np.median(before):.1%} (most {before.max():.1%}) with the "
-        f"world's friction, {np.median(after):.1%} (most {after.max():.1%}) with the found; nearer "
-        f"in {(after < before).sum()} of {given.seeds}"
+        f"{what.__name__} of the next run, off: {np.median(before):.1%} (most {before.max():.1%}) "
+        f"with the files', {np.median(after):.1%} (most {after.max():.1%}) with what was found; "
+        f"nearer in {(after < before).sum()} of {given.seeds}"
     )
 
 

@@ -303,6 +303,7 @@ app.command(
         "identify kp200.json kp800.json --robot xl330-16 --robot-out mine.toml",
         "identify kp400.json --start xl330.json --no-fit --json",
         "identify runs/flat-slalom-walk-seed0/log.mcap -o found.toml",
+        "identify runs/NAME/log.mcap -o found.toml --robot-out mine.toml",
     ),
     rich_help_panel=_BUS,
 )(identify)

@@ -1,4 +1,4 @@
-"""Friction of the belly, along and across (and backward), from logs of a robot's runs.
+"""Friction of the belly, along and across (and backward), and mass, from logs of a robot's runs.
 
 The simulator follows a log's goals with other frictions until its body goes and turns as the
 measured one did, and its joints need the measured currents. How the body moves on a level floor
@@ -6,6 +6,9 @@ tells the ratio of the frictions alone: without inertia their common factor canc
 tell that factor, as well as the servos' torque for a current is known. What robots differ in beside
 (masses, servos, horns) is fitted along, held near the robot's file by priors (Gauss-Newton's steps
 to the most probable values; intervals from the curvature there, by Laplace's approximation).
+
+The mass is fitted on demand, from runs in which pitch joints lift: what they lift they need current
+for, and friction has little part in it. Without lifts weight and friction act together only.
 """
 
 import math
@@ -19,6 +22,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig, WorldConfig
 from snakewalk.controller.app.shadow.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.app.shadow.diagnosis import (
@@ -33,6 +37,9 @@ from snakewalk.controller.app.studies.pool import each
 from snakewalk.controller.runlog.record import RunRecord
 
 RATIO: Final = "across_over_along"
+MASS: Final = "mass"
+_LIFTED_RAD: Final = 0.1
+"""Pitch joints that turn by less than this in a log lift nothing (ours)."""
 WINDOW_S: Final = 1.0
 """The body's motion is compared over this, from the place where each window begins (ours)."""
 MOVED_M: Final = 0.02
@@ -132,6 +139,27 @@ class FrictionLog:
         """All that is compared (N,)."""
         return np.concatenate([features(self.goals, self.answers), self.motion.ravel()])
 
+    def check_lifts(self) -> None:
+        """Refuse a log that tells no mass.
+
+        Raises:
+            InputError: nothing is lifted in it; says what to run instead.
+
+        """
+        robot = self.goals.robot
+        joints = list(robot.pitch_joints)
+        if not joints:
+            raise InputError(
+                f"robot {robot.name} has no pitch joints: on a level floor its weight and the "
+                "friction act together only, so no run of it tells its mass; weigh it"
+            )
+        if np.ptp(self.answers[1][:, joints], axis=0).max() < _LIFTED_RAD:
+            raise InputError(
+                f"the pitch joints turn less than {_LIFTED_RAD:g} rad: nothing is lifted, which "
+                "tells no mass; take a log of a gait that lifts the body (snakewalk gait run "
+                f"sidewinding --robot {robot.name}, or rectilinear)"
+            )
+
     def with_friction(self, friction: FrictionConfig) -> Goals:
         """Return the same goals on ground of another friction."""
         world = self.goals.world.model_copy(update={"friction": friction})
@@ -159,6 +187,10 @@ class Found:
         reach = _NORMAL_95 * deviation
         return Found(math.exp(mean), math.exp(mean - reach), math.exp(mean + reach))
 
+    def times(self, factor: float) -> "Found":
+        """Return it in another unit."""
+        return Found(factor * self.value, factor * self.low, factor * self.high)
+
     @property
     def determined(self) -> bool:
         """Whether the logs say it: the interval is narrower than from half to twice the value."""
@@ -172,6 +204,8 @@ class FrictionFit:
     friction: FrictionConfig
     found: dict[str, Found]
     """``along``, ``across``, perhaps ``back``, and the ratio of the first two."""
+    mass: Found | None = None
+    """Of the spine's links over the robot's file; None where it was not looked for."""
 
     def world(self, world: WorldConfig) -> WorldConfig:
         """Return a world with this friction; what the logs do not tell stays."""
@@ -192,9 +226,20 @@ class FrictionFit:
         return lines
 
 
+def with_mass(robot: RobotConfig, share: float) -> RobotConfig:
+    """Return the robot with the mass of each link of its spine times ``share``."""
+
+    def scaled(mass_kg: float | None) -> float | None:
+        return None if mass_kg is None else float(f"{share * mass_kg:.6g}")
+
+    links = tuple(link.model_copy(update={"mass_kg": scaled(link.mass_kg)}) for link in robot.links)
+    return robot.model_copy(update={"link_mass_kg": scaled(robot.link_mass_kg), "links": links})
+
+
 def fit_friction(
     logs: Sequence[FrictionLog],
     *,
+    mass: bool = False,
     workers: int = 1,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> FrictionFit:
@@ -202,24 +247,36 @@ def fit_friction(
 
     Args:
         logs: of one robot.
+        mass: whether to find the mass of its links as well.
         workers: processes that simulate.
         on_progress: takes simulations done, and of how many.
 
+    Raises:
+        InputError: the mass is asked for, and a log does not tell it.
+
     """
-    return _Fit(logs, workers, on_progress).run()
+    if mass:
+        for log in logs:
+            log.check_lifts()
+    return _Fit(logs, mass, workers, on_progress).run()
 
 
 class _Fit:
     """Steps of Gauss and Newton; the vector is friction's logarithms, then what else differs."""
 
     def __init__(
-        self, logs: Sequence[FrictionLog], workers: int, on_progress: Callable[[int, int], None]
+        self,
+        logs: Sequence[FrictionLog],
+        mass: bool,
+        workers: int,
+        on_progress: Callable[[int, int], None],
     ) -> None:
         self._logs, self._workers, self._on_progress = logs, workers, on_progress
         first = logs[0].goals
         told = first.world.friction
-        self._names = ("along", "across") if told.back is None else ("along", "across", "back")
-        self._start = np.log([getattr(told, name) for name in self._names])
+        frictions = ("along", "across") if told.back is None else ("along", "across", "back")
+        self._start = np.log([getattr(told, name) for name in frictions] + [1.0] * mass)
+        self._names = (*frictions, *[MASS] * mass)
         constants = Constants(first.robot)
         self._steps = constants.step[2:]
         kinds = np.concatenate([_kinds(log) for log in logs])
@@ -259,18 +316,23 @@ class _Fit:
             now = self._simulated(values)
         self._set_noise(self._measured - now, effects)
         curvature, _ = self._normal(effects, self._measured - now)
-        covariance: Floats = np.asarray(np.linalg.inv(curvature))[:k, :k]
-        return self._fit(values[:k], covariance)
+        return self._fit(values, np.asarray(np.linalg.inv(curvature)))
 
-    def _fit(self, logs: Floats, covariance: Floats) -> FrictionFit:
-        found = {
-            name: Found.of_log(float(logs[i]), math.sqrt(covariance[i, i]))
-            for i, name in enumerate(self._names)
-        }
-        apart = np.array([-1.0, 1.0, *np.zeros(len(logs) - 2)])
-        spread = math.sqrt(float(apart @ covariance @ apart))
-        found[RATIO] = Found.of_log(float(apart @ logs), spread)
-        return FrictionFit(_friction(self._names, logs), found)
+    def _fit(self, values: Floats, covariance: Floats) -> FrictionFit:
+        def of(weights: Floats) -> Found:
+            spread = math.sqrt(float(weights @ covariance @ weights))
+            return Found.of_log(float(weights @ values), spread)
+
+        each = np.eye(len(values))
+        found = {name: of(each[i]) for i, name in enumerate(self._names)}
+        mass = found.pop(MASS, None)
+        if mass is not None:  # and what the links weigh more, each
+            k, robot = len(self._names), self._logs[0].goals.robot
+            each[k - 1, k : k + robot.link_count] = 1.0 / (robot.link_count * mass.value)
+            each[k - 1, k : k + robot.link_count] /= robot.mean_link_mass_kg
+            mass = of(each[k - 1])
+        found[RATIO] = of(each[1] - each[0])
+        return FrictionFit(_friction(self._names, values), found, mass)
 
     def _simulated(self, values: Floats) -> Floats:
         out: Floats = _simulated(self._logs, self._names, values)[self._known]
@@ -313,16 +375,22 @@ class _Fit:
 
 
 def _friction(names: Sequence[str], logs: Floats) -> FrictionConfig:
-    values = np.clip(np.exp(logs), 1e-3, 5.0)  # what a world takes
-    return FrictionConfig(**dict(zip(names, map(float, values), strict=True)))
+    values = np.clip(np.exp(logs[: len(names)]), 1e-3, 5.0)  # what a world takes
+    found = dict(zip(names, map(float, values), strict=True))
+    return FrictionConfig(**{name: value for name, value in found.items() if name != MASS})
 
 
 def _simulated(logs: Sequence[FrictionLog], names: Sequence[str], values: Floats) -> Floats:
     """Answer and motion (N,) of all logs, simulated with these values."""
-    friction = _friction(names, values[: len(names)])
+    friction = _friction(names, values)
     others = np.concatenate([np.zeros(2), values[len(names) :]])
     deviation = Constants(logs[0].goals.robot).deviation(others)
-    again = [FrictionLog.simulated(log.with_friction(friction), deviation) for log in logs]
+    goals = [log.with_friction(friction) for log in logs]
+    if MASS in names:
+        share = math.exp(float(values[list(names).index(MASS)]))
+        robot = with_mass(logs[0].goals.robot, share)
+        goals = [replace(each_goals, robot=robot) for each_goals in goals]
+    again = [FrictionLog.simulated(each_goals, deviation) for each_goals in goals]
     return np.concatenate([each_log.vector() for each_log in again])
 
 

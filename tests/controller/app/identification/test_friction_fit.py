@@ -9,15 +9,20 @@ import pytest
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.loader import load_world
+from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.app.cli.command_line import app
-from snakewalk.controller.app.identification.friction_fit import FrictionLog, fit_friction
+from snakewalk.controller.app.identification.friction_fit import (
+    FrictionLog,
+    fit_friction,
+    with_mass,
+)
 from snakewalk.controller.app.runs import execute
 from snakewalk.controller.app.runs.factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
+from tests.helpers.uneven import UNEVEN
 
 PLANTED = {"along": 0.16, "across": 0.45}
 
@@ -100,3 +105,49 @@ def test_what_tells_no_friction_is_refused(record: RunRecord, log: Path, tmp_pat
     assert "end its name with .toml" in refused(log, "-o", tmp_path / "a.json")
     assert "a pendulum has none" in refused(recording, "--world", "flat")
     assert "No such file" in refused(tmp_path / "none.mcap")
+
+
+@pytest.fixture(scope="module")
+def lifting(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Log of a short body that winds sideways and lifts, heavier than a robot's file would say."""
+    prepared = prepare_gait("sidewinding", robot="alternating12", seconds=4.0)
+    robot = RobotConfig(name="short", joint_axes="ypypyp", link_mass_kg=0.13)
+    run = prepared.run.model_copy(update={"physics_step_s": 0.005, "cycle_hz": 25.0})
+    folder = tmp_path_factory.mktemp("run") / "lifting"
+    return execute.execute(replace(prepared, robot=robot, run=run), folder, stoppable=False).log
+
+
+def test_a_planted_mass_comes_back_and_goes_into_a_robot(
+    lifting: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file says 0.1 kg a link where it is 0.13."""
+    record, out = read_log(lifting), tmp_path / "mine.toml"
+    light = with_mass(record.header.robot, 0.1 / 0.13)
+    believed = replace(record, header=replace(record.header, robot=light))
+    monkeypatch.setattr("snakewalk.controller.runlog.reader.read_log", lambda path: believed)
+    words = ("identify", str(lifting), "--workers", "1", "--robot-out", str(out), "--json")
+    told = json.loads(CliRunner().invoke(app, words, catch_exceptions=False).stdout)
+    low_kg, high_kg = told["mass_interval_95_kg"]
+    assert low_kg < 0.91 < high_kg < 1.3 * low_kg
+    assert told["mass_kg"] == pytest.approx(0.91, rel=0.03)
+    robot = load_robot(str(out))
+    assert robot.link_mass_kg == pytest.approx(0.13, rel=0.03)
+    same = {"name": light.name, "link_mass_kg": light.link_mass_kg}
+    assert robot.model_copy(update=same) == light
+    assert "mine.toml: exists; --force" in refused(lifting, "--robot-out", out)
+
+
+def test_what_tells_no_mass_says_what_would(log: Path, lifting: Path, tmp_path: Path) -> None:
+    out = tmp_path / "mine.toml"
+    assert "has no pitch joints" in refused(log, "--robot-out", out)
+    still = FrictionLog.of(read_log(lifting))
+    still.answers[1][:, list(still.goals.robot.pitch_joints)] = 0.05
+    with pytest.raises(InputError, match=r"nothing is lifted.*gait run sidewinding --robot short"):
+        fit_friction([still], mass=True)
+    assert not out.exists()
+
+
+def test_links_with_a_mass_of_their_own_are_scaled_as_well() -> None:
+    heavier = with_mass(UNEVEN, 1.5)
+    expected = 1.5 * np.array(UNEVEN.link_masses_kg)
+    np.testing.assert_allclose(heavier.link_masses_kg, expected, rtol=1e-5)

@@ -128,7 +128,8 @@ def test_what_is_refused_of_a_robot(files: list[Path], tmp_path: Path) -> None:
     assert "of a servo xl330, robot yaw16 has XM430-W350" in refused(
         *words, "--robot", "yaw16", "--robot-out", out
     )
-    assert "take a servo's constants" in refused("a.mcap", "--robot-out", out)
+    assert "the robot of a run is in its log" in refused("a.mcap", "--robot", "yaw16")
+    assert "end its name with .toml" in refused("a.mcap", "--robot-out", json_out)
     assert not out.exists()
 
 

@@ -17,6 +17,12 @@ from snakewalk.controller.app.result_files import atomic_write, refuse_to_overwr
 
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
+    from snakewalk.config.world import FrictionConfig, WorldConfig
+    from snakewalk.controller.app.identification.friction_fit import (
+        Found,
+        FrictionFit,
+        FrictionLog,
+    )
     from snakewalk.controller.app.identification.servo_constants import ServoConstants
 
 
@@ -25,6 +31,13 @@ class _RobotFile(NamedTuple):
 
     before: "RobotConfig"
     out: Path
+
+
+class _Outs(NamedTuple):
+    """Files for what logs of runs tell: of the ground, and of the robot."""
+
+    world: Path | None
+    robot: Path | None
 
 
 def identify(
@@ -56,16 +69,21 @@ def identify(
     world: World = None,
     robot: Robot = None,
     robot_out: Annotated[
-        Path | None, typer.Option(help="write --robot with a servo's constants, for its next runs")
+        Path | None,
+        typer.Option(
+            help="write the robot with what is found of it, for its next runs: --robot with a "
+            "servo's constants, or the robot of a run's log with its mass"
+        ),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="processes, for logs of runs")] = 2,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Find a servo's constants from its pendulum, or the belly's friction from logs of runs.
+    """Find a servo's constants from its pendulum, or friction and mass from logs of runs.
 
     Of a servo: resistance, torque constant, friction, inertia and P unit. Of runs: friction along
-    and across the body, on the ground --world (default: the logs'). All with 95 % intervals.
+    and across the body, on the ground --world (default: the logs'), and with --robot-out the mass
+    of the links, from gaits that lift them. All with 95 % intervals.
     """
     judge = judge or []
     of_runs = [path for path in (*logs, *judge) if _is_run(path)]
@@ -77,12 +95,12 @@ def identify(
             )
         if start is not None or not fit:
             raise InputError("--start and --no-fit are of pendulums; for a run's log take --world")
-        if robot is not None or robot_out is not None:
+        if robot is not None:
             raise InputError(
-                "--robot and --robot-out take a servo's constants, from its pendulum; a run's log "
-                "(.mcap) tells the ground's friction"
+                "--robot is whose servo swings a pendulum; the robot of a run is in its log (.mcap)"
             )
-        _friction(logs, judge, world, out, force=force, workers=workers, as_json=as_json)
+        outs = _Outs(out, robot_out)
+        _friction(logs, judge, world, outs, force=force, workers=workers, as_json=as_json)
         return
     if world is not None:
         raise InputError("--world is the ground of a run's log (.mcap); a pendulum has none")
@@ -102,39 +120,23 @@ def _robot_file(robot: str | None, out: Path | None) -> _RobotFile | None:
             "--robot ROBOT and --robot-out FILE go together: the robot, and the file to write it "
             "to with the constants"
         )
-    if out.suffix != ".toml":
-        raise InputError(f"{out}: --robot-out is a robot's file; end its name with .toml")
+    _check_robot_out(out)
     from snakewalk.config.loader import load_robot  # noqa: PLC0415  heavy; --help stays quick
 
     return _RobotFile(load_robot(robot), out)
 
 
-def _friction(
-    paths: list[Path],
-    judge: list[Path],
-    world: str | None,
-    out: Path | None,
-    *,
-    force: bool,
-    workers: int,
-    as_json: bool,
-) -> None:
-    from snakewalk.config.loader import checked, load_world  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.config.template import template  # noqa: PLC0415
-    from snakewalk.config.world import WorldConfig  # noqa: PLC0415
-    from snakewalk.controller.app.identification.friction_fit import (  # noqa: PLC0415
-        FrictionLog,
-        fit_friction,
-    )
-    from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
+def _check_robot_out(out: Path | None) -> None:
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: --robot-out is a robot's file; end its name with .toml")
+
+
+def _read_runs(
+    paths: list[Path], judge: list[Path], given: "WorldConfig | None", *, lifting: bool
+) -> "dict[Path, FrictionLog]":
+    from snakewalk.controller.app.identification.friction_fit import FrictionLog  # noqa: PLC0415  heavy
     from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
 
-    require_extra("friction from a run's log needs", "mujoco")
-    refuse_to_overwrite([out], force)
-    if out is not None and out.suffix != ".toml":
-        raise InputError(f"{out}: friction is written as a world's file; end its name with .toml")
-    check_files(None, None, world)
-    given = None if world is None else load_world(world)
     logs = {}
     for path in (*paths, *judge):
         record = read_log(path)
@@ -142,6 +144,8 @@ def _friction(
             LOGGER.warning("%s: %s", path, record.note)
         try:
             logs[path] = FrictionLog.of(record, given)
+            if lifting and path in paths:
+                logs[path].check_lifts()
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
     first = next(iter(logs.values())).goals
@@ -151,17 +155,65 @@ def _friction(
                 f"{path}: is of another robot or another friction than {paths[0]}; give logs of "
                 "one robot, and --world WORLD if their worlds differ"
             )
+    return logs
+
+
+def _friction(
+    paths: list[Path],
+    judge: list[Path],
+    world: str | None,
+    outs: _Outs,
+    *,
+    force: bool,
+    workers: int,
+    as_json: bool,
+) -> None:
+    from snakewalk.config.loader import checked, load_world  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.config.template import template  # noqa: PLC0415
+    from snakewalk.config.world import WorldConfig  # noqa: PLC0415
+    from snakewalk.controller.app.identification.friction_fit import fit_friction  # noqa: PLC0415
+    from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
+
+    require_extra("friction from a run's log needs", "mujoco")
+    refuse_to_overwrite(outs, force)
+    _check_robot_out(outs.robot)
+    out = outs.world
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: friction is written as a world's file; end its name with .toml")
+    check_files(None, None, world)
+    given = None if world is None else load_world(world)
+    logs = _read_runs(paths, judge, given, lifting=outs.robot is not None)
+    first = logs[paths[0]].goals
     name = first.world.name if out is None else out.stem
     ground = checked(WorldConfig, first.world.model_dump() | {"name": name}, str(out))
     with ProgressBar("friction", transient=True) as bar:
         found = fit_friction(
-            [logs[path] for path in paths], workers=workers, on_progress=bar.update
+            [logs[path] for path in paths],
+            mass=outs.robot is not None,
+            workers=workers,
+            on_progress=bar.update,
         )
     if out is not None:
         with atomic_write(out) as part:
             text = template(found.world(ground), "\n".join(found.comment(paths)))
             part.write_text(text, encoding="utf-8")
-    told, kept = first.world.friction, found.world(ground).friction
+    if found.mass is not None and outs.robot is not None:
+        _write_mass(outs.robot, first.robot, found.mass, paths)
+    kept = found.world(ground).friction
+    _tell_friction(found, kept, logs, paths, outs, as_json=as_json)
+
+
+def _tell_friction(
+    found: "FrictionFit",
+    kept: "FrictionConfig",
+    logs: "dict[Path, FrictionLog]",
+    paths: list[Path],
+    outs: _Outs,
+    *,
+    as_json: bool,
+) -> None:
+    first, out = logs[paths[0]].goals, outs.world
+    told = first.world.friction
     errors = {str(path): (log.errors(told), log.errors(kept)) for path, log in logs.items()}
     settings = [
         f"world.friction.{key}={getattr(kept, key):.4g}"
@@ -185,6 +237,10 @@ def _friction(
             "fitted": [log_name for log_name in errors if log_name in fitted],
             "out": out and str(out),
         }
+        if found.mass is not None:
+            mass = found.mass.times(_spine_kg(first.robot))
+            result |= {"mass_kg": mass.value, "mass_interval_95_kg": [mass.low, mass.high]}
+            result["robot_out"] = str(outs.robot)
         print(json.dumps(result))
         return
     table = Table("friction", "value", "95 % interval", "", box=None)
@@ -201,6 +257,30 @@ def _friction(
             f"{'' if log_name in fitted else ' (not fitted)'}"
         )
     console.print(" ".join(f"--set {one}" for one in settings), soft_wrap=True)
+    if found.mass is not None:
+        mass = found.mass.times(_spine_kg(first.robot))
+        console.print(
+            f"{outs.robot}: the links weigh {mass.value:.4g} kg, 95 % of {mass.low:.4g} to "
+            f"{mass.high:.4g}; {first.robot.name} has {_spine_kg(first.robot):.4g}",
+            soft_wrap=True,
+        )
+
+
+def _spine_kg(robot: "RobotConfig") -> float:
+    return robot.mean_link_mass_kg * robot.link_count
+
+
+def _write_mass(out: Path, robot: "RobotConfig", mass: "Found", paths: list[Path]) -> None:
+    from snakewalk.config.template import robot_toml  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.app.identification.friction_fit import with_mass  # noqa: PLC0415
+
+    after = with_mass(robot, float(f"{mass.value:.4g}")).model_copy(update={"name": out.stem})
+    comment = (
+        f"Mass found by `snakewalk identify` from {', '.join(map(str, paths))}:\n"
+        f"{mass.value:.4g} times that of {robot.name}, 95 % of {mass.low:.4g} to {mass.high:.4g}"
+    )
+    with atomic_write(out) as part:
+        part.write_text(robot_toml(after, comment), encoding="utf-8")
 
 
 def _servo(
