@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Mapping
+from functools import cache
 from itertools import accumulate, pairwise
 from typing import Literal, NamedTuple, Self, TypeVar
 
@@ -354,6 +355,29 @@ class LimbJoint(NamedTuple):
     """Whether the link behind it ends in the foot."""
 
 
+@cache
+def _joints_about(axes: str, axis: str) -> tuple[int, ...]:
+    """Indices of the joints with this axis; kept, for gaits ask in every cycle."""
+    return tuple(i for i, other in enumerate(axes) if other == axis)
+
+
+@cache
+def _limb_joints(pairs: tuple[str, ...]) -> tuple[LimbJoint, ...]:
+    """Joints of legs that have these axes, a word a pair."""
+    return tuple(
+        LimbJoint(index, side, place, place == len(axes) - 1)
+        for index, axes in enumerate(pairs)
+        for side in _SIDES
+        for place in range(len(axes))
+    )
+
+
+@cache
+def _even_ends(links: int) -> tuple[float, ...]:
+    """Ends of links that are all alike, in their own length."""
+    return tuple(float(k) for k in range(links + 1))
+
+
 class RobotConfig(Strict):
     """A chain of links joined by servos, with or without legs; metres, index 0 is the head.
 
@@ -623,7 +647,7 @@ class RobotConfig(Strict):
     @property
     def joint_count(self) -> int:
         """Number of servos J, legs included; there are J + 1 links."""
-        return len(self.joint_axes) + len(self.limb_joints)
+        return len(self.all_axes)
 
     @property
     def link_count(self) -> int:
@@ -633,12 +657,7 @@ class RobotConfig(Strict):
     @property
     def limb_joints(self) -> tuple[LimbJoint, ...]:
         """Joints of the legs in the order of the bus, behind those of the spine."""
-        return tuple(
-            LimbJoint(index, side, place, place == len(pair.joint_axes) - 1)
-            for index, pair in enumerate(self.limbs)
-            for side in _SIDES
-            for place in range(len(pair.joint_axes))
-        )
+        return _limb_joints(tuple(pair.joint_axes for pair in self.limbs))
 
     @property
     def all_axes(self) -> str:
@@ -666,6 +685,8 @@ class RobotConfig(Strict):
     @property
     def length_m(self) -> float:
         """Body length: the links of the spine."""
+        if not self.links:
+            return self.link_length_m * self.link_count
         lengths_m = self.link_lengths_m
         if len(set(lengths_m)) > 1:
             return math.fsum(lengths_m)
@@ -674,6 +695,8 @@ class RobotConfig(Strict):
     @property
     def mean_link_length_m(self) -> float:
         """Body length over the number of links."""
+        if not self.links:
+            return self.link_length_m
         lengths_m = self.link_lengths_m
         if len(set(lengths_m)) > 1:
             return self.length_m / self.link_count
@@ -723,9 +746,11 @@ class RobotConfig(Strict):
 
         Counted in mean link lengths from the head: 0, 1, 2 ... of links that are all alike.
         """
+        if not self.links:
+            return _even_ends(self.link_count)
         lengths_m, mean_m = self.link_lengths_m, self.mean_link_length_m
         if len(set(lengths_m)) == 1:
-            return tuple(float(k) for k in range(self.link_count + 1))
+            return _even_ends(self.link_count)
         inner = (run_m / mean_m for run_m in accumulate(lengths_m[:-1]))
         return (0.0, *inner, float(self.link_count))
 
@@ -856,12 +881,12 @@ class RobotConfig(Strict):
     @property
     def yaw_joints(self) -> tuple[int, ...]:
         """Indices of the spine's joints that turn about the vertical."""
-        return tuple(i for i, axis in enumerate(self.joint_axes) if axis == "y")
+        return _joints_about(self.joint_axes, "y")
 
     @property
     def pitch_joints(self) -> tuple[int, ...]:
         """Indices of the spine's joints that lift."""
-        return tuple(i for i, axis in enumerate(self.joint_axes) if axis == "p")
+        return _joints_about(self.joint_axes, "p")
 
     @property
     def limit_rad(self) -> tuple[float, ...]:
