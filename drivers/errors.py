@@ -70,6 +70,7 @@ class FaultCause(Enum):
     ALARM = auto()
     TURN_COUNT_LOST = auto()
     MOVED = auto()
+    EXCHANGED = auto()
 
 
 @dataclass(frozen=True, slots=True)

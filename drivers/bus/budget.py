@@ -23,6 +23,8 @@ STATE_BYTES = 10
 """State block, read in every cycle: Present Current, Velocity, Position."""
 SLOW_STATE_BYTES = 3
 """Slow state block, read in every 16th cycle: Present Input Voltage, Present Temperature."""
+CHECK_BYTES = 4
+"""Longest register that is compared with what was set, in cycles without the slow state."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +118,8 @@ def wire_budget(
 
 
 def chain_budget(servos: int, baud: int, *, fast: bool) -> WireBudget:
-    """Budget of the longest cycle of a ``ServoChain``: one that also reads the slow state."""
-    return wire_budget(servos, baud, fast=fast, slow_read_bytes=SLOW_STATE_BYTES)
+    """Budget of the longest cycle of a ``ServoChain``: one that also compares a setting."""
+    return wire_budget(servos, baud, fast=fast, slow_read_bytes=max(SLOW_STATE_BYTES, CHECK_BYTES))
 
 
 def robot_budget(robot: RobotConfig, baud: int, *, fast: bool) -> WireBudget:

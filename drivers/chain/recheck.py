@@ -10,7 +10,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
-from snakewalk.drivers.chain.start_up import Inspection, inspect
+from snakewalk.drivers.chain.start_up import IDENTITY, Inspection, identity_fault, inspect
 from snakewalk.drivers.errors import ChainFault, FaultCause
 
 MOVED_RAD = 0.3
@@ -85,13 +85,13 @@ def recheck(
         elif not abs(moved[joint]) <= MOVED_RAD:
             text = f"{name}: moved by {moved[joint]:+.2f} rad since it was last seen"
             faults.append(ChainFault(FaultCause.MOVED, text))
-    reset = tuple(
-        joint
-        for joint, servo in enumerate(now.servos)
-        if not servo.torque_on
-        or any(
-            bus.read(servo.servo_id, register) != value
-            for register, value in configured.get(joint, {}).items()
-        )
-    )
-    return Recheck(tuple(faults), reset, tuple(map(robot.joint_name, reset)), moved)
+    reset = []
+    for joint, servo in enumerate(now.servos):
+        values = configured.get(joint, {})
+        found = {register: bus.read(servo.servo_id, register) for register in values}
+        other = identity_fault(robot, joint, found[IDENTITY]) if IDENTITY in found else None
+        if other is not None:
+            faults.append(ChainFault(FaultCause.EXCHANGED, other))
+        if not servo.torque_on or found != values:
+            reset.append(joint)
+    return Recheck(tuple(faults), tuple(reset), tuple(map(robot.joint_name, reset)), moved)

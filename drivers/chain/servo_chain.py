@@ -17,10 +17,13 @@ from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Readings
 from snakewalk.drivers.chain.recheck import Recheck, recheck
 from snakewalk.drivers.chain.start_up import (
+    IDENTITY,
     RAM_SETTINGS,
+    SHAPING_SETTINGS,
     Inspection,
     check_pose,
     configure,
+    identity_fault,
     inspect,
     let_reply,
 )
@@ -354,8 +357,8 @@ class ServoChain:
         self._reads += 1
         if place == 0 or measured_at_s - self._readings.slow_at_s() > _SLOW_S:
             reply = self._slow.read()
-            slow_at_s = self._clock.now_s() - self._slow.since_sent_s
-            self._readings.update_slow(reply, slow_at_s)
+            self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
+            self._readings.update_slow(reply, self._sent_at_s)
         self._check_liveness()
         imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
@@ -379,7 +382,9 @@ class ServoChain:
         if not self._armed or self._liveness is None or self._readings.alert:
             return
         try:
-            self._liveness.check(self._reads - 1)
+            asked = self._liveness.check(self._reads - 1)
+            if asked is not None:
+                self._sent_at_s = self._clock.now_s() - asked.since_sent_s
         except BusError:
             self._take(self._cycle.read())
             if not self._readings.alert:
@@ -492,16 +497,23 @@ class LivenessCheck:
 
         self._torque = read("Torque Enable", dict.fromkeys(joints, 1))
         self._watchdog = read("Bus Watchdog", dict.fromkeys(joints, watchdog_ticks))
-        self._settings = []
-        for register in RAM_SETTINGS:
-            expected = {j: v[register] for j, v in configured.items() if register in v}
-            if expected:
-                self._settings.append(read(register, dict(sorted(expected.items()))))
 
-    def check(self, cycle: int) -> None:
-        """Make the check whose turn it is in a cycle.
+        def kept(registers: Iterable[str]) -> "list[_RegisterCheck]":
+            held = {
+                register: {j: v[register] for j, v in sorted(configured.items()) if register in v}
+                for register in registers
+            }
+            return [read(register, expected) for register, expected in held.items() if expected]
 
-        In a round of ``SLOW_EVERY`` cycles: torque, watchdog, and one of the settings.
+        (self._identity,) = kept([IDENTITY])
+        self._settings = kept(RAM_SETTINGS)
+        self._shaping = kept(SHAPING_SETTINGS)
+
+    def check(self, cycle: int) -> GroupCycle | None:
+        """Make the check whose turn it is in a cycle; the group read, if it asked all servos.
+
+        In a round of ``SLOW_EVERY`` cycles: torque, watchdog, identity, one of the settings, and
+        two of those that shape the motion.
 
         Raises:
             BusError: a servo is not as it was set.
@@ -509,12 +521,22 @@ class LivenessCheck:
 
         """
         rounds, place = divmod(cycle, SLOW_EVERY)
+        check = None
         if place == SLOW_EVERY // 3:
-            self._judge(self._torque)
+            check = self._torque
         elif place == 2 * SLOW_EVERY // 3:
-            self._judge(self._watchdog)
+            check = self._watchdog
+        elif place == SLOW_EVERY // 2:
+            check = self._identity
         elif place == SLOW_EVERY - 3:
-            self._judge(self._settings[rounds % len(self._settings)])
+            check = self._settings[rounds % len(self._settings)]
+        elif place in (3, SLOW_EVERY - 5):
+            turn = 2 * rounds + (place > SLOW_EVERY // 2)
+            check = self._shaping[turn % len(self._shaping)]
+        if check is None:
+            return None
+        self._judge(check)
+        return check.cycle if len(check.joints) == self._robot.joint_count else None
 
     def _judge(self, check: "_RegisterCheck") -> None:
         reply = check.cycle.read()
@@ -523,6 +545,9 @@ class LivenessCheck:
         if not len(bad):
             return
         value = int(np.asarray(values)[bad[0]])
+        other = identity_fault(self._robot, check.joints[bad[0]], value)
+        if check is self._identity and other is not None:
+            raise BusError(other)
         if check is self._torque:
             what = "torque is off: has it rebooted?"
         elif check is self._watchdog and value == WATCHDOG_TRIPPED:

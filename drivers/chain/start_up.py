@@ -32,6 +32,14 @@ from snakewalk.drivers.types import LIMIT_SLACK_RAD
 
 RAM_SETTINGS = ("Position P Gain", "Goal PWM", "Goal Current")
 """Settings that a reboot or another program would undo, and that are compared while it runs."""
+SHAPING_SETTINGS = (
+    *("Position I Gain", "Position D Gain", "Feedforward 1st Gain", "Feedforward 2nd Gain"),
+    *("Profile Acceleration", "Profile Velocity"),
+)
+"""Those that another program would change, and a reboot would not."""
+IDENTITY = "Velocity I Gain"
+"""Holds which joint a servo is, while it runs: no register of position control, in RAM, and reset
+by a change of mode. A servo that is given another ID keeps it, one that reboots does not."""
 ALL_REPLY = 2
 """Status Return Level(68)."""
 FAST_READ_FIRMWARE = 45
@@ -237,7 +245,24 @@ def _configure_joint(
     if offset:
         angle = offset * abs(units.rad_per_position[joint])
         on_event(f"{name}: Homing Offset is {offset}: its zero is moved by {angle:+.2f} rad")
-    return {register: values[register] for register in RAM_SETTINGS if register in values}
+    values[IDENTITY] = _apply(bus, robot, joint, ChainSetting(IDENTITY, identity(joint)), on_event)
+    kept = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY)
+    return {register: values[register] for register in kept if register in values}
+
+
+def identity(joint: int) -> int:
+    """Value of ``IDENTITY`` in the servo of a joint."""
+    return 1 + joint
+
+
+def identity_fault(robot: RobotConfig, joint: int, value: int) -> str | None:
+    """What the register says of a joint's servo that is another joint's; None if it is not."""
+    if value == identity(joint) or not 1 <= value <= robot.joint_count:
+        return None
+    return (
+        f"{robot.joint_name(joint)}: its servo was {robot.joint_name(value - 1)}: exchanged IDs; "
+        "put them right: snakewalk bus set"
+    )
 
 
 def _apply(

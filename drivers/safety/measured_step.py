@@ -16,44 +16,68 @@ from snakewalk.drivers.types import JointState
 _FLOATS = readonly_array()
 
 
-def believable(
-    state: JointState, believed: JointState, limits: SafetyLimits
-) -> tuple[JointState, str | None]:
-    """The part of a state that can be believed, and what cannot, as one line.
+class MeasuredSteps:
+    """Which angles are believed; ``update`` with every state."""
 
-    Args:
-        state: as read.
-        believed: the last state that was believed.
-        limits: slack and speed of a measured step.
+    def __init__(self, limits: SafetyLimits) -> None:
+        self._limits = limits
+        self._doubted_rad: Floats | None = None
+        """(J,) what was read and not believed; NaN where the last reading was."""
 
-    Returns:
-        The state, with old values and ages where a joint was not read or is not believed; what is
-        not believed, or None.
+    def reset(self) -> None:
+        """Forget what was doubted: the joints were looked at anew."""
+        self._doubted_rad = None
 
-    """
-    if _is_all_believable(
-        *(state.position_rad, state.age_s, state.valid, state.time_s),
-        *(believed.position_rad, believed.age_s, believed.time_s),
-        *(limits.step_slack_rad, limits.step_rate_rad_s),
-    ):
-        return state, None
-    step_rad = np.abs(state.position_rad - believed.position_rad)
-    measured_s = believed.time_s - believed.age_s
-    between_s = np.maximum(state.time_s - state.age_s - measured_s, 0.0)
-    # a value that is no number is left to the vetting
-    doubted = state.valid & (step_rad > limits.step_slack_rad + limits.step_rate_rad_s * between_s)
-    if not doubted.any():
-        if state.valid.all() or believed.valid.all():
+    def update(self, state: JointState, believed: JointState) -> tuple[JointState, str | None]:
+        """The part of a state that can be believed, and what cannot, as one line.
+
+        A joint that is read again where it was not believed to be stays in doubt, however much time
+        goes by: nobody has seen it on its way there.
+
+        Args:
+            state: as read.
+            believed: the last state that was believed.
+
+        Returns:
+            The state, with old values and ages where a joint was not read or is not believed; what
+            is not believed, or None.
+
+        """
+        limits, doubted_rad = self._limits, self._doubted_rad
+        if doubted_rad is None and _is_all_believable(
+            *(state.position_rad, state.age_s, state.valid, state.time_s),
+            *(believed.position_rad, believed.age_s, believed.time_s),
+            *(limits.step_slack_rad, limits.step_rate_rad_s),
+        ):
             return state, None
-        held = ~state.valid & (state.position_rad != believed.position_rad)
-        return (_held(state, believed, held) if held.any() else state), None
-    joint = int(np.argmax(doubted))
-    doubt = (
-        f"{limits.joint_names[joint]}: measured {state.position_rad[joint]:.2f} rad, "
-        f"{between_s[joint]:.3f} s after {believed.position_rad[joint]:.2f} rad: no servo turns so "
-        "fast: two servos with one ID, exchanged IDs, or a lost turn count"
-    )
-    return _held(state, believed, doubted | ~state.valid), doubt
+        position_rad, slack_rad = state.position_rad, limits.step_slack_rad
+        step_rad = np.abs(position_rad - believed.position_rad)
+        measured_s = believed.time_s - believed.age_s
+        between_s = np.maximum(state.time_s - state.age_s - measured_s, 0.0)
+        # a value that is no number is left to the vetting
+        doubted = step_rad > slack_rad + limits.step_rate_rad_s * between_s
+        if doubted_rad is not None:
+            doubted |= (np.abs(position_rad - doubted_rad) <= slack_rad) & (step_rad > slack_rad)
+        doubted &= state.valid
+        self._remember(doubted, state)
+        if not doubted.any():
+            if state.valid.all() or believed.valid.all():
+                return state, None
+            held = ~state.valid & (position_rad != believed.position_rad)
+            return (_held(state, believed, held) if held.any() else state), None
+        joint = int(np.argmax(np.where(doubted, step_rad, 0.0)))
+        doubt = (
+            f"{limits.joint_names[joint]}: measured {position_rad[joint]:.2f} rad after "
+            f"{believed.position_rad[joint]:.2f} rad: no servo turns so fast: two servos with one "
+            "ID, exchanged IDs, a changed zero, or a lost turn count"
+        )
+        return _held(state, believed, doubted | ~state.valid), doubt
+
+    def _remember(self, doubted: Bools, state: JointState) -> None:
+        before = np.nan if self._doubted_rad is None else self._doubted_rad
+        kept = np.where(state.valid, np.nan, before)
+        now_rad = np.where(doubted, state.position_rad, kept)
+        self._doubted_rad = now_rad if np.isfinite(now_rad).any() else None
 
 
 @compiled(

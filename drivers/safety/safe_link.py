@@ -13,7 +13,7 @@ from snakewalk.drivers.errors import DriverError, SafetyTrippedError
 from snakewalk.drivers.link import JointLink
 from snakewalk.drivers.safety.following_error import FollowingError
 from snakewalk.drivers.safety.limits import SafetyLimits
-from snakewalk.drivers.safety.measured_step import believable
+from snakewalk.drivers.safety.measured_step import MeasuredSteps
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.vet import (
     SafetyMemory,
@@ -55,6 +55,7 @@ class SafeLink:
         clock: Clock,
         recovery: Recovery[Any] | None = None,
         stop_requested: Callable[[], str | None] = lambda: None,
+        on_event: Callable[[str], None] = lambda line: None,
     ) -> None:
         self.tripped: str | None = None
         """Why it has latched; None while it lets commands pass."""
@@ -68,6 +69,9 @@ class SafeLink:
         self._clock = clock
         self._state: JointState | None = None
         self._following = FollowingError(limits)
+        self._steps = MeasuredSteps(limits)
+        self._doubt: str | None = None
+        self._on_event = on_event
         self._memory: SafetyMemory | None = None
         self._stop_requested: str | None = None
         self._asked_to_stop = stop_requested
@@ -124,6 +128,7 @@ class SafeLink:
         state = self._link.enable()
         self._state, self._memory = state, SafetyMemory.at_rest(state)
         self._following.reset()
+        self._steps.reset()
         self._check(state, self._memory)
         self._refuse_if_tripped()
         return state
@@ -149,7 +154,10 @@ class SafeLink:
             return state
         doubt = None
         if self._state is not None:
-            state, doubt = believable(state, self._state, self._limits)
+            state, doubt = self._steps.update(state, self._state)
+            if doubt is not None and self._doubt is None:
+                self._on_event(f"not believed: {doubt}")
+            self._doubt = doubt
         if doubt is not None or (self._recovery is not None and self.tripped is None):
             stale = stale_fault(state, self._limits, self._clock.now_s())
             if stale is not None and doubt is None:
@@ -259,6 +267,7 @@ class SafeLink:
         self.recoveries += 1
         self._state, self._memory = state, SafetyMemory.at_rest(state)
         self._following.reset()
+        self._steps.reset()
         self._check(state, self._memory)
         return state
 

@@ -168,6 +168,7 @@ def execute(
                 clock,
                 recovery,
                 lambda: stop_requested() or (None if button is None else button.pressed()),
+                lambda text: warn("safety", text),
             )
             beside = _shadow(prepared, initial_pose, log, on_event) if shadow else None
             drive = Drive(

@@ -23,7 +23,9 @@ from snakewalk.drivers.types import JointCommand
 _AMPLITUDE_RAD, _FREQUENCY_HZ, _CYCLES = 0.15, 2.0, 4
 _GROWING_CYCLES = 2
 """At first the wiggle grows: a cable that is nearly broken is measured before an alarm ends it."""
-_PERIOD_S = 0.02
+_PERIOD_S = 0.027
+"""No divisor in common with the 50 ms after which a simulated servo measures its voltage anew: read
+at one phase of the motion alone, the step of the current may be missed every time."""
 _SAG_SHARE = 0.08
 """Share of the voltage at rest that the supply may lose (ours); a walk asks for more than this."""
 _VOLTAGE_AT = 20

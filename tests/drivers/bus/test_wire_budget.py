@@ -55,7 +55,9 @@ def test_the_slow_round_is_a_second_read_in_the_longest_cycle() -> None:
 def test_the_budget_of_a_chain_counts_the_blocks_that_it_reads(model: str, fast: bool) -> None:
     bus = DynamixelBus(ScriptedPort(lambda raw: []), model)
     ids = range(1, 17)
-    blocks = (bus.cycle(ids, fast=fast), bus.slow_cycle(ids, fast=fast))
+    check = bus.block(ids, "Profile Velocity", "Profile Velocity", fast=fast)
+    assert check.read_bytes >= bus.slow_cycle(ids, fast=fast).read_bytes
+    blocks = (bus.cycle(ids, fast=fast), check)
     replies = [cycle._default_request.reply_bytes for cycle in blocks]
     requests = [len(cycle._default_request.packet) for cycle in blocks]
     budget = chain_budget(16, 1_000_000, fast=fast)

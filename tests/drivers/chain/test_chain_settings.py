@@ -10,6 +10,7 @@ from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.chain.start_up import SHAPING_SETTINGS
 from snakewalk.drivers.errors import ChainError, SafetyTrippedError
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Policy, Recovery
@@ -174,9 +175,18 @@ def _loses_its_gain(rig: Rig) -> None:
     rig.alter("Position P Gain", 1, 900)
 
 
+def _changes(register: str) -> Callable[[Rig], None]:
+    def change(rig: Rig) -> None:
+        rig.alter(register, 1, 5)
+
+    change.__name__ = register
+    return change
+
+
 CHANGES = (
     *(_boots_with_torque, _boots_with_torque_on_its_next_goal, _loses_its_watchdog),
     *(_gets_a_longer_watchdog, _is_weakened, _loses_its_current_limit, _loses_its_gain),
+    *map(_changes, SHAPING_SETTINGS),
 )
 
 
@@ -206,3 +216,20 @@ def test_going_on_sets_it_up_again(change: Callable[[Rig], None]) -> None:
         *(("Startup Configuration", 0), ("Drive Mode", 0)),
     ):
         assert rig.registers(register)[1] == value, register
+
+
+@pytest.mark.parametrize("policy", ["stop", "resume"])
+def test_ids_exchanged_in_motion_stop_the_run_for_good(policy: Policy) -> None:
+    """Each servo follows the goals of its new ID: nothing that is measured is wrong."""
+    rig = Rig(policy)
+    rig.link.enable()
+    rig.cycles(20)
+    rig.alter("ID", 0, 3)
+    rig.alter("ID", 2, 1)
+    rig.line.refresh_ids()
+    with pytest.raises(
+        SafetyTrippedError, match=r"joint 1 \(ID 1\): its servo was joint 3 \(ID 3\)"
+    ):
+        rig.cycles(17)
+    assert rig.registers("Torque Enable") == [0] * 4
+    assert rig.link.recoveries == 0

@@ -10,7 +10,7 @@ from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import SafetyTrippedError
 from snakewalk.drivers.protocol.crc import crc16
 from snakewalk.drivers.safety.limits import SafetyLimits
-from snakewalk.drivers.safety.measured_step import believable
+from snakewalk.drivers.safety.measured_step import MeasuredSteps
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.types import JointCommand
@@ -30,7 +30,7 @@ def test_a_step_beyond_slack_and_speed_counts_as_not_read(joint: int, sign: floa
     for beyond in (-1e-6, 1e-6):
         step = one(sign * (EDGE_RAD + beyond), joint)
         now = state(position_rad=BEFORE.position_rad + step, current_a=np.full(J, 0.3))
-        found, doubt = believable(now, BEFORE, LIMITS)
+        found, doubt = MeasuredSteps(LIMITS).update(now, BEFORE)
         if beyond < 0:
             assert found is now
             assert doubt is None
@@ -47,25 +47,39 @@ def test_a_step_beyond_slack_and_speed_counts_as_not_read(joint: int, sign: floa
 
 def test_the_longer_ago_the_last_reading_the_farther_a_joint_may_be() -> None:
     now = state(position_rad=np.full(J, 1.0))
-    assert believable(now, BEFORE, LIMITS)[1] is not None
+    assert MeasuredSteps(LIMITS).update(now, BEFORE)[1] is not None
     old = BEFORE._replace(age_s=np.full(J, 0.1))
-    assert believable(now, old, LIMITS)[1] is None
+    assert MeasuredSteps(LIMITS).update(now, old)[1] is None
 
 
 def test_what_was_not_believed_is_not_believed_because_it_is_not_read_again() -> None:
     forged = state(position_rad=one(1.4, 1, 0.1))
-    held, _ = believable(forged, BEFORE, LIMITS)
+    steps = MeasuredSteps(LIMITS)
+    held, _ = steps.update(forged, BEFORE)
     unread = forged._replace(time_s=NOW + 0.02, valid=np.arange(J) != 1, age_s=one(0.02, 1))
-    found, doubt = believable(unread, held, LIMITS)
+    found, doubt = steps.update(unread, held)
     assert doubt is None
     assert found.position_rad[1] == 0.1
     assert found.age_s[1] == pytest.approx(0.04)
     assert not found.valid[1]
 
 
+def test_what_is_read_again_where_it_cannot_be_stays_in_doubt() -> None:
+    """A changed zero was believed as soon as a servo could have turned so far."""
+    steps, believed = MeasuredSteps(LIMITS), BEFORE
+    for k in range(20):
+        now = state(time_s=NOW + 0.02 * k, position_rad=one(0.5 + 0.002 * k, 1, 0.1))
+        believed, doubt = steps.update(now, believed)
+        assert doubt is not None
+        assert believed.position_rad[1] == 0.1
+    assert believed.age_s[1] == pytest.approx(0.4)
+    back = state(time_s=NOW + 0.4, position_rad=np.full(J, 0.12))
+    assert steps.update(back, believed) == (back, None)
+
+
 def test_what_is_no_number_is_left_to_the_vetting() -> None:
     now = state(position_rad=one(np.nan, 2, 0.1))
-    assert believable(now, BEFORE, LIMITS) == (now, None)
+    assert MeasuredSteps(LIMITS).update(now, BEFORE) == (now, None)
 
 
 ROBOT = RobotConfig(name="trio", joint_axes="yyy")
