@@ -1,7 +1,7 @@
 """What a run is: robot, world, recording, waypoints, motion and safety, by name or by path."""
 
 import math
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -28,6 +28,10 @@ MotionName = Literal[
 _FULL_OUTPUT_RAD = 885 * 128 * 2.0 * math.pi / 4096
 """Position error at which a P gain of 1 gives full output: PWM 885 is 100 %, the gain is the
 register over 128, an error is counted in 4096ths of a turn (e-manual, X series)."""
+
+
+Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+"""Of a waypoint, m."""
 
 
 class StatesConfig(Strict):
@@ -192,7 +196,7 @@ class RunConfig(Strict):
         description="kp: on paper only, `snakewalk synthesise`; source: a motion source of your "
         "own, run by `prepare_source`",
     )
-    waypoints_m: tuple[tuple[float, float], ...] = Field(
+    waypoints_m: tuple[tuple[Place, Place], ...] = Field(
         (),
         max_length=1000,
         description="in order; playback and source need none; with them a gait of legs is steered "

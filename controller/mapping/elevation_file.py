@@ -24,6 +24,8 @@ from snakewalk.controller.mapping.raster_file import (
 
 CLOUDS: Final = (".pcd", ".ply", ".xyz")
 MESHES: Final = (".obj", ".stl", ".glb")
+_MOST_HEIGHT_M: Final = 20_000.0
+"""Beyond it a value is no height, but stands for none, or is in another unit (ours)."""
 ENDINGS: Final = (*RASTERS, *CLOUDS, *MESHES)
 _POINTS_A_CELL: Final = 2.0
 """Of a cloud whose spacing is not given, in the mean (ours)."""
@@ -86,6 +88,13 @@ def read_elevation(file: Path, options: MapOptions) -> FileMap:
     dx_m, dy_m = raster.dx_m * scale, raster.dy_m * scale
     spacing_m = min(dx_m, dy_m) if options.spacing_m is None else options.spacing_m
     rows, columns = raster.z_m.shape
+    finite_m = raster.z_m[np.isfinite(raster.z_m)]
+    highest_m = float(np.abs(finite_m).max(initial=0.0))
+    if highest_m > _MOST_HEIGHT_M:
+        raise InputError(
+            f"{file}: holds heights of {highest_m:.3g} m: say which value is none (--no-data), or "
+            "their --unit"
+        )
     elevation = ElevationMap.of_raster(raster.z_m * rise, dx_m, dy_m, spacing_m)
     size_m = (columns - 1) * raster.dx_m, (rows - 1) * raster.dy_m
     return FileMap(elevation.centred(), size_m, _relief(raster.z_m), "raster")

@@ -5,6 +5,7 @@ number (u8); Documentation/input/joydev/joystick-api.rst of the kernel.
 """
 
 import os
+import stat
 import struct
 from pathlib import Path
 from types import TracebackType
@@ -63,6 +64,9 @@ class Gamepad:
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
             raise InputError(f"{path}: {error.strerror or error}: no gamepad to read") from None
+        if stat.S_ISREG(os.fstat(self._file).st_mode):
+            os.close(self._file)
+            raise InputError(f"{path}: is a file; a gamepad is such as /dev/input/js0")
         self._pad = Pad()
         self._gone = False
 

@@ -4,6 +4,7 @@
 """
 
 import json
+import math
 import os
 import select
 import signal
@@ -95,8 +96,7 @@ def serve(
         raise InputError("--play: has what was recorded; leave --imu and --faults out")
     if imu is not None and robot is not None:
         raise InputError("--imu: with --robot, its file says it: table [imu]")
-    if latency < 0.0:
-        raise InputError(f"--latency {latency:g}: must not be negative")
+    _check_serving(latency, for_s, record, link)
     refuse_to_overwrite([record], force)
     refuse_to_overwrite([link], force=True)
     what, line, traffic, make_decoder, player = _served(
@@ -136,6 +136,23 @@ def serve(
         print(json.dumps(done | {"servos": traffic.registers()}), flush=True)
     else:
         _tell_what_was_lost(late_share, server.output_flushes)
+
+
+def _check_serving(
+    latency: float, for_s: float | None, record: Path | None, link: Path | None
+) -> None:
+    """Check numbers and names of ``serve``.
+
+    Raises:
+        InputError: one cannot be.
+
+    """
+    if not 0.0 <= latency < math.inf:
+        raise InputError(f"--latency {latency:g}: must not be negative, nor without end")
+    if for_s is not None and not for_s > 0.0:
+        raise InputError(f"--for {for_s:g}: must be over 0 s")
+    if record is not None and link is not None and record.absolute() == link.absolute():
+        raise InputError("--record and --link have the same name")
 
 
 def _tell_what_was_lost(late_share: float, output_flushes: int) -> None:

@@ -1,5 +1,6 @@
 """``snakewalk ros``: a robot in a ROS 2 graph."""
 
+import re
 from typing import Annotated
 
 import typer
@@ -77,6 +78,8 @@ def ros(
 
     if not timeout > 0.0:
         raise InputError(f"--timeout {timeout:g}: expected seconds over 0, or inf")
+    if not re.fullmatch(r"(/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*)?", namespace, re.ASCII):
+        raise InputError(f"--namespace {namespace}: expected a name as snake or lab/snake")
     options = RosOptions(domain, namespace, network, commands=True, timeout_s=timeout)
     begun = None if gait is None else gait_by_name(gait, parameters(param))[0]
     with open_ros(options) as link, open_view(view, view_at) as page:
