@@ -35,6 +35,8 @@ from snakewalk.controller.motion.trajectory import (
 
 _GAIN_PER_S: Final = 20.0
 _REACHED_RAD: Final = 1e-3
+_TRIED_S: Final = 0.02
+"""Steps in which a join is tried before it begins."""
 _QUIET_S: Final = 1.0
 """The same refusal is told again after so long."""
 
@@ -154,6 +156,8 @@ class Commanded:
         self._limits = JointLimits.of(robot, joints)
         self._timeout_s = timeout_s
         self._first = gait
+        self._waiting: Gait | None = None
+        """Begun as soon as a join to it keeps the joints' limits."""
         rest = np.zeros(robot.joint_count)
         self._mode: _Mode = _Follow(JointsNow(rest, rest), self._limits)
         self._time_s = 0.0
@@ -185,6 +189,8 @@ class Commanded:
             self._first = None
         for command in self._commands():
             self._take(command)
+        if self._waiting is not None:
+            self._join(self._waiting, view)
         self._mode.step(dt_s, view)
         mode = self._mode
         if isinstance(mode, _Through) and mode.over:
@@ -205,12 +211,13 @@ class Commanded:
                 self._go_to(command)
             elif isinstance(command, JointTrajectory):
                 spline, end_s = spline_through(command, self._mode.now(), self._limits)
-                self._mode = _Through(spline, end_s)
+                self._mode, self._waiting = _Through(spline, end_s), None
                 points = len(command.time_s)
                 self._on_event("command", f"a trajectory of {points} points, {end_s:.2f} s")
             elif isinstance(command, StartGait):
                 self._move_by(command.gait)
             elif isinstance(command, HoldStill):
+                self._waiting = None
                 self._follow().stop()
                 self._on_event("command", "hold")
             else:
@@ -239,6 +246,7 @@ class Commanded:
                 "for each name"
             )
         self._limits.check_angles(angle_rad[None], joints, "joint goals")
+        self._waiting = None
         follow = self._follow()
         follow.goal_rad = np.array(follow.goal_rad)
         follow.goal_rad[joints] = angle_rad
@@ -251,7 +259,23 @@ class Commanded:
                 "before a run: snakewalk gait run"
             )
         gait.check(self._robot)
-        now, motion = self._mode.now(), GaitMotion(gait, self._robot)
-        limit = Pace.limit(self._robot)
-        self._mode = _ByGait(Blend(now.angle_rad, now.speed_rad_s, motion, limit))
+        self._waiting = gait
         self._on_event("command", f"gait {gait.name}")
+
+    def _join(self, gait: Gait, view: BodyView) -> None:
+        """Join a gait where no joint leaves its range by that; else go towards its first pose."""
+        now, limit = self._mode.now(), Pace.limit(self._robot)
+        first_rad = GaitMotion(gait, self._robot).goal_rad()
+        tried = Blend(now.angle_rad, now.speed_rad_s, GaitMotion(gait, self._robot), limit)
+        most_rad = self._limits.angle_rad + _REACHED_RAD
+        within = (np.abs(now.angle_rad) <= most_rad).all()
+        while within and not tried.over:
+            within = (np.abs(tried.step(_TRIED_S, view)) <= most_rad).all()
+        if within:
+            motion = GaitMotion(gait, self._robot)
+            self._mode = _ByGait(Blend(now.angle_rad, now.speed_rad_s, motion, limit))
+            self._waiting = None
+            return
+        follow = self._follow()
+        follow.goal_rad = np.clip(first_rad, -self._limits.angle_rad, self._limits.angle_rad)
+        follow.left_s = None

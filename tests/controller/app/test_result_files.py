@@ -196,14 +196,14 @@ def test_commands_leave_nothing_on_a_full_disk(
 
 
 def unsafe(source: str) -> list[int]:
-    """Lines that write a file outside a ``with atomic_write`` block."""
+    """Lines that write a file outside ``with atomic_write``, or a folder that is deleted again."""
     tree = ast.parse(source)
     safe: set[ast.AST] = set()
     for block in ast.walk(tree):
         if isinstance(block, ast.With):
             calls = [item.context_expr for item in block.items]
             names = {getattr(c.func, "id", "") for c in calls if isinstance(c, ast.Call)}
-            if "atomic_write" in names:
+            if names & {"atomic_write", "TemporaryDirectory"}:
                 safe |= set(ast.walk(block))
         elif isinstance(block, ast.FunctionDef) and block.name in EXPORTS | {"save"}:
             safe |= set(ast.walk(block))  # a writer itself: its callers are examined

@@ -208,6 +208,17 @@ def test_hold_stops_a_gait_and_a_trajectory_and_a_gait_may_be_first() -> None:
     assert np.array(bench.goals)[-20:] == pytest.approx(np.tile(stopped, (20, 1)), abs=1e-3)
 
 
+def test_a_gait_that_begins_while_a_joint_nears_its_limit_keeps_it_there() -> None:
+    """A join brakes more gently than goals do: begun at once, joint1 went 1.4 % beyond."""
+    bench = Bench()
+    bench.run(0.62, JointGoals(["joint1"], [0.9375 * LIMITS[1]]))
+    bench.run(3.0, StartGait(make_gait("rolling")))
+    way = np.array(bench.goals)
+    assert (np.abs(way) <= LIMITS + 1e-3).all()
+    assert np.ptp(way[-50:], axis=0).max() > 0.3
+    assert bench.told == "command: gait rolling"
+
+
 ANGLES = st.floats(-LIMIT, LIMIT)
 COMMANDS = st.one_of(
     st.builds(
@@ -238,4 +249,6 @@ def test_whatever_is_commanded_the_goals_keep_the_limits(
     speed = np.abs(np.diff(way, axis=0)).max(initial=0.0) / DT_S
     assert speed <= 1.03 * ROBOT.joint_speed_limit_rad_s
     bend = np.abs(np.diff(way, 2, axis=0)).max(initial=0.0) / DT_S**2
-    assert bend <= 1.05 * ROBOT.joint_acceleration_limit_rad_s2
+    # mean speeds of two cycles, between which one motion may end and another begin: half a cycle of
+    # the one's acceleration, and a whole one of the other's
+    assert bend <= 1.5 * 1.03 * ROBOT.joint_acceleration_limit_rad_s2
