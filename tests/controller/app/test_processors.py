@@ -20,7 +20,7 @@ near = prepare_walk("jacksboro-traverse", waypoints_m=((0.6, 0.2),), time_limit_
 execute(near, Path(sys.argv[1]))
 """
 _AVX512 = "X86_V4 AVX512_ICL AVX512_SPR"
-PROCESSORS = {"Haswell": _AVX512, "Prescott": f"X86_V3 {_AVX512}"}
+PROCESSORS = {"Haswell": _AVX512, "Sandybridge": _AVX512, "Prescott": f"X86_V3 {_AVX512}"}
 """Kernels of OpenBLAS with and without fused products, and what numpy must do without.
 
 numpy's loops for AVX-512 have sines of their own (docs/architecture.md): left out on all.
@@ -42,3 +42,4 @@ def test_a_run_over_hills_leaves_the_same_bytes_whatever_kernel_multiplies(tmp_p
     logs = [(tmp_path / kernel / "log.mcap").read_bytes() for kernel in PROCESSORS]
     assert len(logs[0]) > 50_000
     assert logs[1] == logs[0]
+    assert logs[2] == logs[0]
