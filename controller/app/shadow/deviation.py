@@ -34,6 +34,8 @@ class Deviation:
             return robot
         links = [link.model_dump() for link in robot.links] or [{}] * robot.link_count
         masses_kg = np.array(robot.link_masses_kg) + self.load_kg
+        if robot.stereo_head is not None:  # the robot adds it again
+            masses_kg[robot.stereo_head.link] -= robot.stereo_head.mass_kg
         loaded = [
             link | {"mass_kg": float(mass_kg)}
             for link, mass_kg in zip(links, masses_kg, strict=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.loader import load_run, load_world
+from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.app.shadow.deviation import Deviation
 from snakewalk.controller.app.shadow.diagnosis import Cause, Goals, Signatures, answers
@@ -84,3 +84,12 @@ def test_a_robot_that_is_well_has_no_cause(goals: Goals, signatures: Signatures)
     found = signatures.diagnose(answers(goals, Deviation(**well(2))))  # type: ignore[arg-type]
     assert found.named is None
     assert found.text(goals.robot).startswith("nothing differs from the shadow")
+
+
+def test_a_load_comes_on_top_of_a_head_with_cameras() -> None:
+    robot = load_robot("alternating16-stereo")
+    load_kg = at(robot.link_count, 3, 0.1)
+    heavier = Deviation(load_kg=load_kg).robot(robot)
+    np.testing.assert_allclose(
+        heavier.link_masses_kg, np.array(robot.link_masses_kg) + load_kg, atol=1e-12
+    )
