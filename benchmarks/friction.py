@@ -20,8 +20,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
+from benchmarks.rows import found_table
 from benchmarks.shadow import planted
 from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
@@ -146,12 +146,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             f"{before:+.1%} with the files', {after:+.1%} with what was found",
             soft_wrap=True,
         )
-    table = Table("", "inside its interval", "off, median", "off, most", box=None)
-    for k, name in enumerate(names):
-        column = np.array(off)[:, k]
-        count = f"{within[name]} of {given.seeds}"
-        table.add_row(name, count, f"{np.median(column):.1%}", f"{column.max():.1%}")
-    console.print(table)
+    console.print(found_table(within, off))
     before, after = np.abs(forecasts).T
     console.print(
         f"{what.__name__} of the next run, off: {np.median(before):.1%} (most {before.max():.1%}) "

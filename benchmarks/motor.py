@@ -21,6 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.friction import finer, goals_of_gait
+from benchmarks.rows import found_table
 from snakewalk.config.arrays import Floats
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
@@ -159,12 +160,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 )
             )
         )
-    table = Table("constant", "inside its interval", "off, median", "off, most", box=None)
-    for k, name in enumerate(JUDGED):
-        column = np.array(off)[:, k]
-        count = f"{within[name]} of {given.seeds}"
-        table.add_row(name, count, f"{np.median(column):.1%}", f"{column.max():.1%}")
-    console.print(table)
+    console.print(found_table(within, off))
     table = Table("next run, median (most)", "catalogue", "found", "nearer", box=None)
     for k, (what, scale) in enumerate(
         (("angles, degrees", 1), ("currents, mA", 1), ("speed, %", 100))

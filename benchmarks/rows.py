@@ -1,8 +1,11 @@
-"""One line of a benchmark's table, and how CPU time is taken."""
+"""One line of a benchmark's table, how CPU time is taken, and the table of what was found."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+
+import numpy as np
+from rich.table import Table
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,3 +37,18 @@ def cpu_s(work: Callable[[], object], times: int, tries: int = 5) -> float:
             work()
         best = min(best, (time.process_time() - start) / times)
     return best
+
+
+def found_table(within: Mapping[str, int], off: Sequence[Sequence[float]]) -> Table:
+    """A row for each planted number.
+
+    Args:
+        within: how often each was inside its interval.
+        off: a row a seed: how far each was off, as a share.
+
+    """
+    table = Table("", "inside its interval", "off, median", "off, most", box=None)
+    for (name, count), column in zip(within.items(), np.array(off).T, strict=True):
+        told = f"{count} of {len(off)}", f"{np.median(column):.1%}", f"{column.max():.1%}"
+        table.add_row(name, *told)
+    return table

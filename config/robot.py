@@ -354,6 +354,11 @@ class LimbJoint(NamedTuple):
     has_foot: bool
     """Whether the link behind it ends in the foot."""
 
+    @property
+    def outward(self) -> float:
+        """Which way along the body's y the leg stands: 1 to the left, -1 to the right."""
+        return 1.0 if self.side == "left" else -1.0
+
 
 @cache
 def _joints_about(axes: str, axis: str) -> tuple[int, ...]:

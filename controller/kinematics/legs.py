@@ -21,7 +21,7 @@ def leg_segments_m(robot: RobotConfig, body: BodyView, joint_rad: Floats) -> Flo
     for k, (joint, angle) in enumerate(
         zip(robot.limb_joints, joint_rad[robot.link_count - 1 :], strict=True)
     ):
-        pair, side = robot.limbs[joint.pair], 1.0 if joint.side == "left" else -1.0
+        pair, side = robot.limbs[joint.pair], joint.outward
         if joint.place == 0:
             turn = body.rotation[pair.link]
             end_m = body.link_m[pair.link] + side * pair.hip_m * turn[:, 1]

@@ -264,18 +264,19 @@ class Commanded:
 
     def _join(self, gait: Gait, view: BodyView) -> None:
         """Join a gait where no joint leaves its range by that; else go towards its first pose."""
-        now, limit = self._mode.now(), Pace.limit(self._robot)
-        first_rad = GaitMotion(gait, self._robot).goal_rad()
-        tried = Blend(now.angle_rad, now.speed_rad_s, GaitMotion(gait, self._robot), limit)
-        most_rad = self._limits.angle_rad + _REACHED_RAD
-        within = (np.abs(now.angle_rad) <= most_rad).all()
+        tried, most_rad = self._blend(gait), self._limits.angle_rad
+        first_rad = tried.target.goal_rad()
+        within = (np.abs(tried.goal_rad()) <= most_rad + _REACHED_RAD).all()
         while within and not tried.over:
-            within = (np.abs(tried.step(_TRIED_S, view)) <= most_rad).all()
+            within = (np.abs(tried.step(_TRIED_S, view)) <= most_rad + _REACHED_RAD).all()
         if within:
-            motion = GaitMotion(gait, self._robot)
-            self._mode = _ByGait(Blend(now.angle_rad, now.speed_rad_s, motion, limit))
-            self._waiting = None
+            self._mode, self._waiting = _ByGait(self._blend(gait)), None
             return
         follow = self._follow()
-        follow.goal_rad = np.clip(first_rad, -self._limits.angle_rad, self._limits.angle_rad)
+        follow.goal_rad = np.clip(first_rad, -most_rad, most_rad)
         follow.left_s = None
+
+    def _blend(self, gait: Gait) -> Blend:
+        """Join a gait to what the joints do now."""
+        now, motion = self._mode.now(), GaitMotion(gait, self._robot)
+        return Blend(now.angle_rad, now.speed_rad_s, motion, Pace.limit(self._robot))

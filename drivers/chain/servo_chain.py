@@ -545,9 +545,10 @@ class LivenessCheck:
         if not len(bad):
             return
         value = int(np.asarray(values)[bad[0]])
-        other = identity_fault(self._robot, check.joints[bad[0]], value)
-        if check is self._identity and other is not None:
-            raise BusError(other)
+        if check is self._identity:
+            other = identity_fault(self._robot, check.joints[bad[0]], value)
+            if other is not None:
+                raise BusError(other)
         if check is self._torque:
             what = "torque is off: has it rebooted?"
         elif check is self._watchdog and value == WATCHDOG_TRIPPED:

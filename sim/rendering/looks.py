@@ -319,7 +319,7 @@ def _legs(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
     for k, joint in enumerate(robot.limb_joints):
         pair = robot.limbs[joint.pair]
         body = spec.body(f"link{robot.link_count + k}")
-        end = pair.segments_m[joint.place] * (1.0 if joint.side == "left" else -1.0)
+        end = pair.segments_m[joint.place] * joint.outward
         thick = pair.foot_radius_m
         colour = BACK[joint.place % 2]
         _add(body, _CAPSULE, (thick, 0, 0), (), colour, (0, 0, 0, 0, end, 0))

@@ -75,7 +75,7 @@ def _joints(robot: RobotConfig) -> Iterator[tuple[Floats, Floats]]:
         axis = (0.0, 0.0, -1.0) if letter == "y" else (0.0, 1.0, 0.0)
         yield np.array([-long_m, 0.0, 0.0]), np.array(axis)
     for joint in robot.limb_joints:
-        pair, side = robot.limbs[joint.pair], 1.0 if joint.side == "left" else -1.0
+        pair, side = robot.limbs[joint.pair], joint.outward
         if joint.place:
             at_m = (0.0, side * pair.segments_m[joint.place - 1], 0.0)
         else:

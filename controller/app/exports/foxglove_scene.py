@@ -188,7 +188,7 @@ def _body(record: RunRecord) -> Iterator[Json]:
         }
         yield _entity(f"link{link}", 0.0, frame=f"link{link}", locked=True, cylinders=[cylinder])
     for link, joint in enumerate(robot.limb_joints, robot.link_count):
-        pair, side = robot.limbs[joint.pair], 1.0 if joint.side == "left" else -1.0
+        pair, side = robot.limbs[joint.pair], joint.outward
         length_m, width_m = pair.segments_m[joint.place], 2.0 * pair.foot_radius_m
         cylinder = {
             "pose": _pose([0.0, 0.5 * side * length_m, 0.0], _ACROSS),

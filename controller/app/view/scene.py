@@ -170,36 +170,30 @@ class BodyScene:
         self, name: str, colors: np.ndarray, radii_m: Floats, share: float
     ) -> viser.BatchedMeshHandle:
         """One mesh for all links: a cylinder along x, drawn to their lengths and radii."""
-        mesh = trimesh.creation.cylinder(1.0, self._robot.mean_link_length_m * share, sections=20)
-        long = np.diff(self._robot.link_ends)
-        links = self._robot.link_count
+        lengths_m = np.array(self._robot.link_lengths_m)
+        return self._cylinders(name, share * lengths_m, radii_m, colors)
+
+    def _leg_links(self) -> viser.BatchedMeshHandle:
+        """The same for the segments of legs."""
+        joints, limbs = self._robot.limb_joints, self._robot.limbs
+        lengths_m = np.array([limbs[each.pair].segments_m[each.place] for each in joints])
+        radii_m = np.array([limbs[each.pair].foot_radius_m for each in joints])
+        colors = self._colors[1 + np.arange(len(joints)) % 2].astype(np.uint8)
+        return self._cylinders("legs", lengths_m, radii_m, colors)
+
+    def _cylinders(
+        self, name: str, lengths_m: Floats, radii_m: Floats, colors: np.ndarray
+    ) -> viser.BatchedMeshHandle:
+        """One mesh for cylinders along x of these lengths (n,) and radii (n,)."""
+        mesh = trimesh.creation.cylinder(1.0, 1.0, sections=20)
         return self._scene.add_batched_meshes_simple(
             f"{self._root}/{name}",
             np.asarray(mesh.vertices)[:, [2, 0, 1]],  # the cylinder stands along z
             np.asarray(mesh.faces),
-            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (links, 1)),
-            batched_positions=np.zeros((links, 3)),
-            batched_scales=np.column_stack([long, radii_m, radii_m]),
+            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(lengths_m), 1)),
+            batched_positions=np.zeros((len(lengths_m), 3)),
+            batched_scales=np.column_stack([lengths_m, radii_m, radii_m]),
             batched_colors=colors,
-            flat_shading=False,
-            lod="off",
-            cast_shadow=False,
-        )
-
-    def _leg_links(self) -> viser.BatchedMeshHandle:
-        """One mesh for all segments of legs: a cylinder along x, drawn to their lengths."""
-        joints, limbs = self._robot.limb_joints, self._robot.limbs
-        mesh = trimesh.creation.cylinder(1.0, 1.0, sections=16)
-        long = np.array([limbs[each.pair].segments_m[each.place] for each in joints])
-        radii_m = np.array([limbs[each.pair].foot_radius_m for each in joints])
-        return self._scene.add_batched_meshes_simple(
-            f"{self._root}/legs",
-            np.asarray(mesh.vertices)[:, [2, 0, 1]],
-            np.asarray(mesh.faces),
-            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(joints), 1)),
-            batched_positions=np.zeros((len(joints), 3)),
-            batched_scales=np.column_stack([long, radii_m, radii_m]),
-            batched_colors=self._colors[1 + np.arange(len(joints)) % 2].astype(np.uint8),
             flat_shading=False,
             lod="off",
             cast_shadow=False,
