@@ -77,6 +77,12 @@ class ChainBus(Protocol):
         """Value of a register by its name."""
         ...
 
+    def read_each(
+        self, servo_id: int, names: Iterable[str], optional: Iterable[str] = ()
+    ) -> dict[str, int]:
+        """Values of many registers, by as few requests as can be."""
+        ...
+
     def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
         """Write a register by its name."""
         ...

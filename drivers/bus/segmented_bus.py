@@ -83,6 +83,13 @@ class SegmentedBus:
         with self._with_port_name(servo_id) as bus:
             return bus.read(servo_id, name)
 
+    def read_each(
+        self, servo_id: int, names: Iterable[str], optional: Iterable[str] = ()
+    ) -> dict[str, int]:
+        """Values of many registers, by few requests; raises as ``DynamixelBus.read_each``."""
+        with self._with_port_name(servo_id) as bus:
+            return bus.read_each(servo_id, names, optional)
+
     def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
         """Write a register by its name; raises as ``DynamixelBus.write``."""
         with self._with_port_name(servo_id) as bus:

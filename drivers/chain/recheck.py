@@ -75,7 +75,7 @@ def recheck(
                 "another servo?"
             )
             faults.append(ChainFault(FaultCause.OTHER_FIRMWARE, text))
-        raw = bus.read(servo.servo_id, "Present Position")
+        raw = servo.registers["Present Position"]
         moved[joint] = units.position_rad(joint, raw) - position_rad[joint]
         name = robot.joint_name(joint)
         turns = round(moved[joint] / math.tau) if np.isfinite(moved[joint]) else 0
@@ -88,7 +88,7 @@ def recheck(
     reset = []
     for joint, servo in enumerate(now.servos):
         values = configured.get(joint, {})
-        found = {register: bus.read(servo.servo_id, register) for register in values}
+        found = {register: servo.registers[register] for register in values}
         other = identity_fault(robot, joint, found[IDENTITY]) if IDENTITY in found else None
         if other is not None:
             faults.append(ChainFault(FaultCause.EXCHANGED, other))

@@ -137,8 +137,8 @@ class ServoChain:
             PortError: the port is gone.
 
         """
-        let_reply(self._bus, self.robot)
-        self.inspection = inspect(self._bus, self.robot)
+        replies = let_reply(self._bus, self.robot)
+        self.inspection = inspect(self._bus, self.robot, replies=replies)
         if self.inspection.faults:
             raise ChainError([str(fault) for fault in self.inspection.faults])
         if self._imu is not None:
@@ -231,15 +231,12 @@ class ServoChain:
         bus, ids = self._bus, self.robot.servo_ids
         bus.sync_write(ids, "Bus Watchdog", 0)  # goals follow at once, else an old goal counts
         goals = self._send_goals(state.position_rad)
-        for servo_id, goal in zip(ids, goals.tolist(), strict=True):
-            self._expect(servo_id, "Goal Position", goal)
+        self._expect("Goal Position", goals.tolist())
         bus.sync_write(ids, "Torque Enable", 1)
-        for servo_id in ids:
-            self._expect(servo_id, "Torque Enable", 1)
+        self._expect("Torque Enable", [1] * len(ids))
         ticks = self._watchdog_ticks
         bus.sync_write(ids, "Bus Watchdog", ticks)
-        for servo_id in ids:
-            self._expect(servo_id, "Bus Watchdog", ticks)
+        self._expect("Bus Watchdog", [ticks] * len(ids))
         self._liveness = LivenessCheck(
             bus, self.robot, self._configured, ticks, fast=self._fast_reads
         )
@@ -438,11 +435,19 @@ class ServoChain:
         self._cycle.write_goals(goals)
         return goals
 
-    def _expect(self, servo_id: int, name: str, value: int) -> None:
-        got = self._bus.read(servo_id, name)
-        if got != value:
-            joint = self.robot.joint_name(self.robot.servo_ids.index(servo_id))
-            raise BusError(f"{joint}: {name} is {got} after {value} was written to all")
+    def _expect(self, name: str, values: Sequence[int]) -> None:
+        """Read a register of all servos, and compare; who is not in the reply is asked again."""
+        bus, ids = self._bus, self.robot.servo_ids
+        reply = bus.block(ids, name, name, fast=False).read()
+        for joint, (servo_id, value) in enumerate(zip(ids, values, strict=True)):
+            got = (
+                bus.table_of(servo_id)[name].decode(reply.data[joint].tobytes())
+                if reply.valid[joint]
+                else bus.read(servo_id, name)
+            )
+            if got != value:
+                joint_name = self.robot.joint_name(joint)
+                raise BusError(f"{joint_name}: {name} is {got} after {value} was written to all")
 
     def _first_state(self) -> JointState:
         for _ in range(_FIRST_READS):

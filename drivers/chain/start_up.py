@@ -4,7 +4,7 @@ The order avoids what users of such buses report: goals not synced before torque
 of 500 us a servo, alarms from before, turn counts lost at a reboot.
 """
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus
+from snakewalk.drivers.bus.dynamixel_bus import PingReply
 from snakewalk.drivers.chain.joint_codec import JointUnits
-from snakewalk.drivers.errors import BusError, ChainError, ChainFault, FaultCause, ServoError
+from snakewalk.drivers.errors import BusError, ChainError, ChainFault, FaultCause
 from snakewalk.drivers.protocol.control_table import model_numbers
 from snakewalk.drivers.protocol.registers import (
     CURRENT_POSITION_MODE,
@@ -40,6 +41,21 @@ SHAPING_SETTINGS = (
 IDENTITY = "Velocity I Gain"
 """Holds which joint a servo is, while it runs: no register of position control, in RAM, and reset
 by a change of mode. A servo that is given another ID keeps it, one that reboots does not."""
+_REPORTED = (
+    *("Firmware Version", "Hardware Error Status", "Return Delay Time", "Operating Mode"),
+    *("Torque Enable", "Present Temperature", "Present Input Voltage"),
+)
+_COMPARED = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY, "Present Position")
+"""Read along, for whoever compares a servo with what it was."""
+_STARTUP = "Startup Configuration"
+"""A firmware before 45 has none."""
+_SETTINGS = (
+    *("Torque Enable", "Bus Watchdog", "Secondary(Shadow) ID", "Return Delay Time"),
+    *("Operating Mode", "Drive Mode", _STARTUP, "Shutdown", "Homing Offset", "PWM Limit"),
+    *("Current Limit", "Min Position Limit", "Max Position Limit", "Goal Current"),
+    *("Goal PWM", "Position P Gain", *SHAPING_SETTINGS, IDENTITY),
+)
+"""What ``configure`` looks at."""
 ALL_REPLY = 2
 """Status Return Level(68)."""
 FAST_READ_FIRMWARE = 45
@@ -60,6 +76,8 @@ class ServoReport:
     torque_on: bool
     temperature_c: float
     voltage_v: float
+    registers: Mapping[str, int]
+    """Where it stands, and what a chain sets in its RAM, as far as the model has it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +94,25 @@ class Inspection:
 
 
 def inspect(
-    bus: ChainBus, robot: RobotConfig, servo_ids: Collection[int] | None = None
+    bus: ChainBus,
+    robot: RobotConfig,
+    servo_ids: Collection[int] | None = None,
+    replies: Mapping[int, PingReply] | None = None,
 ) -> Inspection:
-    """Read identity and state of every servo of the robot, or of some; changes nothing."""
+    """Read identity and state of every servo of the robot, or of some; changes nothing.
+
+    Args:
+        bus: where they are.
+        robot: whose they are.
+        servo_ids: only these; None is all.
+        replies: to pings that have been sent to them just now; None: they are pinged.
+
+    Raises:
+        BusError: one that replied to its ping does not reply to the rest, or refuses.
+
+    """
     asked = robot.servo_ids if servo_ids is None else servo_ids
-    found = bus.find(asked)
+    found = bus.find(asked) if replies is None else replies
     faults: list[ChainFault] = []
     for part in bus.parts:
         on_it = [i for i in robot.servo_ids if bus.port_of(i) is part.port]
@@ -119,16 +151,20 @@ def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
         BusError: it does not answer, or refuses.
 
     """
+    table = bus.table_of(servo_id)
+    names = (*_REPORTED, *(each for each in _COMPARED if each in table))
+    values = bus.read_each(servo_id, names)
     return ServoReport(
         servo_id=servo_id,
         model=name,
-        firmware=bus.read(servo_id, "Firmware Version"),
-        hardware_error=bus.read(servo_id, "Hardware Error Status"),
-        return_delay_s=bus.read(servo_id, "Return Delay Time") * RETURN_DELAY_UNIT_S,
-        operating_mode=bus.read(servo_id, "Operating Mode"),
-        torque_on=bool(bus.read(servo_id, "Torque Enable")),
-        temperature_c=float(bus.read(servo_id, "Present Temperature")),
-        voltage_v=bus.read(servo_id, "Present Input Voltage") * VOLTAGE_UNIT_V,
+        firmware=values["Firmware Version"],
+        hardware_error=values["Hardware Error Status"],
+        return_delay_s=values["Return Delay Time"] * RETURN_DELAY_UNIT_S,
+        operating_mode=values["Operating Mode"],
+        torque_on=bool(values["Torque Enable"]),
+        temperature_c=float(values["Present Temperature"]),
+        voltage_v=values["Present Input Voltage"] * VOLTAGE_UNIT_V,
+        registers=values,
     )
 
 
@@ -142,6 +178,10 @@ class ChainSetting:
     """Mask of the bits that matter; the others stay as they are."""
     usual: bool = True
     """Whether other values are what a factory or another robot leaves; else a change is told."""
+
+    def value_in(self, registers: Mapping[str, int]) -> int:
+        """Whole value that the register should hold, where it holds what is in ``registers``."""
+        return registers[self.register] & ~self.bits | self.value & self.bits
 
 
 def chain_settings(
@@ -168,7 +208,7 @@ def chain_settings(
         ChainSetting("Operating Mode", CURRENT_POSITION_MODE if limits_current else POSITION_MODE),
         # Torque that a goal or a power-up switches on is torque without a watchdog
         ChainSetting("Drive Mode", 0, TIME_PROFILE | TORQUE_ON_BY_GOAL, usual=False),
-        ChainSetting("Startup Configuration", 0, usual=False),
+        ChainSetting(_STARTUP, 0, usual=False),
         ChainSetting("Shutdown", SHUTDOWN_ALARMS, SHUTDOWN_ALARMS, usual=False),
         ChainSetting("Min Position Limit", int(low)),
         ChainSetting("Max Position Limit", int(high)),
@@ -209,15 +249,24 @@ def configure(
 
     """
     which = tuple(range(robot.joint_count) if joints is None else joints)
-    for joint in which:
-        servo_id = robot.servo_ids[joint]
-        bus.write_verified(servo_id, "Torque Enable", 0)  # the EEPROM is locked while it is on
+    if not which:
+        return {}
+    ids = [robot.servo_ids[joint] for joint in which]
+    bus.sync_write(ids, "Torque Enable", 0)  # the EEPROM is locked while it is on
+    found: dict[int, dict[str, int]] = {}
+    for joint, servo_id in zip(which, ids, strict=True):
+        found[joint] = _read_settings(bus, servo_id)
+        if found[joint]["Torque Enable"]:  # the packet was lost
+            bus.write_verified(servo_id, "Torque Enable", 0)
         # in its error state goals are refused; if cleared with torque on, an old goal would count
-        bus.write(servo_id, "Bus Watchdog", 0)
+        if found[joint]["Bus Watchdog"]:
+            bus.write(servo_id, "Bus Watchdog", 0)
     none = ChainSetting("Secondary(Shadow) ID", NO_SECONDARY_ID, usual=False)
     for joint in which:  # all, before anything that one of them could take for its own
-        _apply(bus, robot, joint, none, on_event)
-    return {joint: _configure_joint(bus, robot, units, joint, on_event) for joint in which}
+        found[joint] = _apply(bus, robot, joint, (none,), found[joint], on_event)
+    return {
+        joint: _configure_joint(bus, robot, units, joint, found[joint], on_event) for joint in which
+    }
 
 
 def _configure_joint(
@@ -225,29 +274,28 @@ def _configure_joint(
     robot: RobotConfig,
     units: JointUnits,
     joint: int,
+    found: dict[str, int],
     on_event: Callable[[str], None],
 ) -> dict[str, int]:
-    servo_id, name = robot.servo_ids[joint], robot.joint_name(joint)
-    pwm_limit = bus.read(servo_id, "PWM Limit")
+    name, pwm_limit = robot.joint_name(joint), found["PWM Limit"]
     if pwm_limit == 0:
         raise ChainError(f"{name}: PWM Limit is 0: it cannot move; set it to {PWM_FULL}")
-    values = {}
-    for setting in chain_settings(robot, units, joint, pwm_limit):
-        if setting.register in bus.table_of(servo_id):
-            values[setting.register] = _apply(bus, robot, joint, setting, on_event)
+    settings = list(chain_settings(robot, units, joint, pwm_limit))
     if robot.all_axes[joint] == "p" and units.measures_current[joint]:
-        values["Goal Current"] = _limit_current(bus, robot, joint, units)
+        settings.append(_current_setting(robot, units, joint, found["Current Limit"]))
+    settings.append(ChainSetting(IDENTITY, identity(joint)))
+    values = _apply(bus, robot, joint, settings, found, on_event)
     if pwm_limit < PWM_FULL:
         on_event(f"{name}: PWM Limit is {pwm_limit} of {PWM_FULL}: weak and slow")
-    if bus.read(servo_id, "Drive Mode") & REVERSE:
+    if values["Drive Mode"] & REVERSE:
         on_event(f"{name}: Drive Mode is reverse: it turns the other way round")
-    offset = bus.read(servo_id, "Homing Offset")
+    offset = values["Homing Offset"]
     if offset:
         angle = offset * abs(units.rad_per_position[joint])
         on_event(f"{name}: Homing Offset is {offset}: its zero is moved by {angle:+.2f} rad")
-    values[IDENTITY] = _apply(bus, robot, joint, ChainSetting(IDENTITY, identity(joint)), on_event)
+    set_here = {setting.register for setting in settings}
     kept = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY)
-    return {register: values[register] for register in kept if register in values}
+    return {each: values[each] for each in kept if each in set_here and each in values}
 
 
 def identity(joint: int) -> int:
@@ -265,50 +313,77 @@ def identity_fault(robot: RobotConfig, joint: int, value: int) -> str | None:
     )
 
 
+def _read_settings(bus: ChainBus, servo_id: int) -> dict[str, int]:
+    """Values of all that ``configure`` looks at, as far as the model has it."""
+    table = bus.table_of(servo_id)
+    return bus.read_each(servo_id, [each for each in _SETTINGS if each in table], (_STARTUP,))
+
+
 def _apply(
     bus: ChainBus,
     robot: RobotConfig,
     joint: int,
-    setting: ChainSetting,
+    settings: Iterable[ChainSetting],
+    found: dict[str, int],
     on_event: Callable[[str], None],
-) -> int:
-    """Write a setting where it differs, and read it back; returns the register's value."""
-    servo_id, register = robot.servo_ids[joint], setting.register
-    try:
-        before = bus.read(servo_id, register)
-    except ServoError:
-        if register == "Startup Configuration":
-            return 0  # a firmware before 45 has none
-        raise
-    value = before & ~setting.bits | setting.value & setting.bits
-    if value != before:
-        bus.write(servo_id, register, value)
-        got = bus.read(servo_id, register)
+) -> dict[str, int]:
+    """Write each setting that differs from what was found, then read all of them back.
+
+    Returns:
+        What the registers hold now.
+
+    Raises:
+        BusError: one does not hold what it should; or the servo does not answer, or refuses.
+
+    """
+    servo_id, name = robot.servo_ids[joint], robot.joint_name(joint)
+    own = [setting for setting in settings if setting.register in found]
+    now = found
+    for setting in own:
+        value = setting.value_in(now)
+        if value == now[setting.register]:
+            continue
+        bus.write(servo_id, setting.register, value)
+        # a new mode resets the gains
+        renewed = setting.register == "Operating Mode"
+        now = _read_settings(bus, servo_id) if renewed else {**now, setting.register: value}
+    if now is found:
+        return found
+    now = _read_settings(bus, servo_id)
+    for setting in own:
+        register, got = setting.register, now[setting.register]
+        value = setting.value_in(now)
         if got != value:
-            raise BusError(
-                f"{robot.joint_name(joint)}: {register}: wrote {value}, reads back {got}"
-            )
-        if not setting.usual:
-            on_event(f"{robot.joint_name(joint)}: {register} was {before}, is {value} now")
-    return value
+            raise BusError(f"{name}: {register}: wrote {value}, reads back {got}")
+        if got != found[register] and not setting.usual:
+            on_event(f"{name}: {register} was {found[register]}, is {got} now")
+    return now
 
 
-def _limit_current(bus: ChainBus, robot: RobotConfig, joint: int, units: JointUnits) -> int:
-    servo_id, current_a = robot.servo_ids[joint], robot.current_limits_a[joint]
-    limit = bus.read(servo_id, "Current Limit")
+def _current_setting(
+    robot: RobotConfig, units: JointUnits, joint: int, limit_raw: int
+) -> ChainSetting:
+    """Goal Current of a pitch joint.
+
+    Raises:
+        ChainError: it is above the servo's Current Limit.
+
+    """
+    current_a = robot.current_limits_a[joint]
     goal = max(1, units.current_raw(joint, current_a))
-    if goal > limit:
+    if goal > limit_raw:
         own = bool(robot.joints) and robot.joints[joint].current_limit_a is not None
         raise ChainError(
             f"{robot.joint_name(joint)}: {'' if own else 'pitch_'}current_limit_a = {current_a:g}: "
-            f"the servo's Current Limit is {limit * abs(units.a_per_current[joint]):.2f} A"
+            f"the servo's Current Limit is {limit_raw * abs(units.a_per_current[joint]):.2f} A"
         )
-    bus.write_verified(servo_id, "Goal Current", goal)
-    return goal
+    return ChainSetting("Goal Current", goal)
 
 
-def let_reply(bus: ChainBus, robot: RobotConfig) -> None:
+def let_reply(bus: ChainBus, robot: RobotConfig) -> dict[int, PingReply]:
     """Let servos reply to every instruction, whose Status Return Level(68) forbids it.
+
+    Returns the replies to pings of the robot's servos.
 
     At level 0 a servo replies to pings only, at level 1 to pings and reads: what it must be told
     is sent without waiting for a reply, and only to servos of the robot's model.
@@ -317,6 +392,7 @@ def let_reply(bus: ChainBus, robot: RobotConfig) -> None:
     right = [i for i, s in found.items() if s.model_number == bus.table_of(i).model_number]
     if right:
         bus.sync_write(right, "Status Return Level", ALL_REPLY)
+    return found
 
 
 def _ids_in_words(ids: Sequence[int]) -> str:

@@ -99,6 +99,6 @@ def _with(state: JointState, **changes: object) -> JointState:
 
 def test_a_hold_where_the_joints_were_just_read_is_not_too_fast() -> None:
     """The witness compared with the readings of the cycle before, from which fast joints go on."""
-    tally = run_scenario(("drop", "clash"), 1, 240)
+    tally = run_scenario(("drop", "clash"), 3, 240)
     assert tally.brought_back
     assert tally.complaints == []

@@ -15,7 +15,7 @@ from snakewalk.controller.app.service.finding import Finding, Grade, shown_subje
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import ALL_REPLY, ChainSetting, chain_settings, pose_faults
-from snakewalk.drivers.errors import ControlTableError, ServoError
+from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.registers import (
     CURRENT_POSITION_MODE,
     POSITION_MODE,
@@ -59,13 +59,8 @@ def read_registers(bus: DynamixelBus, robot: RobotConfig, servo_id: int) -> Serv
         PortError: the port is gone.
 
     """
-    values = {}
-    for name in _READ:
-        if name in bus.table_of(servo_id):
-            try:
-                values[name] = bus.read(servo_id, name)
-            except ServoError:  # this firmware has no such register
-                continue
+    names = [name for name in _READ if name in bus.table_of(servo_id)]
+    values = bus.read_each(servo_id, names, names)
     return ServoRegisters(servo_id, robot.servo_ids.index(servo_id), values)
 
 

@@ -79,6 +79,37 @@ def test_refusals_name_servo_register_and_reason(bus: DynamixelBus) -> None:
     assert info.value.error == 7
 
 
+def test_many_registers_of_a_servo_are_one_request() -> None:
+    asked: list[InstructionPacket] = []
+    line = SimLine(ServoBank([1]), BenchPlant(1))
+    bus = DynamixelBus(line)
+    names = [name for name in bus.table if 6 <= bus.table[name].address < 120]
+    alone = {name: bus.read(1, name) for name in names}
+    write = line.write
+    line.write = lambda data: (asked.extend(PacketParser().feed(data)), write(data))[1]  # type: ignore
+    assert bus.read_each(1, names) == alone
+    assert bus.read_each(1, [*names[::-1], *names]) == alone
+    assert len(asked) == 2
+    assert bus.read_each(1, ["Present Position", "Model Number"])
+    assert len(asked) == 4  # too far from each other
+
+
+def test_many_registers_are_told_by_the_first_and_the_last(bus: DynamixelBus) -> None:
+    names = ("Goal PWM", "Bus Watchdog", "Profile Velocity")
+    with pytest.raises(NoAnswerError, match="servo 9: read Bus Watchdog to Profile Velocity: no"):
+        bus.read_each(9, names)
+
+
+def test_of_many_registers_only_optional_ones_may_be_lacking(
+    bus: DynamixelBus, line: SimLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(line.bank, "readable", lambda rows, at, size: at == 64 and size == 1)
+    names = ("LED", "Torque Enable")
+    assert bus.read_each(1, names, ("LED",)) == {"Torque Enable": 0}
+    with pytest.raises(ServoError, match="servo 1: read LED: refused: access"):
+        bus.read_each(1, names)
+
+
 def test_silence_is_an_error_with_the_baud_rate(bus: DynamixelBus) -> None:
     with pytest.raises(NoAnswerError, match=r"servo 9: .*1000000 baud"):
         bus.read(9, "Present Position")

@@ -257,6 +257,8 @@ def test_a_fault_of_one_register_is_told_with_its_port(segments: Body) -> None:
     segments.lines[1].refresh_ids()
     with pytest.raises(BusError, match=r"^B: servo 3: read Goal PWM: no answer"):
         bus.read(3, "Goal PWM")
+    with pytest.raises(BusError, match=r"^B: servo 3: read Goal PWM to Goal Current: no answer"):
+        bus.read_each(3, ["Goal Current", "Goal PWM"])
 
 
 def test_fast_reads_are_given_up_on_the_port_that_fails(segments: Body) -> None:

@@ -11,6 +11,7 @@ from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.chain.start_up import inspect
 from snakewalk.drivers.errors import BudgetError, BusError, ChainError, PortError
+from snakewalk.drivers.protocol.control_table import load_control_table
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.drivers.types import JointCommand
@@ -37,10 +38,6 @@ class Recorder(SimLine):
     def write(self, data: bytes) -> None:
         self.heard.extend(PacketParser().feed(data))  # type: ignore[arg-type]
         super().write(data)
-
-    def writePort(self, packet: bytes | list[int]) -> int:
-        self.heard.extend(PacketParser().feed(bytes(packet)))  # type: ignore[arg-type]
-        return super().writePort(packet)
 
     def writes(self) -> list[tuple[int, int, bytes]]:
         """(address, servo, data) of all writes, group ones taken apart, in order."""
@@ -105,6 +102,92 @@ def test_what_the_servos_are_set_to(line: Recorder, chain: ServoChain) -> None:
     assert (bank["Max Position Limit"] - 2048).tolist() == half.tolist()
     assert bank["Bus Watchdog"].tolist() == [10] * 4
     assert bank["Torque Enable"].tolist() == [1] * 4
+
+
+def test_a_start_takes_three_packets_a_servo_and_a_dozen_for_all(line: Recorder) -> None:
+    """A ping and two reads; each took up to 36 ms on an adapter that holds replies back."""
+    chain = ServoChain(DynamixelBus(line), ROBOT)
+    chain.enable()
+    settings = [address for address, _, _ in line.writes() if address not in (64, 68, 98, 116)]
+    joints, modes = ROBOT.joint_count, 2
+    # each setting that differs is a packet, and after them, and after a new mode, all are read
+    assert len(line.heard) <= 12 + 4 * joints + modes + len(settings)
+    chain.disable()
+    line.heard.clear()
+    chain.enable()
+    assert len(line.heard) <= 12 + 3 * joints
+    line.heard.clear()
+    assert not chain.recheck().faults
+    assert len(line.heard) == 2 * joints
+
+
+def test_a_servo_that_refuses_what_lies_between_registers_starts_all_the_same(
+    line: Recorder, chain: ServoChain, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The e-manual has an access error for undefined addresses; firmware 44 has none at 60."""
+    usual = Recorder(ServoBank(ROBOT.servo_ids), START)
+    ServoChain(DynamixelBus(usual), ROBOT).enable()
+    table = load_control_table("XM430-W350")
+    state_and_slow = {(126, 10), (144, 3)}
+    alone = {(r.address, r.size) for r in map(table.register, table) if r.address != 60}
+    monkeypatch.setattr(
+        line.bank, "readable", lambda rows, at, size: (at, size) in alone | state_and_slow
+    )
+    chain.enable()
+    assert line.writes() == usual.writes()
+    assert not chain.recheck().faults
+
+
+def test_torque_that_the_packet_to_all_does_not_switch_off_is_switched_off_alone(
+    line: Recorder, chain: ServoChain, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its watchdog is cleared after that: with torque on, an old goal would count."""
+    line.bank["Torque Enable"][:] = 1
+    line.bank["Bus Watchdog"][:] = 255
+    line.bank["Goal PWM"][2] = 100
+    sync_write = DynamixelBus.sync_write
+
+    def lame(self: DynamixelBus, ids: tuple[int, ...], name: str, value: int) -> None:
+        few = ids[:2] if (name, value) == ("Torque Enable", 0) else ids
+        sync_write(self, few, name, value)
+
+    monkeypatch.setattr(DynamixelBus, "sync_write", lame)
+    chain.enable()
+    off, clear = at(line, 64, 3)[0], at(line, 98, 3)[0]
+    assert line.writes()[off][2] == b"\x00"
+    assert off < clear < at(line, 100, 3)[0]
+
+
+def test_a_setting_that_a_servo_takes_and_does_not_keep_is_told(
+    line: Recorder, chain: ServoChain, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = DynamixelBus.write
+
+    def forgetful(self: DynamixelBus, servo_id: int, name: str, value: int) -> None:
+        write(self, servo_id, name, value + (name == "Profile Velocity"))
+
+    line.bank["Profile Velocity"][0] = 30
+    monkeypatch.setattr(DynamixelBus, "write", forgetful)
+    what = r"joint 1 \(ID 1\): Profile Velocity: wrote 0, reads back 1"
+    with pytest.raises(BusError, match=what):
+        chain.enable()
+    assert line.bank["Torque Enable"].tolist() == [0] * 4
+
+
+def test_who_is_missing_in_the_reply_of_all_is_asked_alone(
+    line: Recorder, chain: ServoChain
+) -> None:
+    """Replies to the group reads of the start are cut short behind the first servo's."""
+
+    def cut(data: bytes) -> list[bytes]:
+        group = line.heard[-1]
+        asked = group.instruction == Instruction.SYNC_READ and data[4] > 1
+        return [] if asked and group.params[0] in (64, 98, 116) else [data]
+
+    line.tamper = cut
+    chain.enable()
+    assert line.bank["Torque Enable"].tolist() == [1] * 4
+    assert {p.params[0] for p in line.heard if p.instruction == Instruction.READ} >= {64, 98, 116}
 
 
 def test_all_faults_of_a_chain_at_once(line: Recorder, chain: ServoChain) -> None:
