@@ -20,7 +20,7 @@ from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.drivers.types import JointCommand
 
-_AMPLITUDE_RAD, _FREQUENCY_HZ, _CYCLES = 0.15, 2.0, 4
+_AMPLITUDE_RAD, _FREQUENCY_HZ, _CYCLES = 0.15, 2.0, 8
 _GROWING_CYCLES = 2
 """At first the wiggle grows: a cable that is nearly broken is measured before an alarm ends it."""
 _PERIOD_S = 0.027
@@ -75,7 +75,7 @@ def supply_under_load(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -
 
 
 def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
-    """Set the chain up as a run does, wiggle all joints by up to 0.15 rad for 2 s, torque off.
+    """Set the chain up as a run does, wiggle all joints by up to 0.15 rad for 4 s, torque off.
 
     Raises:
         PortError: the port vanished, and torque could not be switched off.

@@ -413,6 +413,17 @@ def test_the_doctor_names_what_is_broken(kind: Kind) -> None:
     assert named[0].remedy
 
 
+@pytest.mark.parametrize("into_s", [0.0, 0.024, 0.04])
+def test_a_supply_that_sags_is_named_at_any_phase_of_the_servos_own_measuring(
+    into_s: float,
+) -> None:
+    """Every 50 ms a servo measures its voltage; two seconds of motion missed what four have."""
+    line = TestLine(supply_and_ambient=SupplyAndAmbient(supply_ohm=4.0))
+    line.clock.advance(0.3 + into_s)
+    findings = doctor(line, Kind("", lambda line: None, "", "", wiggle=True))
+    assert "it sags by" in {f.check: f.found for f in findings}["supply under load"]
+
+
 def test_replies_to_another_program_are_no_second_servo() -> None:
     line = TestLine()
     others(REPLY)(line)

@@ -63,14 +63,14 @@ def call(*words: str) -> tuple[int, dict[str, object]]:
 
 
 def test_the_simulated_camera_is_a_frame_late(tmp_path: Path) -> None:
-    """The planted latency is the period of a frame: 50 ms."""
+    """The planted latency is the period of a frame: 50 ms; 4 s of it tell it within some 10."""
     run = tmp_path / "marked.toml"
     run.write_text(RUN + MARKERS.format(-1.8, 0.6))
     code, found = call(str(run), "--seconds", "4")
     assert code == 0, found
     assert found["worst"] == "ok"
     assert found["frame_rate_hz"] == pytest.approx(20.0, abs=0.5)
-    assert found["latency_ms"] == pytest.approx(50.0, abs=8.0)
+    assert found["latency_ms"] == pytest.approx(50.0, abs=12.0)
     assert found["markers_found"] == {"0": 1.0, "3": 1.0, "7": 1.0, "12": 1.0}
     assert found["exposure"] == found["white_balance"] == "locked"
 
