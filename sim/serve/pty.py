@@ -68,7 +68,8 @@ class PtyServer:
         self.overrun_bytes = 0
         """Bytes lost because the client did not read them."""
         self.output_flushes = 0
-        """How often the client threw away what the kernel had not handed over yet."""
+        """How often, at least, the client threw away what the kernel had not handed over yet: it
+        tells of all flushes between two looks as of one."""
         self.path = ""
         """The device to open as a serial port; empty while the port has vanished."""
         self._open()
@@ -86,6 +87,8 @@ class PtyServer:
 
     def close(self) -> None:
         """Take the device away; safe to call twice."""
+        if self.path and select.select([self._master], [], [], 0.0)[0]:
+            self._receive()  # a flush since the last look is counted, too
         for end in (self._master, self._slave):
             if end >= 0:
                 os.close(end)
@@ -126,11 +129,9 @@ class PtyServer:
             return
         if ready:
             self._follow_baud_rate()
-            received = os.read(self._master, CHUNK_BYTES)
-            if received[0] == termios.TIOCPKT_DATA:
-                line.write(received[1:])
-            elif received[0] & termios.TIOCPKT_FLUSHWRITE:
-                self.output_flushes += 1
+            received = self._receive()
+            if received:
+                line.write(received)
             line.settle()
         arrived = line.read_until(CHUNK_BYTES, line.clock.now_s())
         if arrived:
@@ -138,6 +139,14 @@ class PtyServer:
                 os.write(self._master, arrived)
             except BlockingIOError:  # no client reads: a UART's buffer would overrun, too
                 self.overrun_bytes += len(arrived)
+
+    def _receive(self) -> bytes:
+        """Bytes of the client; none where the kernel tells of something else."""
+        received = os.read(self._master, CHUNK_BYTES)
+        if received[0] == termios.TIOCPKT_DATA:
+            return received[1:]
+        self.output_flushes += bool(received[0] & termios.TIOCPKT_FLUSHWRITE)
+        return b""
 
     def _wait(self, wait_s: float) -> bool:
         """Wait for a client, an event on the line or ``wait_s``; whether a client has sent."""

@@ -1,5 +1,7 @@
 """Short ways to a simulated bus, for the tests of this folder."""
 
+import os
+import select
 from collections.abc import Iterator
 
 from snakewalk.drivers.protocol.packet import (
@@ -17,6 +19,8 @@ from snakewalk.sim.servo.bench import BenchPlant
 from snakewalk.sim.servo.motor import TICKS_PER_RAD
 
 ALL = 0xFE
+CARRIED_S = 10.0
+"""Bytes of a pty that a worker of the kernel has not carried by then are lost."""
 PATIENT = {
     "run.safety.stale_limit_s": 5.0,
     "run.safety.slow_stale_limit_s": 20.0,
@@ -40,6 +44,21 @@ def serve_for(server: PtyServer, clock: SimClock, seconds: float) -> None:
     for _ in range(round(seconds / IDLE_S)):
         clock.advance(IDLE_S)
         server.step(0.0)
+
+
+def send_to(server: PtyServer, client: int, data: bytes) -> None:
+    """Write to a pty, and wait until a worker of the kernel has carried the bytes across."""
+    os.write(client, data)
+    assert select.select([server._master], [], [], CARRIED_S)[0]
+
+
+def take(client: int, count: int) -> bytes:
+    """Read ``count`` bytes that a server has written, however the kernel cuts them."""
+    got = b""
+    while len(got) < count:
+        assert select.select([client], [], [], CARRIED_S)[0], got
+        got += os.read(client, count - len(got))
+    return got
 
 
 def ask(line: SimLine, servo_id: int, code: int, params: bytes = b"") -> list[StatusPacket]:

@@ -14,7 +14,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.drivers.clock import WallClock
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.serve.pty import PtyServer
-from tests.helpers.bus import a_line, serve_for, write
+from tests.helpers.bus import a_line, send_to, serve_for, take, write
 
 PING = bytes.fromhex("FF FF FD 00 01 03 00 01 19 4E")
 
@@ -24,18 +24,18 @@ def test_answers_come_when_their_bytes_are_due() -> None:
     with PtyServer(a_line(1), clock) as server:
         client = os.open(server.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
-            os.write(client, PING[:4])
+            send_to(server, client, PING[:4])
             server.step(0.0)
-            os.write(client, PING[4:])
+            send_to(server, client, PING[4:])
             server.step(0.0)
             with pytest.raises(BlockingIOError):
                 os.read(client, 99)
             clock.advance(100e-6 + 50e-6)  # ten bytes out, five of fourteen back
             server.step(0.0)
-            assert os.read(client, 99) == b"\xff\xff\xfd\x00\x01"
+            assert take(client, 5) == b"\xff\xff\xfd\x00\x01"
             clock.advance(1e-3)
             server.step(0.0)
-            assert len(os.read(client, 99)) == 9
+            assert len(take(client, 9)) == 9
         finally:
             os.close(client)
 
@@ -45,7 +45,7 @@ def test_a_client_that_flushes_its_output_is_told_of() -> None:
     with PtyServer(a_line(1), clock) as server:
         client = os.open(server.path, os.O_RDWR | os.O_NOCTTY)
         try:
-            os.write(client, PING)
+            send_to(server, client, PING)
             termios.tcdrain(client)
             server.step(0.0)
             assert server.output_flushes == 0
@@ -53,12 +53,24 @@ def test_a_client_that_flushes_its_output_is_told_of() -> None:
                 termios.tcflush(client, termios.TCOFLUSH)
                 server.step(0.0)
             assert server.output_flushes == 2
-            os.write(client, PING)
+            for _ in range(2):
+                termios.tcflush(client, termios.TCOFLUSH)
+            server.step(0.0)
+            assert server.output_flushes == 3  # the kernel tells of both as of one
+            send_to(server, client, PING)
             while not select.select([client], [], [], 0.0)[0]:
                 clock.advance(1e-3)
                 server.step(0.0)
         finally:
             os.close(client)
+
+
+def test_a_flush_after_the_last_look_is_counted() -> None:
+    with PtyServer(a_line(1), SimClock()) as server:
+        client = os.open(server.path, os.O_RDWR | os.O_NOCTTY)
+        termios.tcflush(client, termios.TCOFLUSH)
+    os.close(client)
+    assert server.output_flushes == 1
 
 
 class CountingClock(SimClock):
@@ -80,12 +92,13 @@ def test_a_reply_that_is_due_soon_is_awaited_without_sleep(monkeypatch: pytest.M
             return look(*ends_and_wait[:3], 0.0)
 
         try:
-            os.write(client, PING)
+            send_to(server, client, PING)
             server.step(1e-3)
-            monkeypatch.setattr(select, "select", sleep)
-            for _ in range(9):
-                server.step(1e-3)
-            assert os.read(client, 99)[:5] == b"\xff\xff\xfd\x00\x01"
+            with monkeypatch.context() as patched:
+                patched.setattr(select, "select", sleep)
+                for _ in range(9):
+                    server.step(1e-3)
+            assert take(client, 5) == b"\xff\xff\xfd\x00\x01"
         finally:
             os.close(client)
     assert set(naps) == {0.0}
