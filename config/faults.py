@@ -50,11 +50,20 @@ class ServoFault(_Lasting):
 
 
 class ClashFault(_Lasting):
-    """One servo takes the ID of another."""
+    """One servo takes the ID of another, which keeps it or gets that of the first."""
 
-    kind: Literal["clash"]
+    kind: Literal["clash", "exchange"]
     id: ServoId
     takes: ServoId
+
+
+class WriteFault(_Fault):
+    """Another program writes to a register of servos, by its name in the control table."""
+
+    kind: Literal["write"]
+    ids: tuple[ServoId, ...] = Field(min_length=1)
+    register_name: str = Field(min_length=1, alias="register")
+    value: int
 
 
 class TripFault(_Fault):
@@ -104,6 +113,7 @@ Fault = Annotated[
     NoiseFault
     | ServoFault
     | ClashFault
+    | WriteFault
     | TripFault
     | HeatFault
     | SupplyFault

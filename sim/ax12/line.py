@@ -65,6 +65,17 @@ class Ax12Line(Wire):
         """Give a servo another ID."""
         self.servos["ID"][row] = servo_id
 
+    def register_type(self, row: int, name: str) -> np.dtype[np.integer] | None:
+        """Type of a register's numbers; None where a servo lacks it."""
+        try:
+            return self.servos[name].dtype
+        except KeyError:
+            return None
+
+    def write_register(self, rows: NDArray[np.intp], name: str, value: int) -> None:
+        """Set a register of servos, as another program would."""
+        self.servos[name][rows] = value
+
     def mute(self, rows: NDArray[np.intp], on: bool) -> None:
         """Stop servos from replying, or let them reply again; they still receive and obey."""
         self._muted[rows] = on

@@ -93,6 +93,14 @@ class FaultTarget(Protocol):
         """Give a servo another ID."""
         ...
 
+    def register_type(self, row: int, name: str) -> np.dtype[np.integer] | None:
+        """Type of a register's numbers; None where a servo lacks it."""
+        ...
+
+    def write_register(self, rows: Indices, name: str, value: int) -> None:
+        """Set a register of servos, as another program would."""
+        ...
+
     def mute(self, rows: Indices, on: bool) -> None:
         """Stop servos from replying, or let them reply again."""
         ...
@@ -172,10 +180,25 @@ class FaultPlayer:
                 for each in named
                 if each not in self._rows
             ]
+            if isinstance(fault, plan.WriteFault):
+                wrong += self._unwritable(fault, where)
             if isinstance(fault, plan.TripFault) and fault.kind != "reboot":
                 wrong += self._undetectable(fault, where)
         if wrong:
             raise ConfigError(wrong)
+
+    def _unwritable(self, fault: plan.WriteFault, where: str) -> list[str]:
+        """Messages about a register that a named servo lacks, or a value that does not fit."""
+        wrong = []
+        for each in self._rows.keys() & set(fault.ids):
+            name, value = fault.register_name, fault.value
+            kind = self._line.register_type(self._rows[each], name)
+            if kind is None:
+                wrong.append(f"{where}: servo {each} has no register {name}")
+            elif not np.iinfo(kind).min <= value <= np.iinfo(kind).max:
+                span = f"{np.iinfo(kind).min} to {np.iinfo(kind).max}"
+                wrong.append(f"{where}: {name} of servo {each} holds {span}, not {value}")
+        return wrong
 
     def _undetectable(self, fault: plan.TripFault, where: str) -> list[str]:
         """Messages about an error that a named servo cannot detect."""
@@ -224,8 +247,9 @@ class FaultPlayer:
             behind = np.arange(self._rows[fault.behind] + 1, len(line.ids()))
             return lambda: servos.cut_power(behind), lambda: servos.restore_power(behind)
         if isinstance(fault, plan.ClashFault):
-            row = self._rows[fault.id]
-            return lambda: line.rename(row, fault.takes), lambda: line.rename(row, fault.id)
+            return lambda: self._rename(fault, True), lambda: self._rename(fault, False)
+        if isinstance(fault, plan.WriteFault):
+            return lambda: line.write_register(rows, fault.register_name, fault.value), None
         if isinstance(fault, plan.HeatFault):
             return lambda: protection.heat(rows, fault.celsius), None
         if isinstance(fault, plan.TripFault):
@@ -241,6 +265,12 @@ class FaultPlayer:
         if fault.kind == "stuck":
             return lambda: servos.block_shafts(rows), lambda: servos.free_shafts(rows)
         return lambda: servos.cut_power(rows), lambda: servos.restore_power(rows)
+
+    def _rename(self, fault: plan.ClashFault, begins: bool) -> None:
+        new, old = (fault.takes, fault.id) if begins else (fault.id, fault.takes)
+        self._line.rename(self._rows[fault.id], new)
+        if fault.kind == "exchange":
+            self._line.rename(self._rows[fault.takes], old)
 
     def _trip(self, rows: Indices, kind: str) -> None:
         if kind == "reboot":

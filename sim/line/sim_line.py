@@ -82,6 +82,15 @@ class SimLine(Wire):
         """Give a servo another ID."""
         self.bank["ID"][row] = servo_id
 
+    def register_type(self, row: int, name: str) -> np.dtype[np.integer] | None:
+        """Type of a register's numbers; None where a servo lacks it."""
+        bank = self.bank
+        return bank[name].dtype if name in bank and bank.has(row, name) else None
+
+    def write_register(self, rows: NDArray[np.intp], name: str, value: int) -> None:
+        """Set a register of servos, as another program would."""
+        self.bank[name][rows] = value
+
     def mute(self, rows: NDArray[np.intp], on: bool) -> None:
         """Stop servos from replying, or let them reply again; they still receive and obey."""
         self.directory.mute[rows] = on

@@ -109,6 +109,7 @@ class PresentValues:
     def supply(self) -> None:
         """Present Input Voltage and Temperature(144, 146)."""
         bank = self._bank
-        bank["Present Input Voltage"][:] = np.rint(self._drive.supply_v * 10.0)
+        volts = self._protection.supply_v(self._plant.velocity_rad_s)
+        bank["Present Input Voltage"][:] = np.rint(volts * 10.0)
         celsius = np.rint(self._protection.temperature_c)
         bank["Present Temperature"][:] = np.minimum(np.maximum(celsius, 0.0), 255.0)

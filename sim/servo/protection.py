@@ -131,7 +131,7 @@ class Protection:
         warm_up(self.temperature_c, heat_j, SLICE_S, self._around.ambient_c, self._thermal)
         drive = self._drive
         pwm = self._motor_output.pwm(plant.velocity_rad_s)
-        self._sag(pwm)
+        self._sag(pwm, drive.supply_v)
         longest_s = count_blocked(
             self._blocked_s,
             SLICE_S,
@@ -163,15 +163,25 @@ class Protection:
         bank["Hardware Error Status"][:] |= errors.astype(np.uint8)
         bank["Torque Enable"][(bank["Hardware Error Status"] & bank["Shutdown"]) != 0] = 0
 
-    def _sag(self, pwm: Floats) -> None:
+    def supply_v(self, velocity_rad_s: Floats) -> Floats:
+        """(S,) voltage as the servos measure it, under what the motors draw at this moment.
+
+        The motors go on with that of the last check, as long as a slice lasts.
+        """
+        out = np.empty_like(self._drive.supply_v)
+        self._sag(self._motor_output.pwm(velocity_rad_s), out)
+        return out
+
+    def _sag(self, pwm: Floats, out: Floats) -> None:
+        """Write the voltage at each servo (S,) under the present currents into ``out``."""
         current_a = self._motor_output.current_a()
         if self._around.cabling is not None:
             self._sag_along(self._around.cabling, pwm, current_a)
-            return
-        for rows, standby_a in self._cables:
-            drawn_a = float(supply_current_a(pwm[rows], current_a[rows])) + standby_a
-            self._drop_v[rows] = self._around.supply_ohm * drawn_a
-        self._supply.feed(self._drive.supply_v, self._drop_v)
+        else:
+            for rows, standby_a in self._cables:
+                drawn_a = float(supply_current_a(pwm[rows], current_a[rows])) + standby_a
+                self._drop_v[rows] = self._around.supply_ohm * drawn_a
+        self._supply.feed(out, self._drop_v)
 
     def _sag_along(self, cabling: Cabling, pwm: Floats, current_a: Floats) -> None:
         """Let the voltage sag along the chain; output and shaft speed stay as they are now.
@@ -190,4 +200,3 @@ class Protection:
             source_v, around_ohm, at_zero_a, slope_s, cables_ohm, leads_ohm, self._drop_v
         )
         self._drop_v[:] = source_v - np.maximum(self._drop_v, 0.0)
-        self._supply.feed(drive.supply_v, self._drop_v)

@@ -13,12 +13,16 @@ from snakewalk.drivers.safety.recovery import Policy
 from snakewalk.drivers.types import JointCommand
 
 from .rig import JOINTS, PATIENCE_S, ROBOT, SAFETY, Rig
-from .scenarios import plan
+from .scenarios import CHANGES, plan
 
 PERIOD_S = 0.02
 LONGEST_CYCLE_S = PATIENCE_S + 3.0
 """Simulated time that one cycle may take at most: a wait for recovery, and the last try of it."""
 _OPERATOR_TRIES = 12
+CHANGING = {*CHANGES, "reboot", "brown_out", "unplug", "supply", "clash"}
+"""Kinds after which registers, or who has which ID, may not be as they were set."""
+_ALARMS = ("does another program write to it", "exchanged")
+"""In the reason of a trip that a changed register has caused."""
 
 
 @dataclass
@@ -43,13 +47,18 @@ class Tally:
     not_held: int = 0
     too_long: int = 0
     """Cycles that took longer than ``LONGEST_CYCLE_S`` of simulated time."""
+    noticed: int = 0
+    """Changes of a servo's registers, or exchanges of IDs, after which the chain stopped."""
+    unnoticed: int = 0
+    false_alarms: int = 0
+    """Trips that name such a change in a scenario that has none."""
     complaints: list[str] = field(default_factory=list)
 
     @property
     def violations(self) -> int:
         """What must be zero."""
         values = (self.beyond_limit, self.too_fast, self.old, self.foreign, self.not_held)
-        return sum(values) + self.too_long + self.unsafe_trips
+        return sum(values) + self.too_long + self.unsafe_trips + self.unnoticed + self.false_alarms
 
     def add(self, other: "Tally") -> None:
         """Add another's counts."""
@@ -85,6 +94,10 @@ def run_scenario(kinds: tuple[str, ...], seed: int, cycles: int) -> Tally:
             tally.clamped += 0 if verdict is None else int(verdict.clamped.any())
         except SafetyTrippedError:
             tally.trips += 1
+            rig.changes.end(rig.link)
+            if not CHANGING & set(kinds) and any(each in str(rig.link.tripped) for each in _ALARMS):
+                tally.false_alarms += 1
+                tally.complaints.append(f"{kinds} {seed}: false alarm: {rig.link.tripped}")
             tally.too_long += clock.now_s() - started_s > LONGEST_CYCLE_S
             clock.advance(SAFETY.watchdog_s + 0.02)
             if not rig.safe:
@@ -97,6 +110,7 @@ def run_scenario(kinds: tuple[str, ...], seed: int, cycles: int) -> Tally:
             tally.too_long += clock.now_s() - started_s > LONGEST_CYCLE_S
         next_s = max(next_s + PERIOD_S, clock.now_s())
     tally.brought_back = rig.link.recoveries
+    tally.noticed, tally.unnoticed = rig.changes.noticed, rig.changes.unnoticed
     for name in ("beyond_limit", "too_fast", "old", "foreign", "not_held"):
         setattr(tally, name, getattr(rig.witness, name))
     tally.complaints += [f"{kinds} {seed}: {line}" for line in rig.witness.complaints]

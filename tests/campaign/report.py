@@ -17,6 +17,9 @@ _COLUMNS = {
     "foreign": "another's",
     "not_held": "not held",
     "too_long": "hangs",
+    "noticed": "changes noticed",
+    "unnoticed": "unnoticed",
+    "false_alarms": "false alarms",
 }
 
 

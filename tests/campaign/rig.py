@@ -13,7 +13,7 @@ from snakewalk.config.faults import FaultPlan
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.chain.servo_chain import SLOW_EVERY, ServoChain
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.drivers.protocol.registers import ServoUnits
@@ -33,6 +33,8 @@ PATIENCE_S = 1.0
 JOINTS = ROBOT.joint_count
 TICK_RAD = 2 * np.pi / 4096
 HELD_RAD = 0.02
+NOTICED_CYCLES = 4 * SLOW_EVERY
+"""A register is compared every third round at the latest; one more for an answer that is lost."""
 _STAMPS = 60
 _GOALS = (116).to_bytes(2, "little") + (4).to_bytes(2, "little")
 
@@ -60,6 +62,61 @@ class Witness:
         return self.beyond_limit + self.too_fast + self.old + self.foreign + self.not_held
 
 
+def rows_by_id(bank: ServoBank) -> np.ndarray | None:
+    """(J,) rows of the servos that have the joints' IDs; None where two have one."""
+    ids = bank["ID"].tolist()
+    if sorted(ids) != sorted(ROBOT.servo_ids):
+        return None
+    return np.array([ids.index(servo) for servo in ROBOT.servo_ids])
+
+
+class ChangeWatch:
+    """Whether a chain notices that registers of its servos are not as it has set them.
+
+    A change counts while torque is on and the servo is read; noticed is one that ends a run, or
+    that a recovery mends, before ``NOTICED_CYCLES`` such cycles have passed.
+    """
+
+    def __init__(self, chain: ServoChain, bank: ServoBank) -> None:
+        self._chain, self._bank = chain, bank
+        self._cycles = np.zeros(JOINTS, np.intp)
+        self._recoveries, self._pending = 0, False
+        self.noticed = self.unnoticed = 0
+
+    def restart(self) -> None:
+        """Begin anew: the chain has been set up."""
+        self._cycles[:] = 0
+        self._pending = False
+
+    def look(self, valid: np.ndarray, link: SafeLink) -> None:
+        """Count what has changed, after a cycle; ``valid`` (J,) which joints were read."""
+        if link.tripped is not None or link.recoveries != self._recoveries:
+            self.end(link)
+        changed = self._changed()
+        self._cycles[~changed] = 0
+        self._cycles[changed & valid] += 1
+        late = self._cycles == NOTICED_CYCLES
+        self.unnoticed += int(late.sum())
+        self._pending = bool(changed.any()) and not late.any()
+
+    def end(self, link: SafeLink) -> None:
+        """Count a change that there was when the link latched, or was brought back."""
+        self.noticed += self._pending
+        self.restart()
+        self._recoveries = link.recoveries
+
+    def _changed(self) -> np.ndarray:
+        """(J,) of the servos that have the joints' IDs; none where two have one."""
+        bank, rows = self._bank, rows_by_id(self._bank)
+        if rows is None:
+            return np.zeros(JOINTS, bool)
+        changed = bank["Bus Watchdog"][rows] != self._chain._watchdog_ticks
+        for joint, values in self._chain._configured.items():
+            row = rows[joint]
+            changed[joint] |= any(int(bank[name][row]) != each for name, each in values.items())
+        return np.asarray(changed & (bank["Torque Enable"][rows] == 1))
+
+
 class Rig:
     """Line, chain and safe link, with faults and a witness."""
 
@@ -81,7 +138,8 @@ class Rig:
         )
         self.link = SafeLink(self.chain, self.limits, self.line.clock, recovery)
         self.player = FaultPlayer(self.line, plan)
-        self.clashing = any(fault.kind == "clash" for fault in plan.fault)
+        self.clashing = any(fault.kind in ("clash", "exchange") for fault in plan.fault)
+        self.changes = ChangeWatch(self.chain, self.line.bank)
         self._units = ServoUnits.of(self.bus.table)
         self._low, self._high = self._raw_limits()
         self._cycle = 0
@@ -100,6 +158,7 @@ class Rig:
         before, brought_back = self._seen, self.link.recoveries
         state = self.link.read()
         self._seen = state
+        self.changes.look(state.valid, self.link)
         self._steady = self._steady and self.link.recoveries == brought_back
         self._check_values(state, before if self._steady else None)
         self._steady = True
@@ -108,6 +167,7 @@ class Rig:
     def restart(self) -> None:
         """Forget what was held: the chain has been enabled anew."""
         self._seen, self._sent, self._steady = None, None, False
+        self.changes.restart()
 
     def cool_down(self) -> None:
         """Let half an hour pass, for the motors alone."""
@@ -169,7 +229,8 @@ class Rig:
     def _check_goals(self, time_s: float, raw: np.ndarray) -> None:
         goal = self._units.position_rad(raw)
         self._sin("beyond_limit", (raw < self._low) | (raw > self._high))
-        here = self.line.firmware.plant.position_rad
+        rows = rows_by_id(self.line.bank)
+        here = self.line.firmware.plant.position_rad[slice(None) if rows is None else rows]
         known = here if self._seen is None else self._seen.position_rad
         ahead = np.minimum(np.abs(goal - known), np.abs(goal - here))
         last = self._sent

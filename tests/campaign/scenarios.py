@@ -10,7 +10,19 @@ from .rig import ROBOT
 NOISE = ("drop", "corrupt", "truncate", "duplicate", "delay", "late")
 SERVO = ("mute", "stuck", "brown_out")
 TRIPS = ("reboot", "overload", "overheating", "voltage", "encoder", "shock")
-KINDS = (*NOISE, *SERVO, "clash", *TRIPS, "heat", "supply", "unplug", "stall", "port")
+WRITES = {
+    "P gain": ("Position P Gain", (50, 400, 3000)),
+    "I gain": ("Position I Gain", (30, 900)),
+    "D gain": ("Position D Gain", (30, 3000)),
+    "feed-forward": ("Feedforward 1st Gain", (50, 900)),
+    "profile": ("Profile Velocity", (5, 60)),
+    "goal PWM": ("Goal PWM", (0, 200)),
+    "goal current": ("Goal Current", (0, 40)),
+    "watchdog": ("Bus Watchdog", (0,)),
+}
+"""Registers that another program changes while the chain moves, and values that it may write."""
+CHANGES = ("exchange", *WRITES)
+KINDS = (*NOISE, *SERVO, "clash", *TRIPS, "heat", "supply", "unplug", "stall", "port", *CHANGES)
 SCENARIOS = ((), *((kind,) for kind in KINDS), *combinations(KINDS, 2))
 """None, each alone, each pair."""
 _EVERY_S = 2.5
@@ -46,8 +58,14 @@ def _how(kind: str, rng: random.Random) -> dict[str, object]:
         return found
     if kind in SERVO:
         return {"ids": ids, "for_s": for_s}
-    if kind == "clash":
+    if kind in WRITES:
+        register, values = WRITES[kind]
+        if register == "Goal Current":  # only pitch joints have it set
+            ids = [ROBOT.servo_ids[j] for j, axis in enumerate(ROBOT.all_axes) if axis == "p"][:2]
+        return {"kind": "write", "ids": ids, "register": register, "value": rng.choice(values)}
+    if kind in ("clash", "exchange"):
         mine, other = rng.sample(ROBOT.servo_ids, 2)
+        for_s = for_s if kind == "clash" else rng.choice((0.8, 1.5))
         return {"id": mine, "takes": other, "for_s": for_s}
     if kind in TRIPS:
         return {"ids": ids}

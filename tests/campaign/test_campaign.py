@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from pytest_mock import MockerFixture
 
 from snakewalk.config.faults import FaultPlan
+from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.types import JointState
 from snakewalk.sim.line.rx_queue import RxQueue
 from tests.oracles.raw_positions import raw_positions
@@ -11,7 +13,7 @@ from tests.oracles.raw_positions import raw_positions
 from .campaign import Tally, campaign, run_scenario
 from .report import table
 from .rig import JOINTS, Rig
-from .scenarios import KINDS, SCENARIOS
+from .scenarios import CHANGES, KINDS, SCENARIOS, WRITES
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -19,6 +21,19 @@ def test_each_kind_of_fault(kind: str) -> None:
     whole, _ = campaign([((kind,), KINDS.index(kind))], cycles=80)
     assert whole.complaints == []
     assert whole.violations == 0
+
+
+@pytest.mark.parametrize("kind", CHANGES)
+def test_a_change_by_another_program_is_noticed_in_motion(kind: str) -> None:
+    tally = run_scenario((kind,), 0, 130)
+    assert tally.noticed
+    assert tally.complaints == []
+    assert tally.violations == 0
+
+
+def test_a_change_that_the_chain_does_not_notice_is_counted(mocker: MockerFixture) -> None:
+    mocker.patch.object(ServoChain, "_check_liveness")
+    assert run_scenario(("I gain",), 0, 160).unnoticed
 
 
 def test_some_pairs_of_faults() -> None:
@@ -34,7 +49,7 @@ def test_some_pairs_of_faults() -> None:
 def test_all_kinds_and_all_pairs_are_in_the_campaign() -> None:
     assert len(SCENARIOS) == 1 + len(KINDS) + len(KINDS) * (len(KINDS) - 1) // 2
     known = str(FaultPlan.model_json_schema())
-    assert all(f"'{kind}'" in known for kind in KINDS)
+    assert all(f"'{kind}'" in known for kind in {*KINDS, "write"} - {*WRITES})
 
 
 def test_the_same_seed_gives_the_same_campaign() -> None:

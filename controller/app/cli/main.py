@@ -2,6 +2,7 @@
 
 import os
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
@@ -17,6 +18,7 @@ def main() -> None:
     os.environ["MUJOCO_GL"] = "disable"
     try:
         _check_words(sys.argv[1:])
+        _tell_of_pipes(sys.argv[1:])
         from snakewalk.controller.app.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it
 
         app(prog_name="snakewalk")
@@ -55,6 +57,14 @@ def _check_words(words: list[str]) -> None:
         except UnicodeEncodeError:
             shown = word.encode(errors="surrogateescape").decode(errors="backslashreplace")
             raise InputError(f"{shown}: this name is not UTF-8; rename the file") from None
+
+
+def _tell_of_pipes(words: list[str]) -> None:
+    """Say which inputs are named pipes: to open one waits until another program writes to it."""
+    for before, word in pairwise(("", *words)):
+        own = word.startswith(("/dev/", "/proc/")) or before == "--port"  # a shell's; or refused
+        if not own and Path(word).is_fifo():
+            _print_line(f"{word}: a named pipe: waits for a program that writes to it; ^C ends")
 
 
 def _end(code: int, *lines: str) -> None:

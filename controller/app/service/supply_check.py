@@ -14,18 +14,22 @@ from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.chain.joint_codec import voltages_v
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import DriverError
-from snakewalk.drivers.protocol.registers import PWM_FULL
+from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A, PWM_FULL
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.drivers.types import JointCommand
 
-_AMPLITUDE_RAD, _FREQUENCY_HZ, _CYCLES = 0.15, 2.0, 8
-_GROWING_CYCLES = 2
+_AMPLITUDE_RAD, _FREQUENCY_HZ, _CYCLES = 0.15, 3.0, 6
+"""At most 2.8 rad/s: what a run may ask for (4 rad/s), and what the servos' motors can."""
+_GROWING_CYCLES = 3
 """At first the wiggle grows: a cable that is nearly broken is measured before an alarm ends it."""
-_PERIOD_S = 0.027
-"""No divisor in common with the 50 ms after which a simulated servo measures its voltage anew: read
-at one phase of the motion alone, the step of the current may be missed every time."""
+_PERIOD_S = 0.02
+"""As of a run at 50 Hz. With each step of the goal the motors draw most of their current within a
+few milliseconds."""
+_DELAYS_S = (1e-3, 2e-3, 3e-3, 5e-3, 8e-3)
+"""Of a reading behind a step, in turns: read at one phase alone, that current may always be missed.
+"""
 _SAG_SHARE = 0.08
 """Share of the voltage at rest that the supply may lose (ours); a walk asks for more than this."""
 _VOLTAGE_AT = 20
@@ -75,7 +79,7 @@ def supply_under_load(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -
 
 
 def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
-    """Set the chain up as a run does, wiggle all joints by up to 0.15 rad for 4 s, torque off.
+    """Set the chain up as a run does, wiggle all joints by up to 0.15 rad for 2 s, torque off.
 
     Raises:
         PortError: the port vanished, and torque could not be switched off.
@@ -101,21 +105,24 @@ def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
             for cycle in range(round(_CYCLES / _FREQUENCY_HZ / _PERIOD_S)):
                 clock.sleep_until_s(begin_s + cycle * _PERIOD_S)
                 time_s = clock.now_s()
-                state = link.read()
                 turns = _FREQUENCY_HZ * cycle * _PERIOD_S
                 size_rad = _AMPLITUDE_RAD * min(turns / _GROWING_CYCLES, 1.0)
                 goal = start.position_rad + size_rad * math.sin(math.tau * turns)
+                link.read()
                 link.write(JointCommand(time_s, goal))
+                clock.sleep_until_s(clock.now_s() + _DELAYS_S[cycle % len(_DELAYS_S)])
                 reply = block.read()
                 if reply.valid.all():
                     voltage_v.append(voltages_v(reply.data[:, _VOLTAGE_AT:]))
-                    drawn.append(drawn_a(robot, _duties(reply.data), state.current_a))
+                    drawn.append(_drawn_a(robot, reply.data))
     except DriverError as error:
         fault = error
     shape = -1, robot.joint_count
     return Wiggle(rest_v, np.array(voltage_v).reshape(shape), np.array(drawn).reshape(shape), fault)
 
 
-def _duties(blocks: Bytes) -> Floats:
-    """Present PWM (n,) of blocks that begin with it, -1 to 1."""
-    return np.asarray(np.ascontiguousarray(blocks[:, :2]).view("<i2")[:, 0] / PWM_FULL)
+def _drawn_a(robot: RobotConfig, blocks: Bytes) -> Floats:
+    """(S,) drawn from the supply, of blocks (S, B) that begin with output and current."""
+    output, current = np.ascontiguousarray(blocks[:, :4]).view("<i2").T
+    unit_a = [CURRENT_UNIT_A.get(model, math.nan) for model in robot.servo_models]
+    return drawn_a(robot, output / PWM_FULL, current * np.array(unit_a))

@@ -413,11 +413,9 @@ def test_the_doctor_names_what_is_broken(kind: Kind) -> None:
     assert named[0].remedy
 
 
-@pytest.mark.parametrize("into_s", [0.0, 0.024, 0.04])
-def test_a_supply_that_sags_is_named_at_any_phase_of_the_servos_own_measuring(
-    into_s: float,
-) -> None:
-    """Every 50 ms a servo measures its voltage; two seconds of motion missed what four have."""
+@pytest.mark.parametrize("into_s", [0.0, 0.011, 0.024, 0.04])
+def test_a_supply_that_sags_is_named_whenever_the_wiggle_begins(into_s: float) -> None:
+    """Simulated servos measured their voltage every 50 ms: half of all wiggles missed the sag."""
     line = TestLine(supply_and_ambient=SupplyAndAmbient(supply_ohm=4.0))
     line.clock.advance(0.3 + into_s)
     findings = doctor(line, Kind("", lambda line: None, "", "", wiggle=True))

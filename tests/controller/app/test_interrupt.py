@@ -1,5 +1,6 @@
 """Ctrl-C and signals: every command ends at once with exit code 130, and says what became of it."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -98,3 +99,19 @@ def test_what_is_imported_before_an_interrupt_is_caught_is_little() -> None:
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = {name.partition(".")[0] for name in found.stdout.split()}
     assert not loaded & {"typer", "rich", "pydantic", "numpy", "numba", "scipy", "mujoco"}
+
+
+def test_a_named_pipe_as_input_is_told_to_wait(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A program without a word waited for a writer until ^C."""
+    pipe = tmp_path / "track.csv"
+    os.mkfifo(pipe)
+    monkeypatch.setattr("sys.argv", ["snakewalk", "no-such-command", str(pipe)])
+    with pytest.raises(SystemExit):
+        main()
+    assert f"{pipe}: a named pipe: waits for a program that writes to it" in capsys.readouterr().err
+    monkeypatch.setattr("sys.argv", ["snakewalk", "no-such-command", "--port", str(pipe)])
+    with pytest.raises(SystemExit):
+        main()
+    assert "waits" not in capsys.readouterr().err

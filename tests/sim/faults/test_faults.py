@@ -196,6 +196,34 @@ def test_two_servos_with_one_id_garble_what_differs() -> None:
     assert read(line, 2, 24, 4) == 10
 
 
+def test_two_servos_exchange_their_ids_and_get_them_back() -> None:
+    line = scripted(fault("exchange", id=3, takes=2, for_s=1.0))
+    wait(line, 0.01)
+    assert line.ids() == [1, 3, 2, 4]
+    assert replying_ids(line) == [1, 2, 3, 4]
+    wait(line, 1.0)
+    assert line.ids() == [1, 2, 3, 4]
+
+
+def test_another_program_writes_to_a_register() -> None:
+    line = scripted(fault("write", ids=[2], register="Goal PWM", value=0, at_s=0.5))
+    assert read(line, 2, 100, 2) == 885
+    wait(line, 0.5)
+    assert (read(line, 1, 100, 2), read(line, 2, 100, 2)) == (885, 0)
+
+
+@pytest.mark.parametrize(
+    ("register", "value", "said"),
+    [
+        ("Goal Speed", 1, "fault.0.write: servo 2 has no register Goal Speed"),
+        ("Torque Enable", 300, "Torque Enable of servo 2 holds 0 to 255, not 300"),
+    ],
+)
+def test_a_write_that_cannot_be_is_refused(register: str, value: int, said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        scripted(fault("write", ids=[2], register=register, value=value))
+
+
 def test_a_cable_out_in_mid_chain_takes_all_behind_it() -> None:
     line = scripted(fault("unplug", behind=2, at_s=0.5, for_s=0.5))
     wait(line, 0.5)

@@ -85,7 +85,7 @@ def test_action_carries_out_the_registered_write(line: SimLine) -> None:
 
 
 def test_bulk_read(line: SimLine) -> None:
-    line.firmware.drive.supply_v[:] = 11.9
+    line.firmware.protection.supply(11.9)
     line.firmware.protection.temperature_c[:] = 36.0
     sent = bytes.fromhex("FF FF FD 00 FE 0D 00 92 01 90 00 02 00 02 92 00 01 00 1A 05")
     assert hexed(exchange(line, sent)) == (

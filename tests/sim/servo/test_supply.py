@@ -94,6 +94,26 @@ def test_a_cable_that_takes_nearly_all_leaves_the_chain_calm() -> None:
     assert np.ptp(np.array(seen), axis=0).max() < 0.05
 
 
+def test_the_voltage_that_a_servo_measures_follows_the_current_at_once() -> None:
+    """It was that of the last check, up to 50 ms ago: the step of a current was not to be seen."""
+    line = SimLine(
+        ServoBank([1, 2]), BenchPlant(2), supply_and_ambient=SupplyAndAmbient(supply_ohm=2.0)
+    )
+    firmware, measured = line.firmware, line.bank["Present Input Voltage"]
+    line.bank["Torque Enable"][:] = 1
+    firmware.apply_registers()
+    firmware.advance(10 * SLICE_S + 1e-3)
+    firmware.refresh()
+    rest = measured.copy()
+    line.bank["Goal Position"][:] += 300
+    firmware.apply_registers()
+    firmware.advance(10 * SLICE_S + 3e-3)
+    before_v = firmware.drive.supply_v.copy()
+    firmware.refresh()
+    assert (measured < rest - 10).all()
+    np.testing.assert_array_equal(firmware.drive.supply_v, before_v)  # to read changes nothing
+
+
 @pytest.mark.parametrize(
     ("power", "said"),
     [

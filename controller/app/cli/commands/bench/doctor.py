@@ -24,7 +24,7 @@ def doctor(
     ] = DEFAULT_RUN,
     wiggle: Annotated[
         bool,
-        typer.Option("--wiggle", help="move all joints by 0.15 rad for 4 s: does the supply sag?"),
+        typer.Option("--wiggle", help="move all joints by 0.15 rad for 2 s: does the supply sag?"),
     ] = False,
     as_json: Json = False,
 ) -> None:
