@@ -140,7 +140,9 @@ def _forward(
     ``centres`` holds the centres of the links and, last, that of their mass.
     """
     links = len(rotation)
-    rotation[0] = head_rotation
+    for i in range(3):
+        for j in range(3):  # numba compiles a whole row's assignment for four seconds
+            rotation[0, i, j] = head_rotation[i, j]
     x, y, z = head_m[0], head_m[1], head_m[2]
     whole = weight[0]
     sum_x, sum_y, sum_z = whole * x, whole * y, whole * z
