@@ -22,12 +22,18 @@ class IdDirectory:
         """(S,) servos that receive and obey but whose replies are lost."""
         self.rows = np.full(256, NOBODY, np.intp)
         """(256,) row of each ID that belongs to one servo, which replies; else a constant above."""
+        self._looked_up = b""
         self._first: dict[int, list[int]] = {}
         self._second: dict[int, list[int]] = {}
 
     def refresh(self, baud: int, powered: NDArray[np.bool_]) -> None:
         """Look up the servos again, after IDs, baud rates or power have changed."""
         bank = self._bank
+        columns = (bank["ID"], bank["Secondary(Shadow) ID"], bank["Baud Rate"], powered, self.mute)
+        now = baud.to_bytes(4, "little") + b"".join(column.tobytes() for column in columns)
+        if now == self._looked_up:
+            return
+        self._looked_up = now
         first, second = defaultdict(list), defaultdict(list)
         for row in bank.tuned_to(baud):
             if not powered[row]:
