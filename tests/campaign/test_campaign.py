@@ -25,7 +25,7 @@ def test_each_kind_of_fault(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", CHANGES)
 def test_a_change_by_another_program_is_noticed_in_motion(kind: str) -> None:
-    tally = run_scenario((kind,), 0, 130)
+    tally = run_scenario((kind,), 1, 130)
     assert tally.noticed
     assert tally.complaints == []
     assert tally.violations == 0
