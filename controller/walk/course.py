@@ -1,8 +1,9 @@
 """The course: the path in force through the waypoints, and how far the body has come on it.
 
-A waypoint counts when the body's centre is near it. Where the body passes by one, is half its
-length off the path, or stands still, another path is planned from its head, in its direction, off
-the places where it stood still. Other waypoints may be set while the body is on its way.
+A waypoint counts when the body's centre is near it. Where the body passes by one, is three quarters
+of its length off the path, or stands still, another path is planned from its head, in its
+direction, off the places where it stood still. Other waypoints may be set while the body is on its
+way.
 """
 
 import math
@@ -18,7 +19,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.terrain.path import SplinePath
 
-_OFF_PATH_BODIES = 0.5
+_OFF_PATH_BODIES = 0.75
 # Body lengths of travel before another path may be planned: turning back takes about as much.
 _REPLAN_AFTER_BODIES = 2.0
 # A body that gains less than this on its path over so much travel stands still.

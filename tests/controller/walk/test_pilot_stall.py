@@ -38,7 +38,8 @@ def test_a_body_that_stands_still_gets_a_path_that_keeps_off_the_place() -> None
     ("beside_m", "ahead_m", "why"),
     [
         (0.3, 0.0, None),
-        (0.8, 0.0, "0.80 m off the path"),
+        (0.8, 0.0, None),
+        (1.0, 0.0, "1.00 m off the path"),
         (0.4, 0.5, "waypoint 1 passed by"),
     ],
 )
