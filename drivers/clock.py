@@ -20,11 +20,12 @@ class WallClock:
     """Real time, monotonic, zero at creation."""
 
     def __init__(self) -> None:
-        self._zero_s = time.monotonic()
+        self.zero_s = time.monotonic()
+        """Its zero, in the time of the machine's monotonic clock."""
 
     def now_s(self) -> float:
         """Seconds since creation."""
-        return time.monotonic() - self._zero_s
+        return time.monotonic() - self.zero_s
 
     def sleep_until_s(self, time_s: float) -> None:
         """Sleep until ``time_s``."""

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Bools
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
+from snakewalk.drivers.bus.line_reservation import LineReservation
 from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.port.byte_port import BytePort, DescriptorPort
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
@@ -70,6 +71,7 @@ class ControlCycle:
         fast: bool = True,
         latency_s: float = 0.004,
         pending: PendingReplies | None = None,
+        line: LineReservation | None = None,
         spin_s: float = SPIN_S,
     ) -> None:
         """Prepare the packets.
@@ -84,6 +86,7 @@ class ControlCycle:
             latency_s: how long adapter and driver may hold bytes back, at most.
             pending: pending replies of this port, shared by all who send requests on it; None: only
                 this cycle does.
+            line: what this port's line carries, shared likewise.
             spin_s: on a device, sleep until so long before the reply should be complete, then poll
                 without sleeping, at most twice as long: shorter cycles, more CPU; 0: always sleep.
 
@@ -102,17 +105,23 @@ class ControlCycle:
         self._clean_in_a_row = 0
         self._pending = pending if pending is not None else PendingReplies(port.clock)
         self._missed = np.zeros(len(ids), np.intp)
-        self._sent_until_s = port.clock.now_s()
+        self._line = line if line is not None else LineReservation(port.clock)
         self._default_request = GroupReadRequest(ids, read_address, read_bytes, fast=fast)
-        if isinstance(port, DescriptorPort) and port.descriptor is not None and _IS_LINUX:
+        if (
+            isinstance(port, DescriptorPort)
+            and port.descriptor is not None
+            and self._line.zero_s is not None
+            and _IS_LINUX
+        ):
             from snakewalk.drivers.bus.serial_fast_path import SerialFastPath  # noqa: PLC0415  its loops call Linux
 
+            packets = self._goals, self._default_request
             self._fast_path = SerialFastPath(
-                port, self._goals, self._default_request, latency_s=latency_s, spin_s=spin_s
+                port, *packets, self._line, latency_s=latency_s, spin_s=spin_s
             )
         self._awaited: tuple[GroupReadRequest, tuple[int, ...], SerialFastPath | float] = (
             *(self._default_request, self._default_order),
-            self._sent_until_s,
+            port.clock.now_s(),
         )
         """Request whose reply is awaited, its order, and what receives it, else until when."""
         self.fast = fast
@@ -130,9 +139,7 @@ class ControlCycle:
 
         After a read: how old its values are at most, as no servo measures before it was asked.
         """
-        if self._fast_path is not None:
-            return self._fast_path.since_sent_s
-        return max(0.0, self._port.clock.now_s() - self._sent_until_s)
+        return self._line.since_sent_s
 
     def write_goals(self, goals: NDArray[np.int32]) -> None:
         """Send raw goals (N,); servos do not reply to a sync write."""
@@ -249,21 +256,18 @@ class ControlCycle:
             self._requests[key] = request
         return request
 
-    def _send(self, packet: bytes) -> None:
-        """Write, and note when the bytes will have left the host (a write does not wait for it)."""
-        now_s, wire_s = self._port.clock.now_s(), self._wire_s(len(packet))
-        if self._fast_path is None:
-            self._sent_until_s = max(now_s, self._sent_until_s) + wire_s
-        else:
-            self._sent_until_s = now_s + self._fast_path.reserve_line(wire_s)
+    def _send(self, packet: bytes) -> float:
+        """Write; when the bytes will have left the host (a write does not wait for it)."""
+        free_s = self._line.reserve(self._wire_s(len(packet)))
         self._port.write(packet)
+        return free_s
 
     def _begin_read(self, request: GroupReadRequest, goals: NDArray[np.int32] | None) -> float:
         """Send a request; until when its reply is awaited."""
         goal_packet = b"" if goals is None else self._goals.encode(goals)
         self._port.clearPort()
-        self._send(goal_packet + request.packet)
-        return self._sent_until_s + self._wire_s(request.reply_bytes) + self._latency_s
+        free_s = self._send(goal_packet + request.packet)
+        return free_s + self._wire_s(request.reply_bytes) + self._latency_s
 
     def _receive_rest(
         self, request: GroupReadRequest, raw: bytes, remaining_s: float

@@ -18,6 +18,7 @@ from typing import TypeVar
 import dynamixel_sdk as sdk
 
 from snakewalk.drivers.bus.control_cycle import ControlCycle
+from snakewalk.drivers.bus.line_reservation import LineReservation
 from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.bus.probe import Probe, probe
 from snakewalk.drivers.bus.register_io import check_accepted, read_register, write_register
@@ -26,6 +27,7 @@ from snakewalk.drivers.port.byte_port import BytePort, reopen
 from snakewalk.drivers.protocol.control_table import ControlTable, Register, load_control_table
 from snakewalk.drivers.protocol.packet import (
     ALERT,
+    BITS_PER_BYTE,
     BROADCAST_ID,
     Instruction,
     InstructionPacket,
@@ -86,7 +88,7 @@ class DynamixelBus:
         self.latency_s = latency_s
         """How long adapter and driver may hold bytes back (FTDI: its latency timer)."""
         self._tries = max(1, tries)
-        self._pending = PendingReplies(port.clock)
+        self._pending, self._line = PendingReplies(port.clock), LineReservation(port.clock)
         self._sdk = sdk.PacketHandler(2.0)
 
     @property
@@ -213,7 +215,9 @@ class DynamixelBus:
 
     def _read(self, servo_id: int, register: Register) -> bytes:
         return self._retry(
-            lambda: read_register(self.port, servo_id, register, self.latency_s, self._pending)
+            lambda: read_register(
+                *(self.port, servo_id, register, self.latency_s, self._pending, self._line)
+            )
         )
 
     def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
@@ -229,7 +233,7 @@ class DynamixelBus:
         data = register.encode(value)
         self._retry(
             lambda: write_register(
-                self.port, servo_id, register, data, self.latency_s, self._pending
+                *(self.port, servo_id, register, data, self.latency_s, self._pending, self._line)
             ),
             tries,
         )
@@ -245,8 +249,9 @@ class DynamixelBus:
         data = register.encode(value)
         params = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
         params += b"".join(bytes([servo_id]) + data for servo_id in servo_ids)
-        packet = InstructionPacket(BROADCAST_ID, Instruction.SYNC_WRITE, params)
-        self.port.write(encode_instruction(packet))
+        raw = encode_instruction(InstructionPacket(BROADCAST_ID, Instruction.SYNC_WRITE, params))
+        self._line.reserve(len(raw) * BITS_PER_BYTE / self.port.getBaudRate())
+        self.port.write(raw)
 
     def write_verified(self, servo_id: int, name: str, value: int) -> None:
         """Write a register if it differs, and read it back: EEPROM wears out, and writes get lost.
@@ -311,6 +316,7 @@ class DynamixelBus:
             fast=fast,
             latency_s=self.latency_s,
             pending=self._pending,
+            line=self._line,
         )
 
     def device_block(self, device_id: int, address: int, length: int) -> ControlCycle:
@@ -323,6 +329,7 @@ class DynamixelBus:
             fast=False,
             latency_s=self.latency_s,
             pending=self._pending,
+            line=self._line,
         )
 
     def table_of(self, servo_id: int) -> ControlTable:

@@ -1,6 +1,7 @@
 """Reading and writing one register of one servo, with a strict codec in place of the SDK's."""
 
 from snakewalk.drivers.bus.budget import STATUS_BYTES
+from snakewalk.drivers.bus.line_reservation import LineReservation
 from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.errors import BusError, NoAnswerError, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
@@ -21,7 +22,12 @@ _REPLY_S = 0.034
 
 
 def read_register(
-    port: BytePort, servo_id: int, register: Register, latency_s: float, pending: PendingReplies
+    port: BytePort,
+    servo_id: int,
+    register: Register,
+    latency_s: float,
+    pending: PendingReplies,
+    line: LineReservation,
 ) -> bytes:
     """Bytes of a register.
 
@@ -40,7 +46,7 @@ def read_register(
     span = register.address.to_bytes(2, "little") + length.to_bytes(2, "little")
     packet = InstructionPacket(servo_id, Instruction.READ, span)
     try:
-        status = _exchange(port, packet, what, length, latency_s, pending)
+        status = _exchange(port, packet, what, length, latency_s, pending, line)
     except NoAnswerError:
         pending.add([servo_id], length, fast=False)
         raise
@@ -56,6 +62,7 @@ def write_register(
     data: bytes,
     latency_s: float,
     pending: PendingReplies,
+    line: LineReservation,
 ) -> None:
     """Write ``data`` to a register.
 
@@ -66,7 +73,7 @@ def write_register(
     """
     params = register.address.to_bytes(2, "little") + data
     packet = InstructionPacket(servo_id, Instruction.WRITE, params)
-    _exchange(port, packet, f"write {register.name}", 0, latency_s, pending)
+    _exchange(port, packet, f"write {register.name}", 0, latency_s, pending, line)
 
 
 def check_accepted(servo_id: int, what: str, error: int) -> None:
@@ -85,13 +92,15 @@ def _exchange(
     data_bytes: int,
     latency_s: float,
     pending: PendingReplies,
+    line: LineReservation,
 ) -> StatusPacket:
     reader = PacketParser()
     raw, expected = encode_instruction(packet), STATUS_BYTES + data_bytes
+    byte_s = BITS_PER_BYTE / port.getBaudRate()
     port.clearPort()
+    free_s = line.reserve(len(raw) * byte_s)
     port.write(raw)
-    wire_s = (len(raw) + expected) * BITS_PER_BYTE / port.getBaudRate()
-    deadline_s = port.clock.now_s() + wire_s + _REPLY_S + latency_s
+    deadline_s = free_s + expected * byte_s + _REPLY_S + latency_s
     missing = expected
     while data := port.read_until(missing, deadline_s):
         for reply in reader.feed(data):

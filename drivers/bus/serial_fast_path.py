@@ -5,12 +5,13 @@ arrived, and ``ControlCycle`` continues with it.
 """
 
 import numpy as np
-from numba import boolean, int32, int64, intp, types, uint8, uintp
+from numba import boolean, float64, int32, int64, intp, types, uint8, uintp
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bytes
+from snakewalk.config.arrays import Bytes, Floats
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
+from snakewalk.drivers.bus.line_reservation import LineReservation
 from snakewalk.drivers.compiling import compiled
 from snakewalk.drivers.port.byte_port import DescriptorPort
 from snakewalk.drivers.port.serial_wait import now_ns, receive, send
@@ -23,9 +24,9 @@ _BYTE_NS_BAUD = 10_000_000_000
 
 LATENCY_ESTIMATE = 0
 """In a plan, 2 numbers: from ``new_latency_estimate``."""
-FREE_NS, BEGUN_NS, REMAINING_NS = 2, 3, 4
-"""When all sent bytes have left the line; when the request was sent; how long the reply of an
-irregular cycle may still take."""
+ZERO_NS, BEGUN_NS, REMAINING_NS = 2, 3, 4
+"""Zero of the port's clock; when the request was sent; how long the reply of an irregular cycle may
+still take."""
 WRITE_BYTES, REQUEST_BYTES, HEADS_END, IDS_END, ERROR_END = 5, 6, 7, 8, 9
 """Length of the sync write and of the request behind it; where in ``work`` the expected heads of
 the replies end, the IDs, and the error bytes. The reply stands behind them."""
@@ -40,15 +41,17 @@ _write = types.ExternalFunction("write", intp(int32, intp, uintp))
 _ROW, _ROWS = uint8[::1], uint8[:, ::1]
 
 
-@compiled(int64(int64[::1], int64, int64))
-def _reserve_line(plan: NDArray[np.int64], from_ns: int, wire_ns: int) -> int:
-    """Note what was sent at ``from_ns``; returns how long until it has left the line, ns."""
-    plan[FREE_NS] = max(from_ns, plan[FREE_NS]) + wire_ns
-    return int(plan[FREE_NS] - from_ns)
+@compiled(int64(float64[::1], int64, int64))
+def _reserve_line(free_s: Floats, from_ns: int, wire_ns: int) -> int:
+    """Note what was sent at ``from_ns`` on the port's clock; how long until it has left, ns."""
+    free_s[0] = max(from_ns * 1e-9, free_s[0]) + wire_ns * 1e-9
+    return int(free_s[0] * 1e9) - from_ns
 
 
-@compiled(int64(int32, _ROW, int32[::1], int64[::1]))
-def _send_goals(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64]) -> int:
+@compiled(int64(int32, _ROW, int32[::1], int64[::1], float64[::1]))
+def _send_goals(
+    fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64], free_s: Floats
+) -> int:
     """Fill ``values`` into the sync write and send it; returns how many bytes were taken.
 
     None are taken where the frame must be stuffed, or the device is gone or full.
@@ -59,7 +62,7 @@ def _send_goals(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[n
     begun_ns = now_ns()
     sent = max(0, int(_write(fd, frame.ctypes.data, len(frame))))
     if sent > 0:
-        _reserve_line(plan, begun_ns, plan[WRITE_NS])
+        _reserve_line(free_s, begun_ns - plan[ZERO_NS], plan[WRITE_NS])
     return sent
 
 
@@ -79,8 +82,15 @@ def _send_request(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray
     return int(send(fd, work[begin:end]))
 
 
-@compiled(int64(int32, _ROW, _ROWS, boolean, int64[::1]), nogil=True)
-def _receive(fd: int, work: Bytes, data: Bytes, with_goals: bool, plan: NDArray[np.int64]) -> int:
+@compiled(int64(int32, _ROW, _ROWS, boolean, int64[::1], float64[::1]), nogil=True)
+def _receive(
+    fd: int,
+    work: Bytes,
+    data: Bytes,
+    with_goals: bool,
+    plan: NDArray[np.int64],
+    free_s: Floats,
+) -> int:
     """Wait for the reply and decode it.
 
     Args:
@@ -89,6 +99,7 @@ def _receive(fd: int, work: Bytes, data: Bytes, with_goals: bool, plan: NDArray[
         data: (N, length) filled, unless irregular.
         with_goals: whether the request was sent behind goals.
         plan: (``PLAN_SIZE``,) the numbers above.
+        free_s: (1,) of the line's ``LineReservation``.
 
     Returns:
         What the frame reader says of a complete reply; ``-1 - n``: only ``n`` bytes arrived.
@@ -97,7 +108,7 @@ def _receive(fd: int, work: Bytes, data: Bytes, with_goals: bool, plan: NDArray[
     begun_ns, wire_ns = int(plan[BEGUN_NS]), int(plan[REQUEST_NS])
     if with_goals:
         wire_ns += int(plan[WRITE_NS])
-    least_ns = _reserve_line(plan, begun_ns, wire_ns) + int(plan[REPLY_NS])
+    least_ns = _reserve_line(free_s, begun_ns - plan[ZERO_NS], wire_ns) + int(plan[REPLY_NS])
     wait_ns = least_ns + int(plan[LATENCY_NS])
     request_end = int(plan[WRITE_BYTES] + plan[REQUEST_BYTES])
     heads_end, ids_end, error_end = plan[HEADS_END], plan[IDS_END], plan[ERROR_END]
@@ -125,6 +136,7 @@ class SerialFastPath:
         port: DescriptorPort,
         goals: GroupWrite,
         request: GroupReadRequest,
+        line: LineReservation,
         *,
         latency_s: float,
         spin_s: float,
@@ -135,11 +147,12 @@ class SerialFastPath:
             port: with a descriptor.
             goals: the sync write of ``write`` and ``transact``.
             request: the group read.
+            line: of the port, whose clock is a ``WallClock``.
             latency_s: how long adapter and driver may hold bytes back, at most.
             spin_s: argument of ``ControlCycle``.
 
         """
-        self._port, self._request = port, request
+        self._port, self._request, self._free_s = port, request, line.free_s
         count = len(request.ids)
         self._values = np.zeros(count, np.int32)
         self._shape = (count, request.length)
@@ -154,19 +167,10 @@ class SerialFastPath:
         self._plan = np.zeros(PLAN_SIZE, np.int64)
         self._plan[WRITE_BYTES], self._plan[REQUEST_BYTES] = ends[0], ends[1] - ends[0]
         self._plan[HEADS_END : ERROR_END + 1] = ends[2], ends[3], reply_at
-        self._plan[FAST] = request.fast
+        self._plan[ZERO_NS], self._plan[FAST] = (line.zero_s or 0.0) * 1e9, request.fast
         self._plan[LATENCY_NS], self._plan[SPIN_NS] = latency_s * 1e9, spin_s * 1e9
         self._baud = 0
         self._awaited = -1, False
-
-    def reserve_line(self, wire_s: float) -> float:
-        """Note that something else is sent now; returns how long until all has left the line, s."""
-        return float(_reserve_line(self._plan, now_ns(), int(wire_s * 1e9)) * 1e-9)
-
-    @property
-    def since_sent_s(self) -> float:
-        """How long ago all that was sent had left the line; 0 while it is still on it."""
-        return max(0, now_ns() - int(self._plan[FREE_NS])) * 1e-9
 
     @property
     def remaining_s(self) -> float:
@@ -182,7 +186,7 @@ class SerialFastPath:
             self._update_wire_times()
         values = self._values
         values[:] = goals
-        return int(_send_goals(fd, self._work, values, self._plan))
+        return int(_send_goals(fd, self._work, values, self._plan, self._free_s))
 
     def begin(self, goals: NDArray[np.int32] | None) -> bool:
         """Send the request, behind ``goals`` (N,) if there are any; False if nothing was sent.
@@ -220,7 +224,7 @@ class SerialFastPath:
             self._update_wire_times()
         data = np.empty(self._shape, np.uint8)
         reply = self._request.regular(FLAWLESS, data, self._error)
-        found = _receive(fd, self._work, data, with_goals, self._plan)
+        found = _receive(fd, self._work, data, with_goals, self._plan, self._free_s)
         if found == FLAWLESS:
             return reply
         if found > IRREGULAR:

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats, Int32s, Ints
+from snakewalk.config.arrays import Floats, Int32s
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.budget import WireBudget, robot_budget
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
@@ -29,6 +30,7 @@ from snakewalk.drivers.chain.start_up import (
 )
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import BusError, ChainError, PortError
+from snakewalk.drivers.protocol.control_table import Register
 from snakewalk.drivers.protocol.registers import (
     WATCHDOG_TICKS_MAX,
     WATCHDOG_TRIPPED,
@@ -436,18 +438,19 @@ class ServoChain:
         return goals
 
     def _expect(self, name: str, values: Sequence[int]) -> None:
-        """Read a register of all servos, and compare; who is not in the reply is asked again."""
-        bus, ids = self._bus, self.robot.servo_ids
-        reply = bus.block(ids, name, name, fast=False).read()
-        for joint, (servo_id, value) in enumerate(zip(ids, values, strict=True)):
-            got = (
-                bus.table_of(servo_id)[name].decode(reply.data[joint].tobytes())
-                if reply.valid[joint]
-                else bus.read(servo_id, name)
+        """Compare a register of all servos with what was written to it.
+
+        Raises:
+            BusError: a servo holds something else, or does not reply.
+
+        """
+        expected = dict(enumerate(values))
+        check = RegisterCheck.of(self._bus, self.robot, name, expected, fast=False)
+        for joint, got in check.differing(ask_again=self._bus).items():
+            raise BusError(
+                f"{self.robot.joint_name(joint)}: {name} is {got} after {expected[joint]} was "
+                "written to all"
             )
-            if got != value:
-                joint_name = self.robot.joint_name(joint)
-                raise BusError(f"{joint_name}: {name} is {got} after {value} was written to all")
 
     def _first_state(self) -> JointState:
         for _ in range(_FIRST_READS):
@@ -493,17 +496,11 @@ class LivenessCheck:
         """
         self._robot = robot
         joints = range(robot.joint_count)
-
-        def read(register: str, expected: Mapping[int, int]) -> _RegisterCheck:
-            ids = [robot.servo_ids[joint] for joint in expected]
-            cycle = bus.block(ids, register, register, fast=fast)
-            values = np.array(list(expected.values()))
-            return _RegisterCheck(register, cycle, tuple(expected), values)
-
+        read = partial(RegisterCheck.of, bus, robot, fast=fast)
         self._torque = read("Torque Enable", dict.fromkeys(joints, 1))
         self._watchdog = read("Bus Watchdog", dict.fromkeys(joints, watchdog_ticks))
 
-        def kept(registers: Iterable[str]) -> "list[_RegisterCheck]":
+        def kept(registers: Iterable[str]) -> "list[RegisterCheck]":
             held = {
                 register: {j: v[register] for j, v in sorted(configured.items()) if register in v}
                 for register in registers
@@ -541,17 +538,15 @@ class LivenessCheck:
         if check is None:
             return None
         self._judge(check)
-        return check.cycle if len(check.joints) == self._robot.joint_count else None
+        return check.cycle if len(check.ids) == self._robot.joint_count else None
 
-    def _judge(self, check: "_RegisterCheck") -> None:
-        reply = check.cycle.read()
-        values = sum(reply.data[:, k].astype(np.int64) << 8 * k for k in range(reply.data.shape[1]))
-        bad = np.flatnonzero(reply.valid & (values != check.expected))
-        if not len(bad):
+    def _judge(self, check: "RegisterCheck") -> None:
+        differing = check.differing()
+        if not differing:
             return
-        value = int(np.asarray(values)[bad[0]])
+        joint, value = next(iter(differing.items()))
         if check is self._identity:
-            other = identity_fault(self._robot, check.joints[bad[0]], value)
+            other = identity_fault(self._robot, joint, value)
             if other is not None:
                 raise BusError(other)
         if check is self._torque:
@@ -560,19 +555,60 @@ class LivenessCheck:
             what = "its bus watchdog has stopped it"
         else:
             what = (
-                f"{check.register} is {value}, not {check.expected[bad[0]]}: has it rebooted, or "
-                "does another program write to it?"
+                f"{check.register.name} is {value}, not {check.expected[joint]}: has it rebooted, "
+                "or does another program write to it?"
             )
-        which = ", ".join(self._robot.joint_name(check.joints[k]) for k in bad)
-        raise BusError(f"{which}: {what}")
+        raise BusError(f"{', '.join(map(self._robot.joint_name, differing))}: {what}")
 
 
 @dataclass(frozen=True, slots=True)
-class _RegisterCheck:
+class RegisterCheck:
     """Group read of one register, and what it must return."""
 
-    register: str
+    register: Register
     cycle: GroupCycle
-    joints: tuple[int, ...]
-    expected: Ints
-    """(N,) of these joints."""
+    ids: tuple[int, ...]
+    expected: Mapping[int, int]
+    """By joint, in the order of ``ids``."""
+
+    @classmethod
+    def of(
+        cls,
+        bus: ChainBus,
+        robot: RobotConfig,
+        name: str,
+        expected: Mapping[int, int],
+        *,
+        fast: bool,
+    ) -> "RegisterCheck":
+        """Prepare the read of a register of some joints' servos."""
+        ids = tuple(robot.servo_ids[joint] for joint in expected)
+        cycle = bus.block(ids, name, name, fast=fast)
+        return cls(bus.table_of(ids[0]).register(name), cycle, ids, dict(expected))
+
+    def differing(self, ask_again: ChainBus | None = None) -> dict[int, int]:
+        """Read the register; the values that are not as expected, by joint.
+
+        Args:
+            ask_again: asks those that are not in the reply one by one; without it they are not
+                judged.
+
+        Raises:
+            BusError: one that is asked again does not reply.
+            PortError: the port is gone.
+
+        """
+        reply, register = self.cycle.read(), self.register
+        kind = f"<{'i' if register.signed else 'u'}{register.size}"
+        values = np.ascontiguousarray(reply.data).view(kind)[:, 0]
+        found = {}
+        for place, (joint, expected) in enumerate(self.expected.items()):
+            if reply.valid[place]:
+                got = int(values[place])
+            elif ask_again is not None:
+                got = ask_again.read(self.ids[place], register.name)
+            else:
+                continue
+            if got != expected:
+                found[joint] = got
+        return found

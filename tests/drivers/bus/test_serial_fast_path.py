@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
+from snakewalk.drivers.bus.line_reservation import LineReservation
 from snakewalk.drivers.bus.serial_fast_path import REPLY_NS, WRITE_NS, SerialFastPath
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.serial_port import SerialPort
@@ -87,9 +88,9 @@ def echo(packet: InstructionPacket, goal: int) -> bytes:
 def fast_path(
     servos: Servos, *, is_fast: bool, latency_s: float = FAR_S, spin_s: float = 4e-5
 ) -> SerialFastPath:
-    request = GroupReadRequest(IDS, 126, 10, fast=is_fast)
+    request, line = GroupReadRequest(IDS, 126, 10, fast=is_fast), LineReservation(servos.port.clock)
     return SerialFastPath(
-        servos.port, GroupWrite(IDS, 116), request, latency_s=latency_s, spin_s=spin_s
+        servos.port, GroupWrite(IDS, 116), request, line, latency_s=latency_s, spin_s=spin_s
     )
 
 

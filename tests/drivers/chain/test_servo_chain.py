@@ -190,6 +190,22 @@ def test_who_is_missing_in_the_reply_of_all_is_asked_alone(
     assert {p.params[0] for p in line.heard if p.instruction == Instruction.READ} >= {64, 98, 116}
 
 
+def test_a_slow_line_has_time_to_carry_what_was_written_before_a_read() -> None:
+    """The time of a group read began while the goals before it were still on the line."""
+    robot = RobotConfig(name="sixteen", joint_axes="y" * 16)
+    line = Recorder(ServoBank(robot.servo_ids, baud=57_600), [0.0] * 16)
+    line.setBaudRate(57_600)
+    chain = ServoChain(DynamixelBus(line), robot)
+    chain.enable()
+    chain.disable()
+    alone = [
+        (packet.servo_id, int.from_bytes(packet.params[:2], "little"))
+        for packet in line.heard
+        if packet.instruction == Instruction.READ
+    ]
+    assert not [read for read in alone if read[1] in (64, 98, 116)]
+
+
 def test_all_faults_of_a_chain_at_once(line: Recorder, chain: ServoChain) -> None:
     line.bank["ID"][1] = 77
     line.bank["Model Number"][2] = 1030
