@@ -1,6 +1,8 @@
 """``python -m tests.campaign``: all of it; writes the table in ``docs/campaign.md``."""
 
 import argparse
+import shlex
+import sys
 from itertools import count
 from pathlib import Path
 
@@ -19,24 +21,27 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--cycles", type=int, default=100_000, help="at least so many in all")
     options.add_argument("--each", type=int, default=240, help="cycles a scenario")
+    options.add_argument("--first-seed", type=int, default=0, help="of the first round")
     options.add_argument("--doc", type=Path, default=DOC, help="file with the table")
     options.add_argument("--alone", action="store_true", help="no pairs; changes no page")
     given = options.parse_args()
     scenarios = [kinds for kinds in SCENARIOS if len(kinds) < 2] if given.alone else SCENARIOS
     rounds = -(-given.cycles // (given.each * len(scenarios)))
-    jobs = [(kinds, seed) for seed in range(rounds) for kinds in scenarios]
+    end = given.first_seed + rounds
+    jobs = [(kinds, seed) for seed in range(given.first_seed, end) for kinds in scenarios]
     with Progress(console=Console(stderr=True)) as progress:
         bar = progress.add_task("fault campaign", total=len(jobs))
         whole, by_kind = campaign(jobs, given.each, lambda: progress.advance(bar))
     # scenarios that end early are made up for
-    for seed in count(rounds):
+    for seed in count(end):
         if whole.cycles >= given.cycles:
             break
         more, by_more = campaign([(kinds, seed) for kinds in scenarios], given.each)
         whole.add(more)
         for kind, tally in by_more.items():
             by_kind[kind].add(tally)
-    shown = table(whole, by_kind)
+    command = shlex.join(["python", "-m", "tests.campaign", *sys.argv[1:]])
+    shown = f"    {command}\n\n{table(whole, by_kind)}"
     print(shown)
     for line in whole.complaints[:40]:
         print(line)

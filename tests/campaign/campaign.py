@@ -48,8 +48,10 @@ class Tally:
     too_long: int = 0
     """Cycles that took longer than ``LONGEST_CYCLE_S`` of simulated time."""
     noticed: int = 0
-    """Changes of a servo's registers, or exchanges of IDs, after which the chain stopped."""
+    """Changes of a joint's register, or ID, that the chain has named."""
     unnoticed: int = 0
+    ended_otherwise: int = 0
+    """Changes that nothing named before a trip or a recovery that had another reason."""
     false_alarms: int = 0
     """Trips that name such a change in a scenario that has none."""
     complaints: list[str] = field(default_factory=list)
@@ -110,7 +112,8 @@ def run_scenario(kinds: tuple[str, ...], seed: int, cycles: int) -> Tally:
             tally.too_long += clock.now_s() - started_s > LONGEST_CYCLE_S
         next_s = max(next_s + PERIOD_S, clock.now_s())
     tally.brought_back = rig.link.recoveries
-    tally.noticed, tally.unnoticed = rig.changes.noticed, rig.changes.unnoticed
+    for name in ("noticed", "unnoticed", "ended_otherwise"):
+        setattr(tally, name, getattr(rig.changes, name))
     for name in ("beyond_limit", "too_fast", "old", "foreign", "not_held"):
         setattr(tally, name, getattr(rig.witness, name))
     tally.complaints += [f"{kinds} {seed}: {line}" for line in rig.witness.complaints]

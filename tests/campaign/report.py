@@ -17,7 +17,8 @@ _COLUMNS = {
     "foreign": "another's",
     "not_held": "not held",
     "too_long": "hangs",
-    "noticed": "changes noticed",
+    "noticed": "changes named",
+    "ended_otherwise": "ended otherwise",
     "unnoticed": "unnoticed",
     "false_alarms": "false alarms",
 }

@@ -14,6 +14,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import SLOW_EVERY, ServoChain
+from snakewalk.drivers.chain.start_up import IDENTITY
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.drivers.protocol.registers import ServoUnits
@@ -70,51 +71,91 @@ def rows_by_id(bank: ServoBank) -> np.ndarray | None:
     return np.array([ids.index(servo) for servo in ROBOT.servo_ids])
 
 
+Change = tuple[tuple[int, ...], str]
+"""A joint, and the register of its servo that is not as the chain has set it; or joints whose
+servos have exchanged IDs, and ``IDENTITY``."""
+
+
 class ChangeWatch:
     """Whether a chain notices that registers of its servos are not as it has set them.
 
-    A change counts while torque is on and the servo is read; noticed is one that ends a run, or
-    that a recovery mends, before ``NOTICED_CYCLES`` such cycles have passed.
+    A change counts while torque is on and the servo is read. It is noticed where what the chain
+    says names joint and register, before ``NOTICED_CYCLES`` such cycles have passed; an end for
+    another reason is none.
     """
 
     def __init__(self, chain: ServoChain, bank: ServoBank) -> None:
+        self.lines: list[str] = []
+        """What the chain and its recovery have said since the last cycle."""
         self._chain, self._bank = chain, bank
-        self._cycles = np.zeros(JOINTS, np.intp)
-        self._recoveries, self._pending = 0, False
-        self.noticed = self.unnoticed = 0
+        self._cycles: dict[Change, int] = {}
+        self._pending: set[Change] = set()
+        self._recoveries = 0
+        self.noticed = self.unnoticed = self.ended_otherwise = 0
+        chain.on_event = self.lines.append
+        check = chain._check_liveness
+
+        def watched() -> None:
+            self._pending |= self._changed()
+            check()
+
+        chain._check_liveness = watched  # type: ignore[method-assign]
 
     def restart(self) -> None:
         """Begin anew: the chain has been set up."""
-        self._cycles[:] = 0
-        self._pending = False
+        self._cycles.clear()
+        self._pending.clear()
+        self.lines.clear()
 
     def look(self, valid: np.ndarray, link: SafeLink) -> None:
         """Count what has changed, after a cycle; ``valid`` (J,) which joints were read."""
         if link.tripped is not None or link.recoveries != self._recoveries:
             self.end(link)
         changed = self._changed()
-        self._cycles[~changed] = 0
-        self._cycles[changed & valid] += 1
-        late = self._cycles == NOTICED_CYCLES
-        self.unnoticed += int(late.sum())
-        self._pending = bool(changed.any()) and not late.any()
+        self._cycles = {
+            each: self._cycles.get(each, 0) + bool(valid[list(each[0])].any()) for each in changed
+        }
+        self.unnoticed += sum(count == NOTICED_CYCLES for count in self._cycles.values())
+        self._pending = {each for each in changed if self._cycles[each] < NOTICED_CYCLES}
+        self.lines.clear()
 
     def end(self, link: SafeLink) -> None:
-        """Count a change that there was when the link latched, or was brought back."""
-        self.noticed += self._pending
+        """Count the changes that there were when the link latched, or was brought back."""
+        lines = [*self.lines, link.tripped or ""]
+        for change in self._pending:
+            if any(self._is_named(change, line) for line in lines):
+                self.noticed += 1
+            else:
+                self.ended_otherwise += 1
         self.restart()
         self._recoveries = link.recoveries
 
-    def _changed(self) -> np.ndarray:
-        """(J,) of the servos that have the joints' IDs; none where two have one."""
+    def _is_named(self, change: Change, line: str) -> bool:
+        joints, register = change
+        # of exchanged servos, registers are another joint's, too
+        whats = ("exchanged", "another program") if register == IDENTITY else (register,)
+        names = map(ROBOT.joint_name, joints)
+        return any(name in line for name in names) and any(what in line for what in whats)
+
+    def _changed(self) -> set[Change]:
+        """Those of the servos that have the joints' IDs; none where two have one."""
         bank, rows = self._bank, rows_by_id(self._bank)
         if rows is None:
-            return np.zeros(JOINTS, bool)
-        changed = bank["Bus Watchdog"][rows] != self._chain._watchdog_ticks
-        for joint, values in self._chain._configured.items():
+            return set()
+        found: set[Change] = set()
+        exchanged = []
+        for joint in np.flatnonzero(bank["Torque Enable"][rows] == 1).tolist():
+            expected = {**self._chain._configured.get(joint, {})}
+            expected["Bus Watchdog"] = self._chain._watchdog_ticks
             row = rows[joint]
-            changed[joint] |= any(int(bank[name][row]) != each for name, each in values.items())
-        return np.asarray(changed & (bank["Torque Enable"][rows] == 1))
+            other = {name for name, each in expected.items() if int(bank[name][row]) != each}
+            if IDENTITY in other:
+                exchanged.append(joint)
+            else:
+                found |= {((joint,), name) for name in other}
+        if exchanged:
+            found.add((tuple(exchanged), IDENTITY))
+        return found
 
 
 class Rig:
@@ -128,18 +169,18 @@ class Rig:
         self.chain = ServoChain(self.bus, ROBOT, watchdog_s=SAFETY.watchdog_s)
         self.witness = Witness()
         self.limits = SafetyLimits.from_config(ROBOT, SAFETY)
-        reboots = 10**6 if policy == "resume" else 0
+        self.changes = ChangeWatch(self.chain, self.line.bank)
         recovery = Recovery(
             self.chain,
             policy=policy,
             patience_s=PATIENCE_S,
             limit=10**6,
-            overload_reboots=reboots,
+            overload_reboots=10**6 if policy == "resume" else 0,
+            on_event=self.changes.lines.append,
         )
         self.link = SafeLink(self.chain, self.limits, self.line.clock, recovery)
         self.player = FaultPlayer(self.line, plan)
         self.clashing = any(fault.kind in ("clash", "exchange") for fault in plan.fault)
-        self.changes = ChangeWatch(self.chain, self.line.bank)
         self._units = ServoUnits.of(self.bus.table)
         self._low, self._high = self._raw_limits()
         self._cycle = 0

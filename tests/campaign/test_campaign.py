@@ -1,11 +1,14 @@
 """A short fault campaign; the whole one is ``make campaign``."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 from pytest_mock import MockerFixture
 
 from snakewalk.config.faults import FaultPlan
 from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.errors import SafetyTrippedError
 from snakewalk.drivers.types import JointState
 from snakewalk.sim.line.rx_queue import RxQueue
 from tests.oracles.raw_positions import raw_positions
@@ -34,6 +37,22 @@ def test_a_change_by_another_program_is_noticed_in_motion(kind: str) -> None:
 def test_a_change_that_the_chain_does_not_notice_is_counted(mocker: MockerFixture) -> None:
     mocker.patch.object(ServoChain, "_check_liveness")
     assert run_scenario(("I gain",), 0, 160).unnoticed
+
+
+@pytest.mark.parametrize("other", [False, True])
+def test_only_what_names_a_change_counts_as_noticed(*, other: bool) -> None:
+    rig = Rig(FaultPlan(), "stop")
+    rig.link.enable()
+    rig.restart()
+    rig.line.bank["Position P Gain"][2] = 50
+    if other:
+        rig.link.request_stop("stop button")
+    with suppress(SafetyTrippedError):
+        while rig.link.tripped is None:
+            rig.line.clock.advance(0.02)
+            rig.read()
+    rig.changes.end(rig.link)
+    assert (rig.changes.noticed, rig.changes.ended_otherwise) == ((0, 1) if other else (1, 0))
 
 
 def test_some_pairs_of_faults() -> None:
