@@ -94,6 +94,13 @@ class WalkConfig(Strict):
         description="a body that has missed its way and climbs badly rolls up the slope sideways, "
         "if it is round and its pitch joints carry it",
     )
+    tries: int = Field(
+        8,
+        ge=0,
+        le=50,
+        description="in simulation, on slopes over 8 degrees: pieces of a decision that a second "
+        "simulated body tries where the best one fails there; 0: none",
+    )
     pitch: PitchConfig = PitchConfig()
     fallback: bool = Field(
         True, description="a serpenoid from the second miss of a waypoint on until it is reached"

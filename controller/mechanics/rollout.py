@@ -26,7 +26,7 @@ _BACK, _FORTH = 5, 40
 """Points of the path among which a place is looked for after a step."""
 _AHEAD = 30
 """Points of the path from the centre to where its direction is compared."""
-_STATE = 10
+_STATE = 11
 """Numbers of a body between two steps."""
 
 
@@ -59,15 +59,23 @@ class PathTable:
 
     points_m: Floats
     """(n, 2)"""
+    waypoint_m: Floats
+    """(2,) the next one."""
+    waypoint_at: float
+    """Index of the point at which the path passes it; infinite where it leads to none."""
 
     @classmethod
-    def of(cls, points_m: Floats) -> "PathTable":
+    def of(
+        cls, points_m: Floats, waypoint_m: Floats | None = None, waypoint_at: float = np.inf
+    ) -> "PathTable":
         """Carry points (n, 2), ``PATH_STEP_M`` apart, on along the last direction."""
         step = points_m[-1] - points_m[-2]
         step = step / np.hypot(step[0], step[1]) * PATH_STEP_M
         count = np.arange(1, round(_BEYOND_M / PATH_STEP_M) + 1)
         return cls(
-            np.ascontiguousarray(np.vstack([points_m, points_m[-1] + count[:, None] * step]))
+            np.ascontiguousarray(np.vstack([points_m, points_m[-1] + count[:, None] * step])),
+            np.zeros(2) if waypoint_m is None else waypoint_m,
+            waypoint_at,
         )
 
 
@@ -87,10 +95,41 @@ class Rolled:
     """(C,) that of the head link."""
     heading_rad: Floats
     """(C,) mean heading at the end less the path's direction a little ahead of the centre."""
+    passed_m: Floats
+    """(C,) least distance of the centre from the next waypoint; 0 where it is not passed."""
     along_m: Floats
     """(C,) progress on the path."""
     time_s: Floats
     """(C,) that the joints need for it."""
+
+
+class Followed:
+    """How a body that moves otherwise follows a path: measured as rollouts are."""
+
+    def __init__(self, path: PathTable, path_at: int) -> None:
+        """Begin at the path's point with index ``path_at``."""
+        self._path, self._from, self._steps = path, path_at, 0
+        self._state = np.zeros(_STATE)
+        self._state[3], self._state[10] = path_at, np.inf
+
+    def note(self, centre_m: Floats, dt_s: float) -> None:
+        """Take the centre of mass (2,), ``dt_s`` after the last."""
+        state, path = self._state, self._path
+        x, y = float(centre_m[0]), float(centre_m[1])
+        state[0], state[1] = x, y
+        state[3], state[4] = _nearest(path.points_m, int(state[3]), x, y)
+        state[5] += state[4] ** 2
+        state[6] += dt_s
+        gap_m = path.waypoint_m - centre_m
+        state[10] = min(state[10], float(gap_m @ gap_m))
+        self._steps += 1
+
+    def rolled(self, headings_rad: Floats, points_m: Floats) -> Rolled:
+        """Result for links that head so (L,) at the end, at points (L, 2) about the centre."""
+        out, path = np.empty((1, 10)), self._path
+        given = self._steps, headings_rad, np.ascontiguousarray(points_m), path.points_m
+        _write_result(self._state, *given, self._from, path.waypoint_at, out[0])
+        return Rolled(out[:, :2], *out.T[2:])
 
 
 class Rollout:
@@ -121,6 +160,13 @@ class Rollout:
         """Roll out on another ground from now on."""
         self._field = np.ascontiguousarray(ground.z_m), ground.x0_m, ground.y0_m, ground.spacing_m
 
+    def steepest(self, points_m: Floats) -> float:
+        """Greatest mean slope of the ground over ten points in a row of (n, 2)."""
+        slopes = np.array([plane(*self._field, float(x), float(y))[1:] for x, y in points_m])
+        count = min(10, len(slopes))
+        rows = np.lib.stride_tricks.sliding_window_view(slopes, count, axis=0).mean(axis=-1)
+        return float(np.hypot(*rows.T).max())
+
     def begin(
         self,
         samples_rad: Floats,
@@ -145,7 +191,8 @@ class Rollout:
         """
         given = (
             *(np.array([*start.centre_m, start.offset_rad]), *self._field, *self._links),
-            *(self._body, path.points_m, path_at, cruise_segments_s),
+            *(self._body, path.points_m, path_at),
+            *(np.array([*path.waypoint_m, path.waypoint_at]), cruise_segments_s),
             np.array([drift.ahead_m, drift.left_m, drift.turn_rad]),
         )
         return RolloutTree(samples_rad, head, len(self._links[0]), given)
@@ -177,7 +224,7 @@ class RolloutTree:
         steps = max(1, round(pulse / _STEP_SEGMENTS))
         before = self._make_room(count, length, steps)
         self._pieces[before : self._count] = pieces_rad
-        out = np.empty((count, 9))
+        out = np.empty((count, 10))
         _roll(
             *(self._samples, self._pieces[: self._count], before, self._head, pulse / steps),
             *(*self._given, self._states, self._moving, out),
@@ -360,7 +407,8 @@ def _slide(
 
 
 @compiled(
-    "void(float64[::1], int64, float64[::1], float64[:, ::1], float64[:, ::1], int64, float64[::1])"
+    "void(float64[::1], int64, float64[::1], float64[:, ::1], float64[:, ::1], int64, float64,"
+    " float64[::1])"
 )
 def _write_result(
     state: Floats,
@@ -369,9 +417,10 @@ def _write_result(
     points: Floats,
     path: Floats,
     path_at: int,
+    waypoint_at: float,
     row: Floats,
 ) -> None:
-    """Write the columns of ``Rolled`` (9,) from the state (10,) after all steps."""
+    """Write the columns of ``Rolled`` (10,) from the state (11,) after all steps."""
     x, y, phi, place = state[0], state[1], state[2], state[3]
     k = min(int(place) + _AHEAD, len(path) - 2)
     error = phi + headings.mean()
@@ -382,7 +431,14 @@ def _write_result(
     row[3], row[4] = np.sqrt(state[5] / steps), state[4]
     row[5] = _nearest(path, k, head_x, head_y)[1]
     row[6] = error - 2.0 * np.pi * np.floor(error / (2.0 * np.pi) + 0.5)
-    row[7], row[8] = PATH_STEP_M * (place - path_at), state[6]
+    row[7] = np.sqrt(state[10]) if place >= waypoint_at else 0.0
+    row[8], row[9] = PATH_STEP_M * (place - path_at), state[6]
+
+
+@compiled("float64(float64, float64, float64)")
+def _least(square: float, x: float, y: float) -> float:
+    """Less of a square and that of a distance."""
+    return float(min(square, x * x + y * y))
 
 
 @compiled("UniTuple(int64, 2)(float64[:, ::1], int64)")
@@ -404,7 +460,8 @@ def _alike(pieces: Floats, piece: int) -> tuple[int, int]:
 @compiled(
     f"void({readonly_array(layout='C')}, float64[:, ::1], int64, float64, float64, float64[::1],"
     f" {FIELD}, {readonly_array()}, {readonly_array()}, float64[::1], int64[::1], float64[::1],"
-    " float64[:, ::1], int64, float64, float64[::1], float64[:, :, ::1], float64[:, :, :, ::1],"
+    " float64[:, ::1], int64, float64[::1], float64, float64[::1], float64[:, :, ::1],"
+    " float64[:, :, :, ::1],"
     " float64[:, ::1])"
 )
 def _roll(
@@ -425,13 +482,14 @@ def _roll(
     body: Floats,
     path: Floats,
     path_at: int,
+    waypoint: Floats,
     cruise: float,
     drift: Floats,
     states: Floats,
     movings: Floats,
     out: Floats,
 ) -> None:
-    """Roll out pieces (P, n) from number ``before`` on; ``out`` (C, 9) are columns of ``Rolled``.
+    """Roll out pieces (P, n) from number ``before`` on; ``out`` (C, 10) are columns of ``Rolled``.
 
     Args:
         samples: as in ``Rollout.begin``, and so on.
@@ -451,11 +509,12 @@ def _roll(
         body: (3,) friction along and across; speed limit of the joints.
         path: (m, 2) points.
         path_at: place on it.
+        waypoint: (3,) the next waypoint, and its place on the path.
         cruise: wanted segments a second.
         drift: (3,) added to each step.
-        states: (P, steps + 1, 10) of each piece before each step, and at its end: the body's place
+        states: (P, steps + 1, 11) of each piece before each step, and at its end: the body's place
             (2) and turn, place on the path, distance from it, sum of its squares, time, velocity
-            (3).
+            (3), and the least square of its distance from the waypoint.
         movings: (P, steps + 1, L, 2) velocities of the links; kept as ``states`` are.
         out: written.
 
@@ -477,15 +536,16 @@ def _roll(
         like, same = _alike(pieces, c)
         if like < 0:
             states[c, 0, :3], states[c, 0, 3], states[c, 0, 4:] = start, path_at, 0.0
+            states[c, 0, 10] = np.inf
             movings[c, 0] = 0.0
         else:
             while begin < steps and at + step <= known + same:
                 at, begin = at + step, begin + 1
             states[c, begin], movings[c, begin] = states[like, begin], movings[like, begin]
         state = states[c, begin]
-        x, y, phi = state[0], state[1], state[2]
-        place, off, square, time = state[3], state[4], state[5], state[6]
-        velocity[:], moving[:] = state[7:], movings[c, begin]
+        x, y, phi, place = state[0], state[1], state[2], state[3]
+        off, square, time = state[4], state[5], state[6]
+        velocity[:], moving[:] = state[7:10], movings[c, begin]
         _lay(total, track, at, edges, group, half_m, weight, here_h, here_p, here_g)
         for n in range(begin, steps):
             at += step
@@ -501,13 +561,13 @@ def _roll(
             y += velocity[1] * dt + left * drift[0] + ahead * drift[1]
             phi += velocity[2] * dt + step * drift[2]
             time += dt
-            here_h, next_h = next_h, here_h
-            here_p, next_p = next_p, here_p
+            here_h, next_h, here_p, next_p = next_h, here_h, next_p, here_p
             here_g, next_g = next_g, here_g
             place, off = _nearest(path, int(place), x, y)
             square += off * off
             state, movings[c, n + 1] = states[c, n + 1], moving
-            state[0], state[1], state[2] = x, y, phi
-            state[3], state[4], state[5], state[6] = place, off, square, time
-            state[7:] = velocity
-        _write_result(state, steps, here_h, here_p, path, path_at, out[c - before])
+            state[0], state[1], state[2], state[3] = x, y, phi, place
+            state[4], state[5], state[6] = off, square, time
+            state[10] = _least(states[c, n, 10], x - waypoint[0], y - waypoint[1])
+            state[7:10] = velocity
+        _write_result(*(state, steps, here_h, here_p, path, path_at, waypoint[2], out[c - before]))

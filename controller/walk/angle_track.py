@@ -5,6 +5,8 @@ them. Here the samples stay untouched and one accumulated shift gives the head's
 with no sliding every point of the body passes through the angles of the head exactly.
 """
 
+import copy
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -36,6 +38,12 @@ class AngleTrack:
     def append(self, piece_rad: Floats) -> None:
         """Add ``piece_rad`` (n,), oldest (tail side) first, as it is."""
         self._samples = np.concatenate([self._samples, piece_rad])
+
+    def with_piece(self, piece_rad: Floats) -> "AngleTrack":
+        """Return a copy to which ``piece_rad`` (n,) is appended."""
+        other = copy.copy(self)
+        other.append(piece_rad)
+        return other
 
     def restart(self, body_rad: Floats) -> None:
         """Go on from a body (N,), head first, that came about otherwise: its head is at the end."""

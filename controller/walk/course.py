@@ -176,6 +176,16 @@ class Course:
         return np.asarray(self.path.position(at))  # its end, where it leads to no waypoint yet
 
     @property
+    def next_waypoint(self) -> tuple[Floats, float] | None:
+        """(2,) the next one, and the arc length at which the path passes it; None after the last.
+
+        The arc length is infinite where the path leads not to it.
+        """
+        if self.complete:
+            return None
+        return self.waypoints_m[self.reached], self._passed_m[self.reached]
+
+    @property
     def leads_on(self) -> bool:
         """Whether the path leads to every waypoint that is left."""
         return not math.isinf(self._passed_m[-1])

@@ -5,6 +5,7 @@ quadratic B-spline runs, so that slope is continuous and the second derivative i
 That is what lets a time law keep joint speed *and* acceleration within limits.
 """
 
+import copy
 from collections.abc import Callable
 
 import numpy as np
@@ -42,6 +43,12 @@ class JointTrack:
 
     def _joints_of(self, body_rad: Floats) -> Floats:
         return np.clip(self._joints(body_rad), -self._limit_rad, self._limit_rad)
+
+    def on(self, track: AngleTrack) -> "JointTrack":
+        """Return a copy on a track that begins as its own."""
+        other = copy.copy(self)
+        other.track = track
+        return other
 
     def restart(self) -> None:
         """Begin again at the end of the track, where the body lies now."""

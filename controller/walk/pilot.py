@@ -7,8 +7,9 @@ With ``feedback`` off it believes that the body goes where the track goes, witho
 method, kept to show what a body with friction makes of it.
 """
 
+import copy
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.roll_compensation import RollCompensation
 from snakewalk.controller.kinematics.rotations import offset_rad
 from snakewalk.controller.mechanics.pitch_fit import PitchFitter
-from snakewalk.controller.mechanics.rollout import PATH_STEP_M, PathTable
+from snakewalk.controller.mechanics.rollout import PATH_STEP_M, PathTable, Rolled
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.terrain.path import SplinePath
@@ -26,6 +27,7 @@ from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.course import Course, OnCourse, aim_rad
 from snakewalk.controller.walk.steering import PathPose
 from snakewalk.controller.walk.time_law import TimeLaw
+from snakewalk.controller.walk.twin_rollout import LENGTH_BODIES, TwinRollout
 
 # Segments of track that remain when the next piece is decided: the time law looks ahead.
 _LOOKAHEAD_SEGMENTS = 6.0
@@ -82,6 +84,28 @@ class Aimed:
         return self._chooser.decide(pose.offset_rad, pose.aim_rad)
 
 
+@runtime_checkable
+class TriesPieces(Protocol):
+    """A ``ShapeChooser`` that tries pieces where it is given the means."""
+
+    try_piece: Callable[[PathPose, Floats], Rolled] | None
+
+
+class _Fixed:
+    """A ``ShapeChooser`` whose track does not grow."""
+
+    def __init__(self, track: AngleTrack) -> None:
+        self.track = track
+
+    def think(self, look: Callable[[], PathPose]) -> bool:
+        """Nothing."""
+        return False
+
+    def decide(self, pose: PathPose) -> Decision:
+        """Never asked."""
+        raise AssertionError("a track that is tried does not grow")
+
+
 class Pilot(OnCourse):
     """Steers a chooser of shapes along a path through waypoints.
 
@@ -118,13 +142,14 @@ class Pilot(OnCourse):
         self._pitch_rad: Floats | None = None
         self._roll = roll
         self._table: PathTable | None = None
-        self._table_of: SplinePath | None = None
+        self._table_of: tuple[SplinePath, int] | None = None
         self._links = len(self._goal_rad) + 1
         self._pitch_lead_s = pitch_lead_s
         self._segment_m = length_m / chooser.track.points
         self._carrot_m = carrot_m
         self._feedback = feedback
         self._aim_at_waypoint = aim_at_waypoint
+        self._twin: TwinRollout | None = None
         self._start: tuple[Floats, float] | None = None
         self._at_rest = True
         self._decides = True
@@ -212,6 +237,8 @@ class Pilot(OnCourse):
         return goal
 
     def _steer(self, dt_s: float, view: BodyView) -> Floats:
+        if self._twin is not None:
+            self._twin.observe(view, dt_s)
         self.course.follow(
             view.centre_m[:2],
             view.link_m[0, :2],
@@ -235,9 +262,28 @@ class Pilot(OnCourse):
             self._time_law.stop()
         else:
             self._time_law.go_on()
+        return self._move(dt_s, view)
+
+    def _move(self, dt_s: float, view: BodyView) -> Floats:
+        """Go on along the track; the goals (J,) there."""
         self._time_law.advance(dt_s)
         goal_rad = self._on_ground(self._time_law.goal_rad(), dt_s, view)
         return goal_rad if self._roll is None else self._roll(goal_rad, view, dt_s)
+
+    def use_twin(self, twin: TwinRollout) -> None:
+        """Let the chooser try pieces of track on a twin of the robot."""
+        if isinstance(self._chooser, TriesPieces):
+            self._twin = twin
+            self._chooser.try_piece = self._try_piece
+
+    def _try_piece(self, pose: PathPose, piece_rad: Floats) -> Rolled:
+        """What becomes of the body on a piece (n,) that would be appended to the track."""
+        assert self._twin is not None
+        other, track = copy.copy(self), self._chooser.track.with_piece(piece_rad)
+        other._time_law, other._roll = self._time_law.on(track), copy.copy(self._roll)
+        other._chooser = _Fixed(track)
+        end = min(self.head + LENGTH_BODIES * track.points, track.end - _LOOKAHEAD_SEGMENTS)
+        return self._twin.roll(pose, lambda: other.head >= end, other._move)
 
     def _on_ground(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:
         """Add to yaw goals (J,) the pitch that fits the body to the ground under it.
@@ -282,12 +328,15 @@ class Pilot(OnCourse):
         return PathPose(self.head, offset, view.centre_m[:2].copy(), aim, self._path_table(), at)
 
     def _path_table(self) -> PathTable:
-        """Table of the path in force, made once a path."""
-        path = self.path
-        if self._table is None or self._table_of is not path:
+        """Table of the path in force, made once a path and waypoint."""
+        path, course = self.path, self.course
+        made_of = path, course.reached
+        if self._table is None or self._table_of != made_of:
             whole = np.arange(0.0, path.length_m, PATH_STEP_M)
-            self._table = PathTable.of(path.position(np.append(whole, path.length_m)))
-            self._table_of = path
+            points_m = path.position(np.append(whole, path.length_m))
+            waypoint_m, passed_m = course.next_waypoint or (None, np.inf)
+            self._table = PathTable.of(points_m, waypoint_m, passed_m / PATH_STEP_M)
+            self._table_of = made_of
         return self._table
 
     def _aim(self, view: BodyView) -> tuple[float, float]:

@@ -15,6 +15,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Indices
 from snakewalk.config.run import WalkConfig
 from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.mechanics.rollout import Rolled
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.shape.star import StarVisits
 from snakewalk.controller.walk.angle_track import AngleTrack
@@ -42,6 +43,10 @@ _GRID = (np.linspace(-1.0, 1.0, 5), np.linspace(-1.0, 1.0, 3))
 _AROUND = np.array(
     [[-1, 0], [1, 0], [0, -1], [0, 1], [-1, -1], [1, 1], [-1, 1], [1, -1]], dtype=float
 )
+_UNLIKE = np.array([[0, 0], [-1, 0], [1, 0], [-1, 1], [1, -1]], dtype=float)
+"""Bends of other states that are tried."""
+_TROUBLE_M2 = 0.2
+"""Cost on a simulated body from which on other pieces are tried: 0.3 m off the path at the end."""
 _FINER = np.array([0.25, 0.5])
 """Steps to the neighbours of the best of the grid: half of the grid's."""
 
@@ -113,6 +118,8 @@ class PredictiveWalker:
         self._tried: list[_Tried] = []
         self._thinking: Iterator[bool] | None = None
         self._lost = False
+        self.try_piece: Callable[[PathPose, Floats], Rolled] | None = None
+        """Tries a piece (n,) on a simulated body; None where there is none."""
         self.outlook = 1.0
         """Predicted of the last decision: progress over that at the wanted pulse without slip."""
 
@@ -154,7 +161,7 @@ class PredictiveWalker:
         while self.track.end == self.track.points and self.think(lambda: pose):
             pass
         self._thinking = None
-        best = self._best()
+        best = self._tried_best(pose, self._best())
         self.outlook = best.progress
         option, keep = best.option, self._keep
         if self._is_new:
@@ -183,6 +190,50 @@ class PredictiveWalker:
             if self._accept(np.concatenate([each.piece_rad[: self._keep][::-1], old])):
                 return each
         return ranked[0]
+
+    def _tried_best(self, pose: PathPose, best: _Tried) -> _Tried:
+        """Try the best piece on a simulated body where it is steep; where that fails, others."""
+        if not self.try_piece or self._walk.tries == 0 or not self.steering.is_steep(pose):
+            return best
+        least, found = self._cost_of_try(pose, best), best
+        if least <= _TROUBLE_M2 or self._lost:
+            return best
+        for each in self._others(pose, best):
+            cost = self._cost_of_try(pose, each)
+            if cost < least:
+                least, found = cost, each
+        if found.option is not best.option:
+            self._until = self._at  # another state begins here
+        return found
+
+    def _cost_of_try(self, pose: PathPose, piece: _Tried) -> float:
+        assert self.try_piece is not None
+        return float(self.steering.cost(self.try_piece(pose, piece.piece_rad))[0][0])
+
+    def _others(self, pose: PathPose, best: _Tried) -> list[_Tried]:
+        """Pieces unlike each other, the cheapest first: of the state under way, and of others."""
+        if not self._is_new:
+            until, near = self._until, self._near
+            self._until = self._at
+            options = self._options(pose)
+            for carrier in CLIMBING:
+                options += self._options(pose, carrier)[:3]
+            self._until, self._near = until, near
+            for option in options:
+                self._roll(pose, [(option, bends) for bends in _UNLIKE])
+        chosen = [best]
+        old = self.track.body_rad(self.track.end)[: self.track.points - self._keep]
+        for each in sorted(self._tried, key=lambda each: each.cost_m2):
+            if len(chosen) == self._walk.tries:
+                break
+            same = [other.bends for other in chosen if other.option is each.option]
+            if (
+                len(same) < 3
+                and all(np.abs(each.bends - bends).max() >= 0.7 for bends in same)
+                and self._accept(np.concatenate([each.piece_rad[: self._keep][::-1], old]))
+            ):
+                chosen.append(each)
+        return chosen[1:]
 
     def _judge(self, pose: PathPose) -> Iterator[bool]:
         """Judge options and bends, a batch at a time, the most likely ones first."""

@@ -30,6 +30,7 @@ from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.pilot import Pilot
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker
 from snakewalk.controller.walk.steering import PathPose
+from snakewalk.controller.walk.twin_rollout import TwinRollout
 
 ARCS_RAD = np.array([-2.4, -2.0, -1.6, 1.6, 2.0, 2.4])
 """Bends of the whole body, of which one is chosen to roll in (ours)."""
@@ -224,6 +225,10 @@ class SideRolls(OnCourse):
     def pace(self) -> Pace:
         """The robot's limits: what comes next is not known."""
         return self._pilot.pace()
+
+    def use_twin(self, twin: TwinRollout) -> None:
+        """Let the walk try pieces of track on a twin of the robot."""
+        self._pilot.use_twin(twin)
 
     def begin(self, view: BodyView) -> Floats:
         """(J,) where the walk begins."""

@@ -52,10 +52,16 @@ class SteeringWeights:
     """The head's."""
     heading_m: float = 0.3
     """Lever on which the heading error at the end counts as a distance."""
+    pass_by: float = 4.0
+    """Square of what is passed by farther from the next waypoint than ``near_m``."""
+    near_m: float = 0.2
+    """Within this a waypoint is passed well."""
     delay_m2: float = 0.1
     """For standing still; in proportion less for progress at up to the wanted pulse."""
 
 
+_STEEP = 0.14
+_AHEAD_POINTS = 100
 _SPAN_SEGMENTS = 40.0
 _UPDATE = 0.25
 """Share of a new measurement in the drift: its memory is four decisions, 0.4 body lengths."""
@@ -110,6 +116,11 @@ class Steering:
             self._tree, self._tree_of = self._begin(pose, self.drift), pose
         return self._tree.roll(pieces_rad)
 
+    def is_steep(self, pose: PathPose) -> bool:
+        """Whether a body here, or a length on along its path, lies on a slope of 8 degrees."""
+        points_m = pose.path.points_m[pose.path_at : pose.path_at + _AHEAD_POINTS : 6]
+        return self._rollout.steepest(points_m + pose.centre_m - points_m[0]) > _STEEP
+
     def forget(self) -> None:
         """Leave out what came before: the body has moved otherwise than by its track."""
         self._past.clear()
@@ -122,13 +133,18 @@ class Steering:
             without slip.
 
         """
-        weights, rolled = self._weights, self.roll_out(pose, pieces_rad)
+        return self.cost(self.roll_out(pose, pieces_rad))
+
+    def cost(self, rolled: Rolled) -> tuple[Floats, Floats]:
+        """Cost and progress, as ``judge`` returns them, of rollouts that have been made."""
+        weights = self._weights
         progress = rolled.along_m / (rolled.time_s * self._cruise * self._rollout.segment_m)
         cost = (
             weights.off_path * rolled.off_path_m**2
             + weights.end * rolled.end_off_m**2
             + weights.head * rolled.head_off_m**2
             + (weights.heading_m * rolled.heading_rad) ** 2
+            + weights.pass_by * np.maximum(rolled.passed_m - weights.near_m, 0.0) ** 2
             + weights.delay_m2 * (1.0 - progress)
         )
         return np.asarray(cost), np.asarray(progress)

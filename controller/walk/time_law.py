@@ -6,9 +6,12 @@ shape bends quickly. Here half of the acceleration limit is left to the bending
 of the track that is known.
 """
 
+import copy
+
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.joint_track import JointTrack
 from snakewalk.drivers.compiling import compiled
 
@@ -45,6 +48,12 @@ class TimeLaw:
         self._first = self.joints.first
         self._allowed = np.zeros(1)  # nothing is known of what comes
         self._slope = np.zeros(1)
+
+    def on(self, track: AngleTrack) -> "TimeLaw":
+        """Return a copy that goes on by itself, on a track that begins as its own."""
+        other = copy.copy(self)
+        other.joints = self.joints.on(track)
+        return other
 
     def restart(self) -> None:
         """Begin again, at rest, at the end of the track, where the body lies now."""

@@ -145,6 +145,21 @@ class MujocoPlant:
         if fault is not None:
             raise InputError(f"world {self.world.name}: {fault}")
 
+    def set_state(self, before: Floats, now: Floats, dt_s: float) -> None:
+        """Put it at MuJoCo's coordinates ``now`` (7 + J,), where it came from ``before`` in dt_s.
+
+        What loads the links is that of this state at once; it is time 0.
+        """
+        m, d = self.mechanics, self._data
+        mujoco.mj_resetData(m.model, d)
+        mujoco.mj_differentiatePos(m.model, d.qvel, dt_s, before, now)
+        d.qpos[:] = now
+        m.planes.lay(d)
+        mujoco.mj_forward(m.model, d)
+        m.start_at_rest()
+        self._count = 0
+        m.totals[:] = 0.0
+
     def _place_body(
         self, start_m: tuple[float, float], heading_rad: float, joint_rad: ArrayLike
     ) -> None:

@@ -18,6 +18,7 @@ from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.shadow.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
+from snakewalk.controller.walk.twin_rollout import Twin
 from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
@@ -48,6 +49,8 @@ class Backend:
     """Time that bytes have spent on the wire so far; NaN where nobody counts."""
     energy: Callable[[], MotorEnergy] = MotorEnergy
     """What the motors have taken in and done so far."""
+    twin: Callable[[], Twin] | None = None
+    """Makes a second body, on which motion is tried; None where time does not wait for it."""
 
 
 def simulated(
@@ -72,6 +75,7 @@ def simulated(
     require_extra("simulated runs need", "mujoco")
     from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
     from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
+    from snakewalk.sim.physics.twin import PlantTwin  # noqa: PLC0415
     from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
     from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
     from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
@@ -106,6 +110,7 @@ def simulated(
         lambda: plant.qpos,
         lambda: line.busy_s,
         lambda: MotorEnergy(float(drive.drawn_j.sum()), float(drive.work_j.sum())),
+        lambda: PlantTwin(robot, world, ground),
     )
 
 

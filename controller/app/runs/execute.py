@@ -36,6 +36,7 @@ from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outcome
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
+from snakewalk.controller.walk.twin_rollout import TwinRollout, UsesTwin
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.priority import raised_priority
 from snakewalk.drivers.safety.limits import SafetyLimits
@@ -160,6 +161,8 @@ def execute(
             map_provider(prepared, backend, pose.measure, folder, log_event) as mapped,
         ):
             source = prepared.make_source(log_event)
+            if backend.twin is not None and _may_try(prepared) and isinstance(source, UsesTwin):
+                source.use_twin(TwinRollout(robot, backend.twin()))
             if waypoint_commands is not None:
                 source = _live(prepared, source, waypoint_commands, log_event)
             link = SafeLink(
@@ -213,6 +216,13 @@ def _live(
     if not isinstance(prepared, PathRun) or not isinstance(source, OnCourse):
         raise InputError(f"run {prepared.run.name}: its motion has no waypoints that can be set")
     return LiveCourse(cast(MotionOnCourse, source), commands, prepared.check_waypoint, on_event)
+
+
+def _may_try(prepared: PreparedRun) -> bool:
+    """Whether a second body stands where the first does, on ground that is known, a bare snake."""
+    run = prepared.run
+    known = prepared.ground is not None and run.mapping is None and run.pose in (None, "simulator")
+    return known and not prepared.robot.limb_joints and run.motion == "walk" and run.walk.tries > 0
 
 
 @contextmanager

@@ -53,6 +53,21 @@ def rollout(ground: HeightField | None = None, friction: FrictionConfig = SNAKE)
     return Rollout(ROBOT, friction, ground, 100)
 
 
+def test_a_waypoint_that_is_passed_is_as_far_as_the_body_came_near() -> None:
+    """A wave along x passes at the distance of the waypoint from that line; ahead it counts not."""
+    line = np.arange(0.0, 6.0, PATH_STEP_M)[:, None] * np.array([1.0, 0.0])
+    tree_of = rollout().begin
+    for at_m, passed in ((0.2, True), (3.0, False)):
+        path = PathTable.of(line, np.array([at_m, 0.5]), at_m / PATH_STEP_M)
+        tree = tree_of(sine(0, 102), 101.0, START, path, 0, 25.0, Drift())
+        made = tree.roll(sine(102, 60)[None])
+        assert float(made.along_m[0]) > 0.25
+        if passed:
+            np.testing.assert_allclose(made.passed_m, 0.5, atol=0.05)
+        else:
+            np.testing.assert_array_equal(made.passed_m, 0.0)
+
+
 def test_a_straight_body_goes_nowhere() -> None:
     made = roll(rollout(), np.zeros((1, 50)), np.zeros(102))
     np.testing.assert_allclose(made.centre_m, 0.0, atol=1e-9)

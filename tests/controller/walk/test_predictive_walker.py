@@ -13,6 +13,7 @@ from snakewalk.controller.mechanics.rollout import (
     Drift,
     PathTable,
     PlanarPose,
+    Rolled,
     Rollout,
 )
 from snakewalk.controller.walk.angle_track import AngleTrack
@@ -67,6 +68,26 @@ def test_the_track_never_jumps() -> None:
     # shapes bend by up to 0.8 * 1.8 * 2 pi / 100 a sample; a join adds a state's share at most
     assert np.abs(bend).max() < 0.35
     assert np.abs(np.diff(bend)).max() < 0.2
+
+
+def test_what_fails_on_a_second_body_is_not_walked(monkeypatch: pytest.MonkeyPatch) -> None:
+    chooser = walker(3)
+    monkeypatch.setattr(chooser.steering, "is_steep", lambda pose: True)
+    tried: list[np.ndarray] = []
+
+    def try_piece(pose: PathPose, piece_rad: np.ndarray) -> Rolled:
+        tried.append(piece_rad)
+        off_m = np.array([0.0 if len(tried) == 2 else 2.0])
+        zero = np.zeros(1)
+        return Rolled(np.zeros((1, 2)), zero, off_m, off_m, zero, zero, zero, zero, np.ones(1))
+
+    chooser.try_piece = try_piece
+    for _ in range(4):
+        tried.clear()
+        chooser.decide(pose(chooser.track))
+        added = chooser.track.samples(chooser.track.end - 10)
+        np.testing.assert_array_equal(added, tried[1][:10])
+        assert 2 < len(tried) <= 8
 
 
 @pytest.mark.parametrize(("y_m", "turn"), [(0.3, -1.0), (-0.3, 1.0)])

@@ -1,0 +1,79 @@
+"""A rollout on a twin: what becomes of a body on a piece of track, tried on a simulated one.
+
+The balance of forces on paper knows no weight that rests on few links of a body on rough ground; a
+body that physics moves does. It costs a hundred times as much.
+"""
+
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.kinematics.links import BodyView, body_in_world, chain_angles_rad
+from snakewalk.controller.mechanics.rollout import Followed, Rolled
+from snakewalk.controller.walk.steering import PathPose
+from snakewalk.drivers.types import BodyPose
+
+LENGTH_BODIES = 1.0
+"""Of pulse that is rolled out."""
+_LONGEST_S = 6.0
+
+
+class Twin(Protocol):
+    """A simulated body of the robot."""
+
+    def begin(
+        self, before: BodyPose, now: BodyPose, before_rad: Floats, now_rad: Floats, dt_s: float
+    ) -> None:
+        """Put it where the robot is, moving as the robot did since ``dt_s`` ago."""
+        ...
+
+    def step(self, goal_rad: Floats, dt_s: float) -> tuple[BodyPose, Floats]:
+        """Hold goals (J,) for ``dt_s``; returns the head's pose and the joints (J,) then."""
+        ...
+
+
+@runtime_checkable
+class UsesTwin(Protocol):
+    """A motion that tries what it will do, where it is given the means."""
+
+    def use_twin(self, twin: "TwinRollout") -> None:
+        """Try it on this twin."""
+        ...
+
+
+class TwinRollout:
+    """Rolls out motions of one robot on its twin."""
+
+    def __init__(self, robot: RobotConfig, twin: Twin) -> None:
+        self._robot, self._twin = robot, twin
+        self._seen: list[tuple[BodyPose, Floats]] = []
+        self._dt_s = 0.0
+
+    def observe(self, view: BodyView, dt_s: float) -> None:
+        """Take the measured body, ``dt_s`` after the last."""
+        pose = BodyPose(0.0, view.link_m[0].copy(), view.rotation[0].copy())
+        self._seen = [*self._seen[-1:], (pose, chain_angles_rad(self._robot, view))]
+        self._dt_s = dt_s
+
+    def roll(
+        self, pose: PathPose, is_over: Callable[[], bool], move: Callable[[float, BodyView], Floats]
+    ) -> Rolled:
+        """Move the twin, from where the robot is, until ``is_over``.
+
+        Args:
+            pose: with the path to measure by.
+            is_over: asked before each cycle.
+            move: takes the length of a cycle and the body; returns goals (J,).
+
+        """
+        (before, before_rad), (now, now_rad) = self._seen[0], self._seen[-1]
+        self._twin.begin(before, now, before_rad, now_rad, self._dt_s)
+        followed, time_s = Followed(pose.path, pose.path_at), 0.0
+        view = body_in_world(self._robot, now, now_rad)
+        while not (is_over() or time_s >= _LONGEST_S) or time_s == 0.0:
+            now, now_rad = self._twin.step(move(self._dt_s, view), self._dt_s)
+            view = body_in_world(self._robot, now, now_rad)
+            time_s += self._dt_s
+            followed.note(view.centre_m[:2], self._dt_s)
+        return followed.rolled(view.headings_rad, view.link_m[:, :2] - view.centre_m[:2])

@@ -1,0 +1,63 @@
+"""A twin: a second body, put where the robot is, on which motion is tried before it is made.
+
+Its joints are driven to their goals as servos drive them, without a bus. It is stepped twice as
+coarsely as the body that it foretells.
+"""
+
+import mujoco
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.drivers.types import BodyPose
+from snakewalk.sim.physics.plant import FLOOR_STEP_S, MujocoPlant
+from snakewalk.sim.servo.motor import make_drive, motors_of, p_gain_per_rad
+
+
+class PlantTwin:
+    """A ``MujocoPlant`` beside the robot, without servos of its own."""
+
+    def __init__(self, robot: RobotConfig, world: WorldConfig, ground: HeightField | None) -> None:
+        """Lay a body of ``robot`` on the ground; its servos have torque and the robot's gains."""
+        self._plant = MujocoPlant(robot, world, ground, FLOOR_STEP_S)
+        motors = motors_of(robot)
+        self._drive = make_drive(motors, robot.servo.supply_v)
+        self._drive.torque_on[:] = 1.0
+        gains = zip(robot.position_p_gains, motors, strict=True)
+        self._drive.p_gain_per_rad[:] = [float(p_gain_per_rad(gain, each)) for gain, each in gains]
+        self._drive.current_limit_a[:] = robot.current_limits_a
+
+    def begin(
+        self, before: BodyPose, now: BodyPose, before_rad: Floats, now_rad: Floats, dt_s: float
+    ) -> None:
+        """Put it where the robot is, moving as the robot did since ``dt_s`` ago.
+
+        Args:
+            before: the head's pose ``dt_s`` ago.
+            now: the head's pose.
+            before_rad: (J,) joints ``dt_s`` ago.
+            now_rad: (J,) joints.
+            dt_s: more than 0.
+
+        """
+        self._plant.set_state(_qpos(before, before_rad), _qpos(now, now_rad), dt_s)
+
+    def step(self, goal_rad: Floats, dt_s: float) -> tuple[BodyPose, Floats]:
+        """Hold goals (J,) for ``dt_s``; returns the head's pose and the joints (J,) then.
+
+        Raises:
+            PhysicsError: the state has diverged.
+
+        """
+        self._drive.goal_rad[:] = goal_rad
+        self._plant.advance(self._plant.time_s + dt_s, self._drive)
+        return self._plant.head_pose(), self._plant.position_rad.copy()
+
+
+def _qpos(pose: BodyPose, joint_rad: Floats) -> Floats:
+    """(7 + J,) MuJoCo's coordinates of a body."""
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
+    return np.concatenate([pose.head_in_world_m, quaternion, joint_rad])
