@@ -241,6 +241,11 @@ class RunConfig(Strict):
     )
     synthesis: SynthesisConfig = SynthesisConfig()
 
+    @property
+    def pose_is_true(self) -> bool:
+        """Whether in a simulated run the simulator measures the head, without error."""
+        return self.pose in (None, "simulator")
+
     @model_validator(mode="after")
     def _motion_has_its_table(self) -> Self:
         if self.motion == "gait" and self.gait is None:

@@ -114,14 +114,8 @@ class Followed:
 
     def note(self, centre_m: Floats, dt_s: float) -> None:
         """Take the centre of mass (2,), ``dt_s`` after the last."""
-        state, path = self._state, self._path
-        x, y = float(centre_m[0]), float(centre_m[1])
-        state[0], state[1] = x, y
-        state[3], state[4] = _nearest(path.points_m, int(state[3]), x, y)
-        state[5] += state[4] ** 2
-        state[6] += dt_s
-        gap_m = path.waypoint_m - centre_m
-        state[10] = min(state[10], float(gap_m @ gap_m))
+        path, (x, y) = self._path, centre_m
+        _note(self._state, path.points_m, path.waypoint_m, float(x), float(y), dt_s)
         self._steps += 1
 
     def rolled(self, headings_rad: Floats, points_m: Floats) -> Rolled:
@@ -309,6 +303,17 @@ def _nearest(path: Floats, at: int, x: float, y: float) -> tuple[float, float]:
     return float(best), (1.0 if side >= 0.0 else -1.0) * np.sqrt(least)
 
 
+@compiled("void(float64[::1], float64[:, ::1], float64[::1], float64, float64, float64)")
+def _note(state: Floats, path: Floats, waypoint: Floats, x: float, y: float, dt: float) -> None:
+    """Take into a state (11,) that its body has come to (x, y) within ``dt``."""
+    state[0], state[1] = x, y
+    state[3], state[4] = _nearest(path, int(state[3]), x, y)
+    state[5] += state[4] * state[4]
+    state[6] += dt
+    dx, dy = x - waypoint[0], y - waypoint[1]
+    state[10] = min(state[10], dx * dx + dy * dy)
+
+
 @compiled(
     "float64(float64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64, float64,"
     " float64[:, ::1], float64[:, ::1], float64[:, ::1])"
@@ -435,12 +440,6 @@ def _write_result(
     row[8], row[9] = PATH_STEP_M * (place - path_at), state[6]
 
 
-@compiled("float64(float64, float64, float64)")
-def _least(square: float, x: float, y: float) -> float:
-    """Less of a square and that of a distance."""
-    return float(min(square, x * x + y * y))
-
-
 @compiled("UniTuple(int64, 2)(float64[:, ::1], int64)")
 def _alike(pieces: Floats, piece: int) -> tuple[int, int]:
     """Which earlier piece begins like a piece for longest, and for how many samples; -1 is none.
@@ -543,8 +542,7 @@ def _roll(
                 at, begin = at + step, begin + 1
             states[c, begin], movings[c, begin] = states[like, begin], movings[like, begin]
         state = states[c, begin]
-        x, y, phi, place = state[0], state[1], state[2], state[3]
-        off, square, time = state[4], state[5], state[6]
+        x, y, phi = state[0], state[1], state[2]
         velocity[:], moving[:] = state[7:10], movings[c, begin]
         _lay(total, track, at, edges, group, half_m, weight, here_h, here_p, here_g)
         for n in range(begin, steps):
@@ -560,14 +558,10 @@ def _roll(
             x += velocity[0] * dt + ahead * drift[0] - left * drift[1]
             y += velocity[1] * dt + left * drift[0] + ahead * drift[1]
             phi += velocity[2] * dt + step * drift[2]
-            time += dt
             here_h, next_h, here_p, next_p = next_h, here_h, next_p, here_p
             here_g, next_g = next_g, here_g
-            place, off = _nearest(path, int(place), x, y)
-            square += off * off
-            state, movings[c, n + 1] = states[c, n + 1], moving
-            state[0], state[1], state[2], state[3] = x, y, phi, place
-            state[4], state[5], state[6] = off, square, time
-            state[10] = _least(states[c, n, 10], x - waypoint[0], y - waypoint[1])
-            state[7:10] = velocity
+            states[c, n + 1], movings[c, n + 1] = state, moving
+            state = states[c, n + 1]
+            _note(state, path, waypoint, x, y, dt)
+            state[2], state[7:10] = phi, velocity
         _write_result(*(state, steps, here_h, here_p, path, path_at, waypoint[2], out[c - before]))

@@ -91,21 +91,6 @@ class TriesPieces(Protocol):
     try_piece: Callable[[PathPose, Floats], Rolled] | None
 
 
-class _Fixed:
-    """A ``ShapeChooser`` whose track does not grow."""
-
-    def __init__(self, track: AngleTrack) -> None:
-        self.track = track
-
-    def think(self, look: Callable[[], PathPose]) -> bool:
-        """Nothing."""
-        return False
-
-    def decide(self, pose: PathPose) -> Decision:
-        """Never asked."""
-        raise AssertionError("a track that is tried does not grow")
-
-
 class Pilot(OnCourse):
     """Steers a chooser of shapes along a path through waypoints.
 
@@ -219,6 +204,8 @@ class Pilot(OnCourse):
         points = self._chooser.track.points
         at = (np.arange(points) + 0.5) * self._links / points - 0.5
         restart(np.interp(at, np.arange(self._links), view.headings_rad))
+        if self._twin is not None:
+            self._twin.forget()
         self._time_law.restart()
         self._pitch_rad, self._at_rest, self._decides = None, True, True
         self._goal_rad = self._on_ground(self._time_law.goal_rad(), 0.0, view)
@@ -281,7 +268,6 @@ class Pilot(OnCourse):
         assert self._twin is not None
         other, track = copy.copy(self), self._chooser.track.with_piece(piece_rad)
         other._time_law, other._roll = self._time_law.on(track), copy.copy(self._roll)
-        other._chooser = _Fixed(track)
         end = min(self.head + LENGTH_BODIES * track.points, track.end - _LOOKAHEAD_SEGMENTS)
         return self._twin.roll(pose, lambda: other.head >= end, other._move)
 
@@ -306,7 +292,8 @@ class Pilot(OnCourse):
 
         The body is taken to follow its track: goals for the ground under it now would come late.
         """
-        track, head_m, headings_rad = self._chooser.track, view.link_m[0, :2], view.headings_rad
+        track, head_m = self._time_law.joints.track, view.link_m[0, :2]
+        headings_rad = view.headings_rad
         pulse = min(self._pitch_lead_s * self._time_law.speed_segments_s, track.end - self.head)
         if pulse <= 0.0:
             return head_m, headings_rad

@@ -56,6 +56,8 @@ class _Option:
     """A wave that may come next, without its bend."""
 
     state: int
+    near: int
+    """States within tolerance of the aim, of which it was one."""
     base_rad: float
     """Angle of its mean line at its begin."""
     wave_rad: Floats
@@ -114,7 +116,6 @@ class PredictiveWalker:
         self._option: _Option | None = None
         self._base_rad = 0.0
         self._bends = np.zeros(2)
-        self._near = 0
         self._tried: list[_Tried] = []
         self._thinking: Iterator[bool] | None = None
         self._lost = False
@@ -175,7 +176,7 @@ class PredictiveWalker:
         self._at += keep
         self._bends = best.bends
         error = float(wrap(self._base_rad + pose.offset_rad - pose.aim_rad))
-        return Decision(option.state, error, float(bend), self._near, self._star.distinct)
+        return Decision(option.state, error, float(bend), option.near, self._star.distinct)
 
     @property
     def _is_new(self) -> bool:
@@ -185,11 +186,12 @@ class PredictiveWalker:
     def _best(self) -> _Tried:
         """Cheapest piece whose body may be made; the cheapest if none may."""
         ranked = sorted(self._tried, key=lambda each: each.cost_m2)
+        return next(filter(self._may_be_made, ranked), ranked[0])
+
+    def _may_be_made(self, tried: _Tried) -> bool:
+        """Whether the body at the end of what would be appended may be made."""
         old = self.track.body_rad(self.track.end)[: self.track.points - self._keep]
-        for each in ranked:
-            if self._accept(np.concatenate([each.piece_rad[: self._keep][::-1], old])):
-                return each
-        return ranked[0]
+        return self._accept(np.concatenate([tried.piece_rad[: self._keep][::-1], old]))
 
     def _tried_best(self, pose: PathPose, best: _Tried) -> _Tried:
         """Try the best piece on a simulated body where it is steep; where that fails, others."""
@@ -213,16 +215,12 @@ class PredictiveWalker:
     def _others(self, pose: PathPose, best: _Tried) -> list[_Tried]:
         """Pieces unlike each other, the cheapest first: of the state under way, and of others."""
         if not self._is_new:
-            until, near = self._until, self._near
-            self._until = self._at
-            options = self._options(pose)
+            options = self._new_options(pose)
             for carrier in CLIMBING:
-                options += self._options(pose, carrier)[:3]
-            self._until, self._near = until, near
+                options += self._new_options(pose, carrier)[:3]
             for option in options:
                 self._roll(pose, [(option, bends) for bends in _UNLIKE])
         chosen = [best]
-        old = self.track.body_rad(self.track.end)[: self.track.points - self._keep]
         for each in sorted(self._tried, key=lambda each: each.cost_m2):
             if len(chosen) == self._walk.tries:
                 break
@@ -230,7 +228,7 @@ class PredictiveWalker:
             if (
                 len(same) < 3
                 and all(np.abs(each.bends - bends).max() >= 0.7 for bends in same)
-                and self._accept(np.concatenate([each.piece_rad[: self._keep][::-1], old]))
+                and self._may_be_made(each)
             ):
                 chosen.append(each)
         return chosen[1:]
@@ -283,13 +281,18 @@ class PredictiveWalker:
         return np.asarray(limit * (bends[:, :1] * first + bends[:, 1:] * second))
 
     def _options(self, pose: PathPose, carrier: SerpenoidParameters | None = None) -> list[_Option]:
-        """What may come next: the rest of the state, or the smoothest of the first states of W."""
-        points, walk = self.track.points, self._walk
+        """What may come next: the rest of the state, or another."""
         if self._option is not None and not self._is_new:
-            going_on = self._option.wave_rad[self._at :]
-            return [_Option(self._option.state, self._base_rad, going_on)]
+            state, going_on = self._option.state, self._option.wave_rad[self._at :]
+            return [_Option(state, self._option.near, self._base_rad, going_on)]
+        return self._new_options(pose, carrier)
+
+    def _new_options(
+        self, pose: PathPose, carrier: SerpenoidParameters | None = None
+    ) -> list[_Option]:
+        """Other states: the smoothest of the first of W; lost, serpenoids."""
+        points, walk = self.track.points, self._walk
         if self._lost:
-            self._near = 1
             return [self._serpenoid(each) for each in SERPENOIDS]
         share, at = (1.0, 0) if carrier is None else (walk.climb_share, self._phase(carrier))
         carried = np.zeros(self._walked + points + 1)
@@ -297,14 +300,12 @@ class PredictiveWalker:
             carried = carrier.wave_rad(at - 1 + np.arange(len(carried)), points)
         placed = self.track.last_rad - share * self._shapes[:, -1] - carried[0]
         error = wrap(placed + pose.offset_rad - pose.aim_rad)
-        ranks, self._near = self._star.order(
-            error, walk.heading_tolerance_rad, walk.nearest_count, _REST
-        )
+        ranks, near = self._star.order(error, walk.heading_tolerance_rad, walk.nearest_count, _REST)
         states = np.array(list(islice(ranks, walk.proposals)))
         waves = share * self._waves_rad(states) + carried[1:]
         rough = self._roughness(placed[states, None] + waves[:, : self._walked])
         return [
-            _Option(int(states[k]), float(placed[states[k]]), waves[k], carrier, at)
+            _Option(int(states[k]), near, float(placed[states[k]]), waves[k], carrier, at)
             for k in np.argsort(rough, kind="stable")[: walk.candidates]
         ]
 
@@ -313,7 +314,7 @@ class PredictiveWalker:
         points, at = self.track.points, self._phase(carrier)
         waves = carrier.wave_rad(at - 1 + np.arange(self._walked + points + 1), points)
         base = self.track.last_rad - waves[0]
-        return _Option(SERPENOID, float(base), waves[1:], carrier, at)
+        return _Option(SERPENOID, 1, float(base), waves[1:], carrier, at)
 
     def _phase(self, carrier: SerpenoidParameters) -> int:
         """Sample of a carrier that comes next: it goes on, or begins as the track bends."""

@@ -61,7 +61,9 @@ class SteeringWeights:
 
 
 _STEEP = 0.14
+"""Slope from which weight rests on few links of a body: 8 degrees."""
 _AHEAD_POINTS = 100
+"""Points of the path ahead whose slope counts: a metre, the body's length of pulse and a little."""
 _SPAN_SEGMENTS = 40.0
 _UPDATE = 0.25
 """Share of a new measurement in the drift: its memory is four decisions, 0.4 body lengths."""

@@ -45,16 +45,20 @@ class UsesTwin(Protocol):
 class TwinRollout:
     """Rolls out motions of one robot on its twin."""
 
-    def __init__(self, robot: RobotConfig, twin: Twin) -> None:
-        self._robot, self._twin = robot, twin
-        self._seen: list[tuple[BodyPose, Floats]] = []
+    def __init__(self, robot: RobotConfig, make_twin: Callable[[], Twin]) -> None:
+        self._robot, self._make_twin = robot, make_twin
+        self._twin: Twin | None = None
+        self._seen: list[BodyView] = []
         self._dt_s = 0.0
 
     def observe(self, view: BodyView, dt_s: float) -> None:
         """Take the measured body, ``dt_s`` after the last."""
-        pose = BodyPose(0.0, view.link_m[0].copy(), view.rotation[0].copy())
-        self._seen = [*self._seen[-1:], (pose, chain_angles_rad(self._robot, view))]
+        self._seen = [*self._seen[-1:], view]
         self._dt_s = dt_s
+
+    def forget(self) -> None:
+        """Leave out what was seen: the next body is not seen one cycle after it."""
+        self._seen = []
 
     def roll(
         self, pose: PathPose, is_over: Callable[[], bool], move: Callable[[float, BodyView], Floats]
@@ -63,17 +67,24 @@ class TwinRollout:
 
         Args:
             pose: with the path to measure by.
-            is_over: asked before each cycle.
+            is_over: asked before each cycle; not yet at once.
             move: takes the length of a cycle and the body; returns goals (J,).
 
         """
-        (before, before_rad), (now, now_rad) = self._seen[0], self._seen[-1]
+        if self._twin is None:
+            self._twin = self._make_twin()
+        (before, before_rad), (now, now_rad) = self._state(0), self._state(-1)
         self._twin.begin(before, now, before_rad, now_rad, self._dt_s)
-        followed, time_s = Followed(pose.path, pose.path_at), 0.0
-        view = body_in_world(self._robot, now, now_rad)
-        while not (is_over() or time_s >= _LONGEST_S) or time_s == 0.0:
+        followed, time_s, view = Followed(pose.path, pose.path_at), 0.0, self._seen[-1]
+        while time_s < _LONGEST_S and not is_over():
             now, now_rad = self._twin.step(move(self._dt_s, view), self._dt_s)
             view = body_in_world(self._robot, now, now_rad)
             time_s += self._dt_s
             followed.note(view.centre_m[:2], self._dt_s)
         return followed.rolled(view.headings_rad, view.link_m[:, :2] - view.centre_m[:2])
+
+    def _state(self, which: int) -> tuple[BodyPose, Floats]:
+        """Head's pose and joints (J,) of a body seen."""
+        view = self._seen[which]
+        pose = BodyPose(0.0, view.link_m[0], view.rotation[0])
+        return pose, chain_angles_rad(self._robot, view)

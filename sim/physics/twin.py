@@ -13,7 +13,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.plant import FLOOR_STEP_S, MujocoPlant
-from snakewalk.sim.servo.motor import make_drive, motors_of, p_gain_per_rad
+from snakewalk.sim.servo.motor import MotorColumns, make_drive, motors_of, p_gain_per_rad
 
 
 class PlantTwin:
@@ -25,8 +25,8 @@ class PlantTwin:
         motors = motors_of(robot)
         self._drive = make_drive(motors, robot.servo.supply_v)
         self._drive.torque_on[:] = 1.0
-        gains = zip(robot.position_p_gains, motors, strict=True)
-        self._drive.p_gain_per_rad[:] = [float(p_gain_per_rad(gain, each)) for gain, each in gains]
+        gains = np.array(robot.position_p_gains)
+        self._drive.p_gain_per_rad[:] = p_gain_per_rad(gains, MotorColumns(motors))
         self._drive.current_limit_a[:] = robot.current_limits_a
 
     def begin(

@@ -90,7 +90,8 @@ class FrictionLog:
         """
         header, pose = record.header, record.pose
         told = header.run.pose
-        measured = told == "camera" or (header.backend == "sim" and told in (None, "simulator"))
+        true = header.backend == "sim" and header.run.pose_is_true
+        measured = told == "camera" or true
         if not measured:
             way = told or "the IMU or the joints"
             raise InputError(

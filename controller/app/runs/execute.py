@@ -162,7 +162,7 @@ def execute(
         ):
             source = prepared.make_source(log_event)
             if backend.twin is not None and _may_try(prepared) and isinstance(source, UsesTwin):
-                source.use_twin(TwinRollout(robot, backend.twin()))
+                source.use_twin(TwinRollout(robot, backend.twin))
             if waypoint_commands is not None:
                 source = _live(prepared, source, waypoint_commands, log_event)
             link = SafeLink(
@@ -220,9 +220,9 @@ def _live(
 
 def _may_try(prepared: PreparedRun) -> bool:
     """Whether a second body stands where the first does, on ground that is known, a bare snake."""
-    run = prepared.run
-    known = prepared.ground is not None and run.mapping is None and run.pose in (None, "simulator")
-    return known and not prepared.robot.limb_joints and run.motion == "walk" and run.walk.tries > 0
+    run, robot = prepared.run, prepared.robot
+    known = prepared.ground is not None and run.mapping is None
+    return known and run.pose_is_true and not robot.limb_joints
 
 
 @contextmanager

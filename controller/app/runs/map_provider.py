@@ -43,7 +43,7 @@ def map_faults(prepared: PreparedRun, *, metal: bool) -> None:
         faults.append(f"mapping: motion {run.motion} plans once; take walk or serpenoid")
     if prepared.ground is None:
         faults.append(f"mapping: world {prepared.world.name} is level; there is nothing to map")
-    if run.pose not in (None, "simulator"):
+    if not run.pose_is_true:
         faults.append(
             f"mapping: pose {run.pose} knows no heights; the pictures' places come from the "
             "simulator, as from a motion capture"

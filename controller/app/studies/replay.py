@@ -113,7 +113,7 @@ def differences(
     """
     valid = original.cycle.valid
     header = original.header
-    measured = header.backend == "sim" and header.run.pose in (None, "simulator")
+    measured = header.backend == "sim" and header.run.pose_is_true
     reported_only = dict.fromkeys(("velocity_rad_s", "current_a"), float("inf"))
     limits = reported_only | {
         "measured_rad": tolerance_rad,
