@@ -191,6 +191,21 @@ class SafetyConfig(Strict):
         )
 
 
+class DeviationConfig(Strict):
+    """In what a simulated robot and its ground differ from what plan and motion take them to be."""
+
+    friction_along: float = Field(
+        1.0, gt=0.0, le=10.0, description="along the body over the world's, forward and backward"
+    )
+    friction_across: float = Field(
+        1.0, gt=0.0, le=10.0, description="across the body over the world's"
+    )
+    mass: float = Field(1.0, gt=0.0, le=10.0, description="of every link over the robot's")
+    torque: float = Field(
+        1.0, gt=0.0, le=10.0, description="of every servo for a current, over its model's"
+    )
+
+
 class RunConfig(Strict):
     """One run of the main job."""
 
@@ -232,6 +247,10 @@ class RunConfig(Strict):
         None,
         description="what measures the head; default: the simulator, on servos the robot's IMU, "
         "or the joints",
+    )
+    deviation: DeviationConfig = Field(
+        DeviationConfig(),
+        description="of a simulated body and ground from their files: nothing in the run knows",
     )
     camera: CameraConfig = CameraConfig()
     mapping: MappingConfig | None = Field(

@@ -16,7 +16,7 @@ from snakewalk.config.loader import with_keys
 from snakewalk.config.robot import SIMULATED, RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.controller.app.shadow.deviation import NO_DEVIATION, Deviation
+from snakewalk.controller.app.shadow.deviation import Deviation
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.controller.walk.twin_rollout import Twin
 from snakewalk.drivers.bus.chain_bus import ChainBus
@@ -59,7 +59,7 @@ def simulated(
     world: WorldConfig,
     ground: HeightField | None,
     initial_pose: InitialPose,
-    deviation: Deviation = NO_DEVIATION,
+    deviation: Deviation | None = None,
 ) -> Backend:
     """Servos on a simulated line that turn a MuJoCo body with its head at the start.
 
@@ -69,7 +69,8 @@ def simulated(
         world: friction and ground.
         ground: the world's height field, where it has one.
         initial_pose: heading of the head link, and joint angles to begin with, as servos say them.
-        deviation: in what the simulated robot and its ground differ from ``robot`` and ``world``.
+        deviation: in what the simulated robot and its ground differ from ``robot`` and ``world``;
+            None is the run's.
 
     """
     require_extra("simulated runs need", "mujoco")
@@ -80,6 +81,8 @@ def simulated(
     from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
     from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
+    if deviation is None:
+        deviation = Deviation.of_run(run.deviation, robot)
     plant = MujocoPlant(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s)
     joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
     plant.reset(run.start_m, initial_pose.heading_rad, joint_rad)
@@ -184,7 +187,8 @@ def split(
 
     (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)
     rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in here]
-    plant = MujocoPlant(robot, world, ground, run.physics_step_s)
+    deviation = Deviation.of_run(run.deviation, robot)
+    plant = MujocoPlant(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s)
     plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
     motors = motors_of(robot)
     body = SplitPlant(plant, motors, [j for j in range(robot.joint_count) if j not in rows])
@@ -203,6 +207,8 @@ def split(
         supply_and_ambient=SupplyAndAmbient(supply_v=robot.servo.supply_v),
         imu=imu if imu is not None and imu.config.id in here else None,
     )
+    if deviation.torque is not None:
+        line.firmware.drive.torque_constant_n_m_a[:] *= deviation.torque[rows]
     bus = _bus_on_ports(robot, clock, line)
     chain = ServoChain(bus, robot, watchdog_s=run.safety.watchdog_s, rate_hz=run.cycle_hz)
 

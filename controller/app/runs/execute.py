@@ -10,7 +10,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import RunConfig
+from snakewalk.config.run import DeviationConfig, RunConfig
 from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.report.artifacts import write_summary
 from snakewalk.controller.app.result_files import LOG, clear_run, refuse_another_run
@@ -253,6 +253,10 @@ def _read_back(log: Path) -> tuple[RunRecord, RunSummary]:
 
 def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:
     """Refuse what no plan shows: a pose that nothing measures, compliance, a shadow's ground."""
+    if metal and prepared.run.deviation != DeviationConfig():
+        raise InputError(
+            f"run {prepared.run.name}: deviation: a robot on a port is as it is; take the table out"
+        )
     pose_faults(prepared.run, prepared.robot, prepared.world, metal=metal)
     map_faults(prepared, metal=metal)
     check_compliance(prepared.run, prepared.robot)

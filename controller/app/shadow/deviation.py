@@ -7,6 +7,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import DeviationConfig
 from snakewalk.config.world import WorldConfig
 
 if TYPE_CHECKING:
@@ -27,6 +28,17 @@ class Deviation:
     """(J,) torque of each servo for a current, over its model's."""
     slip_rad: Floats | None = None
     """(J,) angle by which each joint is bent more than its servo says: its horn has slipped."""
+
+    @classmethod
+    def of_run(cls, by: DeviationConfig, robot: RobotConfig) -> "Deviation":
+        """Return that of a whole robot from its file."""
+        more = by.mass - 1.0
+        return cls(
+            by.friction_along,
+            by.friction_across,
+            more * np.array(robot.link_masses_kg) if more else None,
+            np.full(robot.joint_count, by.torque) if by.torque != 1.0 else None,
+        )
 
     def robot(self, robot: RobotConfig) -> RobotConfig:
         """Return the body that the physics has."""
