@@ -49,6 +49,15 @@ DAMAGE: Final = (
 """What reading a damaged archive raises, besides ``OSError``."""
 
 
+def why_no_file(path: Path, missing: str = "no such file") -> str:
+    """Say why a path is not one of a file that can be read more than once."""
+    if path.is_dir():
+        return f"{path}: is a folder"
+    if path.exists():
+        return f"{path}: is no file but a pipe or a device: put what it gives into a file"
+    return f"{path}: {missing}"
+
+
 def read_bytes(file: Path, most_bytes: int = MOST_BYTES) -> bytes:
     """Bytes of a file, which may be a device or a pipe, up to a size.
 

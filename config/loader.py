@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args, get_or
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticSerializationError, to_json
 
-from snakewalk.config.archive import read_text
+from snakewalk.config.archive import read_text, why_no_file
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.gait import GaitSetConfig
 
@@ -47,7 +47,7 @@ def locate(kind: Kind, name_or_path: str, beside: Path | None = None) -> Path:
     if beside is not None and not path.is_absolute() and (beside / path).is_file():
         path = beside / path
     if not path.is_file():
-        raise ConfigError(f"{path}: no such file")
+        raise ConfigError(why_no_file(path))
     return path
 
 

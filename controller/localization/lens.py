@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.archive import check_matrices
+from snakewalk.config.archive import check_matrices, why_no_file
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 
@@ -66,7 +66,7 @@ class Lens:
         if file.suffix.lower() not in _ENDINGS:
             raise InputError(f"{file}: the file of a lens ends in {', '.join(_ENDINGS)}")
         if not file.is_file():
-            raise InputError(f"{file}: no such file")
+            raise InputError(why_no_file(file))
         check_matrices(file)
         try:
             store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from itertools import pairwise
+from functools import cache
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
@@ -18,9 +18,9 @@ def main() -> None:
     os.environ["MUJOCO_GL"] = "disable"
     try:
         _check_words(sys.argv[1:])
-        _tell_of_pipes(sys.argv[1:])
         from snakewalk.controller.app.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it
 
+        _tell_of_pipes()
         app(prog_name="snakewalk")
     except InputError as error:
         _end(2, *error.faults)
@@ -59,12 +59,27 @@ def _check_words(words: list[str]) -> None:
             raise InputError(f"{shown}: this name is not UTF-8; rename the file") from None
 
 
-def _tell_of_pipes(words: list[str]) -> None:
-    """Say which inputs are named pipes: to open one waits until another program writes to it."""
-    for before, word in pairwise(("", *words)):
-        own = word.startswith(("/dev/", "/proc/")) or before == "--port"  # a shell's; or refused
-        if not own and Path(word).is_fifo():
-            _print_line(f"{word}: a named pipe: waits for a program that writes to it; ^C ends")
+@cache
+def _tell_of_pipes() -> None:
+    """Have every opening of a named pipe told: it waits until another program opens it, too."""
+    sys.addaudithook(_tell_of_pipe)
+
+
+def _tell_of_pipe(event: str, details: tuple[object, ...]) -> None:
+    """Audit hook: say that the file about to be opened is a named pipe."""
+    if event != "open":
+        return
+    path, _, flags = details
+    if (
+        not isinstance(path, str)
+        or not isinstance(flags, int)
+        or path.startswith(("/dev/", "/proc/"))
+    ):
+        return  # a descriptor, or one of the shell's
+    if flags & getattr(os, "O_NONBLOCK", 0) or not Path(path).is_fifo():
+        return
+    to = "reads from" if flags & os.O_WRONLY else "writes to"
+    _print_line(f"{path}: a named pipe: waits for a program that {to} it; ^C ends")
 
 
 def _end(code: int, *lines: str) -> None:

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.archive import why_no_file
 from snakewalk.config.arrays import DeepImage, Floats, Image
 from snakewalk.config.errors import InputError
 
@@ -185,7 +186,7 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
             deep=_scale_of_deep(files[:: max(1, len(files) // _DEEP_SAMPLE)]),
         )
     if not path.is_file():
-        raise InputError(f"{path}: no such video or folder of images")
+        raise InputError(why_no_file(path, "no such video or folder of images"))
     if path.stat().st_size == 0:
         raise InputError(f"{path}: is an empty file")
     film = cv2.VideoCapture(str(path))

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 from PIL import Image as Pillow
 
-from snakewalk.config.archive import check_expansion, parse_json
+from snakewalk.config.archive import check_expansion, parse_json, why_no_file
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.mesh.mesh import Mesh
@@ -56,7 +56,7 @@ def read_mesh(file: Path, forward: str | None = None, up: str | None = None) -> 
 
     """
     if not file.is_file():
-        raise InputError(f"{file}: no such file")
+        raise InputError(why_no_file(file))
     try:
         size = file.stat().st_size
         check_expansion(file, size, _unpacked_glb(file) if file.suffix.lower() == ".glb" else size)

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -101,17 +102,48 @@ def test_what_is_imported_before_an_interrupt_is_caught_is_little() -> None:
     assert not loaded & {"typer", "rich", "pydantic", "numpy", "numba", "scipy", "mujoco"}
 
 
-def test_a_named_pipe_as_input_is_told_to_wait(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("words", [("report", "{pipe}"), ("bus", "serve", "--faults", "{pipe}")])
+def test_a_named_pipe_that_is_waited_for_is_told(
+    words: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """A program without a word waited for a writer until ^C."""
-    pipe = tmp_path / "track.csv"
+    pipe = tmp_path / "pipe.toml"
     os.mkfifo(pipe)
-    monkeypatch.setattr("sys.argv", ["snakewalk", "no-such-command", str(pipe)])
-    with pytest.raises(SystemExit):
+    monkeypatch.setattr("sys.argv", ["snakewalk", *(word.format(pipe=pipe) for word in words)])
+    writer = threading.Thread(target=pipe.write_text, args=("no = 1",))
+    writer.start()
+    with pytest.raises(SystemExit) as end:
         main()
-    assert f"{pipe}: a named pipe: waits for a program that writes to it" in capsys.readouterr().err
-    monkeypatch.setattr("sys.argv", ["snakewalk", "no-such-command", "--port", str(pipe)])
-    with pytest.raises(SystemExit):
+    writer.join()
+    assert end.value.code == 2
+    told = f"snakewalk: {pipe}: a named pipe: waits for a program that writes to it; ^C ends\n"
+    assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("gait", "run", "lateral-undulation", "--robot", "{pipe}"),
+        ("plan", "{pipe}"),
+        ("gait", "fit", "{pipe}"),
+        ("capture", "{pipe}"),
+    ],
+)
+def test_a_named_pipe_is_not_told_to_be_missing(
+    words: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pipe = tmp_path / "pipe.toml"
+    os.mkfifo(pipe)
+    monkeypatch.setattr("sys.argv", ["snakewalk", *(word.format(pipe=pipe) for word in words)])
+    with pytest.raises(SystemExit) as end:
         main()
-    assert "waits" not in capsys.readouterr().err
+    assert end.value.code == 2
+    assert capsys.readouterr().err == (
+        f"snakewalk: {pipe}: is no file but a pipe or a device: put what it gives into a file\n"
+    )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from snakewalk.config.archive import why_no_file
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.options import Force, Json, Robot, show
 from snakewalk.controller.app.result_files import check_picture
@@ -87,7 +88,7 @@ def _read(path: Path) -> list[list[float]]:
 
     """
     if not path.is_file():
-        raise InputError(f"{path}: no such file")
+        raise InputError(why_no_file(path))
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             table = csv.DictReader(stream, skipinitialspace=True)
