@@ -1,14 +1,25 @@
 """``snakewalk``: runs the command line and says in a line, with an exit code, how it ended."""
 
 import os
+import signal
 import sys
 from functools import cache
 from pathlib import Path
+from types import FrameType
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
 from snakewalk.controller.app.messages import plain
 from snakewalk.drivers.errors import DriverError
+
+_ENDING = tuple(
+    getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)
+)
+"""Signals that would end a program without a word; SIGQUIT is Ctrl-\\."""
+_BY_SIGNAL = 128
+"""Exit code of a program that a signal has ended: this, and the signal's number."""
+_INTERRUPTED = 130
+"""Of Ctrl-C, which has been told."""
 
 
 def main() -> None:
@@ -16,6 +27,9 @@ def main() -> None:
     # Pictures are drawn without a screen, by a context of our own; MuJoCo's import fails on a
     # choice that is not installed.
     os.environ["MUJOCO_GL"] = "disable"
+    for number in _ENDING:
+        if signal.getsignal(number) is signal.SIG_DFL:  # nohup ignores SIGHUP
+            signal.signal(number, _unwind)
     try:
         _check_words(sys.argv[1:])
         from snakewalk.controller.app.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it
@@ -36,12 +50,17 @@ def main() -> None:
         notes = getattr(error, "__notes__", [])  # of a run: what became of torque and log
         _end(1 if notes else 2, "; ".join([f"{place}{error.strerror or error}", *notes]))
     except KeyboardInterrupt:
-        _end(130, "interrupted")
+        _end(_INTERRUPTED, "interrupted")
     except SystemExit as stop:
-        notes = getattr(stop, "__notes__", [])
-        if notes:
-            _print_line("; ".join(["ended by a signal", *notes]))
+        if isinstance(stop.code, int) and stop.code > _BY_SIGNAL and stop.code != _INTERRUPTED:
+            name = signal.Signals(stop.code - _BY_SIGNAL).name
+            _print_line("; ".join([f"ended by {name}", *getattr(stop, "__notes__", [])]))
         raise
+
+
+def _unwind(number: int, frame: FrameType | None) -> None:
+    """Turn a signal into an exception, so that every context ends properly."""
+    raise SystemExit(_BY_SIGNAL + number)
 
 
 def _check_words(words: list[str]) -> None:

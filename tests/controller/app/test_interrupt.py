@@ -95,6 +95,30 @@ def test_an_interrupt_before_the_first_line_of_a_command_is_one_line(
     assert capsys.readouterr().err == "snakewalk: interrupted\n"
 
 
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGQUIT"])
+def test_a_signal_before_anything_moves_is_one_line_too(
+    name: str,
+    mocker: MockerFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The system ended the program without a word, and without the ends of its contexts."""
+    number = signal.Signals[name]
+    mocker.patch(
+        "snakewalk.controller.app.cli.main._check_words",
+        side_effect=lambda words: signal.raise_signal(number),
+    )
+    monkeypatch.setattr("sys.argv", ["snakewalk", "list"])
+    before = signal.signal(number, signal.SIG_DFL)
+    try:
+        with pytest.raises(SystemExit) as end:
+            main()
+    finally:
+        signal.signal(number, before)
+    assert end.value.code == 128 + number
+    assert capsys.readouterr().err == f"snakewalk: ended by {name}\n"
+
+
 def test_what_is_imported_before_an_interrupt_is_caught_is_little() -> None:
     code = "import sys, snakewalk.controller.app.cli.main; print(*sys.modules)"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
