@@ -8,6 +8,8 @@ Rules, each against something that happens on real buses:
 - A reply older than its request is never taken for new. Draining alone cannot promise that, because
   an adapter may stall for longer. So after a failure the request asks for a length of which no
   reply is pending (``pending_replies``), and a late reply is dropped for its wrong length.
+- A reply that came twice is known: it is there sooner than it can have crossed the line, or there
+  is more on the line than was asked for.
 - Fast reads that keep failing are given up for plain ones, where damage ends with its packet.
 """
 
@@ -27,7 +29,8 @@ from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.bus.line_reservation import LineReservation
 from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.port.byte_port import BytePort, DescriptorPort
-from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
+from snakewalk.drivers.protocol.frames import HEAD
+from snakewalk.drivers.protocol.packet import BITS_PER_BYTE, HEADER
 
 if TYPE_CHECKING:
     from snakewalk.drivers.bus.serial_fast_path import SerialFastPath
@@ -53,6 +56,8 @@ class CycleCounters:
     """Reads whose deadline passed before all bytes had arrived."""
     unclean: int = 0
     """Reads with noise, damage, or late replies in them."""
+    copies: int = 0
+    """Older replies that had come twice, and were dropped."""
     drained_bytes: int = 0
     fast_given_up: int = 0
 
@@ -105,7 +110,7 @@ class ControlCycle:
         self._clean_in_a_row = 0
         self._pending = pending if pending is not None else PendingReplies(port.clock)
         self._missed = np.zeros(len(ids), np.intp)
-        self._line = line if line is not None else LineReservation(port.clock)
+        self._line = line or LineReservation(port.clock, paced=port.paced)
         self._default_request = GroupReadRequest(ids, read_address, read_bytes, fast=fast)
         if (
             isinstance(port, DescriptorPort)
@@ -279,9 +284,15 @@ class ControlCycle:
         self, request: GroupReadRequest, raw: bytes, deadline_s: float
     ) -> tuple[bytes, GroupReadReply]:
         """Receive and parse the reply, and then what stuffing has added to it."""
-        missing = request.reply_bytes - len(raw)
-        if missing > 0:
-            raw += self._port.read_until(missing, deadline_s)
+        port, expected = self._port, request.reply_bytes
+        if len(raw) < expected:
+            raw += port.read_until(expected - len(raw), deadline_s)
+        if len(raw) == expected and self._came_twice(request, deadline_s):
+            raw = port.read_until(expected, deadline_s)
+            self._line.note_copies(answered=len(raw) > 0)
+            self.counters.copies += 1
+        if len(raw) > expected or (len(raw) == expected and port.getBytesAvailable()):
+            raw = self._with_surplus(request, raw, deadline_s)
         reply = request.parse(raw)
         while len(raw) >= request.reply_bytes and not reply.complete:
             more = request.missing_bytes(raw)  # stuffed bytes come on top
@@ -291,6 +302,23 @@ class ControlCycle:
             raw += got
             reply = request.parse(raw)
         return raw, reply
+
+    def _with_surplus(self, request: GroupReadRequest, raw: bytes, deadline_s: float) -> bytes:
+        """The bytes of a reply behind which there are more, and those of one that is behind it."""
+        port, expected = self._port, request.reply_bytes
+        if not request.parse(raw[:expected]).whole:
+            return raw
+        more_s = port.clock.now_s() + self._wire_s(2 * HEAD)
+        raw += port.read_until(expected + HEAD - len(raw), more_s)
+        if HEADER not in raw[expected:]:
+            return raw[:expected]  # noise, as when an adapter turns the line round
+        return raw + port.read_until(2 * expected - len(raw), deadline_s)
+
+    def _came_twice(self, request: GroupReadRequest, deadline_s: float) -> bool:
+        """Whether a reply that is complete now is an older one."""
+        reply_s = self._wire_s(request.reply_bytes)
+        free_s = deadline_s - reply_s - self._latency_s
+        return self._line.came_twice(free_s, self._wire_s(len(request.packet)), reply_s)
 
     def _wire_s(self, count: int) -> float:
         return count * BITS_PER_BYTE / self._port.getBaudRate()

@@ -88,7 +88,8 @@ class DynamixelBus:
         self.latency_s = latency_s
         """How long adapter and driver may hold bytes back (FTDI: its latency timer)."""
         self._tries = max(1, tries)
-        self._pending, self._line = PendingReplies(port.clock), LineReservation(port.clock)
+        self._pending = PendingReplies(port.clock)
+        self._line = LineReservation(port.clock, paced=port.paced)
         self._sdk = sdk.PacketHandler(2.0)
 
     @property

@@ -103,8 +103,7 @@ class GroupReadRequest:
         if self.fast:
             return 0
         reader = PacketParser()
-        complete = {p.servo_id for p in reader.feed(raw)}
-        missing = sum(servo_id not in complete for servo_id in self.ids)
+        missing = len(self.ids) - len(self._in_turn(reader.feed(raw))[0])
         return max(1, missing * self.frame_bytes - reader.pending) if missing else 0
 
     def _regular(self, raw: Bytes) -> GroupReadReply | None:
@@ -121,26 +120,43 @@ class GroupReadRequest:
     def _salvage_plain(self, raw: bytes) -> GroupReadReply:
         reader = PacketParser()
         packets = reader.feed(raw)
-        unexpected = reader.dropped_bytes + reader.pending
-        by_id: dict[int, StatusPacket] = {}
-        twice: set[int] = set()
-        for packet in packets:
-            if not isinstance(packet, StatusPacket) or packet.servo_id not in self._index:
-                unexpected += 1
-            elif len(packet.params) not in (self.length, 0):
-                unexpected += 1  # the reply to another, older request
-            elif packet.servo_id in by_id:
-                twice.add(packet.servo_id)
-            else:
-                by_id[packet.servo_id] = packet
-        for servo_id in twice:
-            del by_id[servo_id]  # which of the two is new cannot be known
-        return self._partial(by_id, clean=not unexpected and not twice)
+        by_id, unexpected = self._in_turn(packets)
+        unexpected += reader.dropped_bytes + reader.pending
+        return self._partial(by_id, clean=not unexpected)
+
+    def _in_turn(self, packets: Sequence[object]) -> tuple[dict[int, StatusPacket], int]:
+        """Replies of this length by servo, and how many packets are none, or came out of turn.
+
+        Servos reply in the order of the request. So what belongs to every longest run in that
+        order is new, and a packet of the same servo before it is an older one that came twice. Of
+        two in one place, or one behind it, it cannot be known which is new.
+        """
+        told = [
+            packet
+            for before, packet in zip([None, *packets], packets, strict=False)
+            if isinstance(packet, StatusPacket)
+            and packet.servo_id in self._index
+            and len(packet.params) in (self.length, 0)  # else to another, older request
+            and packet != before  # what came twice at once says the same
+        ]
+        turns = [self._index[packet.servo_id] for packet in told]
+        before, after = _run_lengths(turns), _run_lengths([-t for t in reversed(turns)])[::-1]
+        longest = max(before, default=0)
+        ranks = [
+            rank if rank + rest == longest + 1 else 0
+            for rank, rest in zip(before, after, strict=True)
+        ]
+        by_id = {
+            packet.servo_id: packet
+            for k, (packet, rank) in enumerate(zip(told, ranks, strict=True))
+            if rank and ranks.count(rank) == 1 and turns[k] not in turns[k + 1 :]
+        }
+        return by_id, len(packets) - len(by_id)
 
     def _salvage_fast(self, raw: bytes) -> GroupReadReply:
         """Results in front of the first damage, each proved by its CRC of everything so far."""
         by_id: dict[int, StatusPacket] = {}
-        start = raw.find(self._fast_head)
+        start = raw.rfind(self._fast_head)  # of two, the first is an older one that came twice
         if start < 0:
             return self._partial(by_id, clean=not raw)
         at = start + len(self._fast_head)
@@ -170,6 +186,15 @@ class GroupReadRequest:
                 data[k] = np.frombuffer(packet.params, np.uint8)
                 valid[k] = True
         return GroupReadReply(data, valid, error, answered, clean)
+
+
+def _run_lengths(values: Sequence[int]) -> list[int]:
+    """Of each value, the length of the longest rising run that ends with it."""
+    lengths: list[int] = []
+    for k, value in enumerate(values):
+        lower = [lengths[j] for j in range(k) if values[j] < value]
+        lengths.append(1 + max(lower, default=0))
+    return lengths
 
 
 def _constant(array: NDArray[S]) -> NDArray[S]:

@@ -1,19 +1,26 @@
 """Until when a line carries what was sent on it: no reply begins before.
 
 A write returns long before its bytes have left. Whoever asks for a reply counts its time from when
-the line is free, also where another has sent what is still on it.
+the line is free, also where another has sent what is still on it. A reply that is complete before
+it can have crossed the line is an older one that came twice.
 """
 
 import numpy as np
 
 from snakewalk.drivers.clock import Clock, WallClock
 
+_LEAST_SHARE = 0.9
+"""Of the computed time of request and reply: neither clock is off by so much (ours)."""
+_IN_VAIN = 2
+"""Replies in a row that were taken for copies, with nothing behind them, after which the line is
+known to be faster than its baud rate (ours): some adapters have another one on their other side."""
+
 
 class LineReservation:
-    """Of one port, shared by all who send on it."""
+    """Of one port, shared by all who send on it; ``paced`` as of ``BytePort``."""
 
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
+    def __init__(self, clock: Clock, *, paced: bool = False) -> None:
+        self._clock, self._paced, self._in_vain = clock, paced, 0
         self.free_s = np.array([clock.now_s()])
         """(1,) when all that was sent will have left, on the clock, s; compiled code writes it."""
 
@@ -32,3 +39,20 @@ class LineReservation:
         free_s = max(self._clock.now_s(), float(self.free_s[0])) + wire_s
         self.free_s[0] = free_s
         return free_s
+
+    def came_twice(self, free_s: float, request_s: float, reply_s: float) -> bool:
+        """Whether a reply that is complete now cannot be that to the last request.
+
+        Args:
+            free_s: when the request will have left, on the clock.
+            request_s: how long it is on the line.
+            reply_s: how long the reply is.
+
+        """
+        late_s = self._clock.now_s() - free_s - reply_s
+        return self._paced and late_s < -(1.0 - _LEAST_SHARE) * (request_s + reply_s)
+
+    def note_copies(self, *, answered: bool) -> None:
+        """Note that replies had come twice, and whether the right one was behind them."""
+        self._in_vain = 0 if answered else self._in_vain + 1
+        self._paced = self._paced and self._in_vain < _IN_VAIN

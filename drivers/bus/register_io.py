@@ -94,7 +94,7 @@ def _exchange(
     pending: PendingReplies,
     line: LineReservation,
 ) -> StatusPacket:
-    reader = PacketParser()
+    reader, copies = PacketParser(), False
     raw, expected = encode_instruction(packet), STATUS_BYTES + data_bytes
     byte_s = BITS_PER_BYTE / port.getBaudRate()
     port.clearPort()
@@ -109,9 +109,16 @@ def _exchange(
                 and reply.servo_id == packet.servo_id
                 and not _is_other(reply, data_bytes, pending)
             ):
+                if line.came_twice(free_s, len(raw) * byte_s, expected * byte_s):
+                    copies = True
+                    continue
+                if copies:
+                    line.note_copies(answered=True)
                 check_accepted(packet.servo_id, what, reply.error)
                 return reply
         missing = max(1, expected - reader.pending)  # stuffing or noise made it longer
+    if copies:
+        line.note_copies(answered=False)
     raise NoAnswerError(f"servo {packet.servo_id}: {what}: no answer at {port.getBaudRate()} baud")
 
 

@@ -102,7 +102,8 @@ def _receive(
         free_s: (1,) of the line's ``LineReservation``.
 
     Returns:
-        What the frame reader says of a complete reply; ``-1 - n``: only ``n`` bytes arrived.
+        What the frame reader says of a complete reply; ``-1 - n``: ``n`` bytes arrived, too few or
+        one too many: more than the reply is on the line.
 
     """
     begun_ns, wire_ns = int(plan[BEGUN_NS]), int(plan[REQUEST_NS])
@@ -112,10 +113,11 @@ def _receive(
     wait_ns = least_ns + int(plan[LATENCY_NS])
     request_end = int(plan[WRITE_BYTES] + plan[REQUEST_BYTES])
     heads_end, ids_end, error_end = plan[HEADS_END], plan[IDS_END], plan[ERROR_END]
-    reply, error = work[error_end:], work[ids_end:error_end]
+    room, error = work[error_end:], work[ids_end:error_end]
+    reply = room[:-1]
     latency_estimate = plan[LATENCY_ESTIMATE : LATENCY_ESTIMATE + 2]
-    got = receive(fd, reply, begun_ns, least_ns, wait_ns, plan[SPIN_NS], latency_estimate)
-    if got < len(reply):
+    got = receive(fd, room, begun_ns, least_ns, wait_ns, plan[SPIN_NS], latency_estimate)
+    if got != len(reply):
         found = -1 - int(got)
     elif plan[FAST]:
         head, ids = work[request_end:heads_end], work[heads_end:ids_end]
@@ -160,10 +162,10 @@ class SerialFastPath:
         parts = [np.frombuffer(bytes(part), np.uint8) for part in head]
         ends = np.cumsum([len(part) for part in parts])
         reply_at = int(ends[3]) + count
-        self._work = np.zeros(reply_at + request.reply_bytes, np.uint8)
+        self._work = np.zeros(reply_at + request.reply_bytes + 1, np.uint8)
         self._work[: ends[3]] = np.concatenate(parts)
         self._write_bytes, self._request_end = int(ends[0]), int(ends[1])
-        self._error, self._reply = self._work[ends[3] : reply_at], self._work[reply_at:]
+        self._error, self._room = self._work[ends[3] : reply_at], self._work[reply_at:]
         self._plan = np.zeros(PLAN_SIZE, np.int64)
         self._plan[WRITE_BYTES], self._plan[REQUEST_BYTES] = ends[0], ends[1] - ends[0]
         self._plan[HEADS_END : ERROR_END + 1] = ends[2], ends[3], reply_at
@@ -229,12 +231,12 @@ class SerialFastPath:
             return reply
         if found > IRREGULAR:
             return self._request.regular(found, data, self._error)
-        return self._reply[: None if found == IRREGULAR else -1 - found].tobytes()
+        return self._room[: len(self._room) - 1 if found == IRREGULAR else -1 - found].tobytes()
 
     def _update_wire_times(self) -> None:
         """Times on the line at the port's present baud rate."""
         self._baud = baud = self._port.getBaudRate()
         plan = self._plan
-        counts = int(plan[WRITE_BYTES]), int(plan[REQUEST_BYTES]), len(self._reply)
+        counts = int(plan[WRITE_BYTES]), int(plan[REQUEST_BYTES]), len(self._room) - 1
         for time, count in zip((WRITE_NS, REQUEST_NS, REPLY_NS), counts, strict=True):
             plan[time] = count * _BYTE_NS_BAUD // baud

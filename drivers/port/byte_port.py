@@ -90,6 +90,14 @@ class BytePort(SdkPort, Protocol):
         """For messages: ``/dev/ttyUSB0``, ``simulated line``."""
         ...
 
+    @property
+    def paced(self) -> bool:
+        """Whether on the clock bytes take the time that the baud rate says.
+
+        They do on a wire; not on a pseudo-terminal, and nobody knows behind a network.
+        """
+        ...
+
     def write(self, data: bytes) -> None:
         """Send all of ``data`` without waiting until it is on the wire.
 

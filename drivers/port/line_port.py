@@ -62,6 +62,11 @@ class LinePort(ABC):
         return self._name
 
     @property
+    def paced(self) -> bool:
+        """Whether bytes take the time that the baud rate says."""
+        return False
+
+    @property
     @abstractmethod
     def latency_s(self) -> float:
         """How long bytes may be held back on the way, the ``latency_s`` of ``DynamixelBus``."""

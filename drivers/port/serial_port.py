@@ -73,6 +73,11 @@ class SerialPort(LinePort):
         timer_ms = self.latency_timer_ms
         return 0.003 + (timer_ms if timer_ms is not None else 1) * 1e-3
 
+    @property
+    def paced(self) -> bool:
+        """True of a device; a pseudo-terminal has no wire."""
+        return not self._is_pseudo_terminal()
+
     def write(self, data: bytes) -> None:
         """Send all of ``data``."""
         fd = self._fileno

@@ -91,11 +91,13 @@ def receive(
     spin_ns: int,
     latency_estimate: NDArray[np.int64],
 ) -> int:
-    """Receive into ``reply`` until it is full or the deadline has passed; returns the byte count.
+    """Receive until a reply is complete or the deadline has passed; returns the byte count.
+
+    It is one more than the reply has where more is on the line.
 
     Args:
         fd: descriptor, non-blocking.
-        reply: (n,) filled; at least 1 byte.
+        reply: (n + 1,) filled; n is the length of the reply, at least 1 byte.
         begun_ns: when the request was sent.
         least_ns: from then until the last byte can have arrived at the earliest.
         wait_ns: from then until the deadline.
@@ -106,7 +108,7 @@ def receive(
     """
     time = np.empty(2, np.int64)  # struct timespec
     awaited = np.empty(1, np.int64)  # struct pollfd: descriptor, events, returned events
-    here, count = reply.ctypes.data, len(reply)
+    here, count = reply.ctypes.data, len(reply) - 1
     got = 0
     if spin_ns > 0:
         expected_ns = begun_ns + least_ns + int(latency_estimate[LATE])
@@ -119,9 +121,9 @@ def receive(
         in_time = sleep_ns > 0 and here_ns < expected_ns
         polled = False
         while not polled or here_ns < expected_ns + spin_ns:
-            more = int(_read(fd, here + got, count - got))
+            more = int(_read(fd, here + got, count + 1 - got))
             got += max(more, 0)
-            if got == count:
+            if got >= count:
                 if polled:
                     late_ns = _now_ns(time) - begun_ns - least_ns
                     update(latency_estimate, late_ns, least_ns, spin_ns)
@@ -137,14 +139,14 @@ def receive(
         awaited[0] = fd | _POLLIN << 32
         if _ppoll(awaited.ctypes.data, 1, time.ctypes.data, 0) <= 0:
             return got  # the deadline, or a signal
-        more = int(_read(fd, here + got, count - got))
+        more = int(_read(fd, here + got, count + 1 - got))
         if more <= 0:
             return got  # the device is gone
         got += more
         while more == _PIECE and got < count:
-            more = int(_read(fd, here + got, count - got))
+            more = int(_read(fd, here + got, count + 1 - got))
             got += max(more, 0)
-        if got == count:
+        if got >= count:
             if spin_ns > 0:
                 late_ns = _now_ns(time) - begun_ns - least_ns
                 update(latency_estimate, late_ns, least_ns, spin_ns)

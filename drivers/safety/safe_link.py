@@ -40,8 +40,8 @@ class SafeLink:
     (called at each read and write) returns a reason, it latches: torque goes off, ``tripped`` says
     why, ``write`` raises; ``read`` goes on, for the log. Only ``reset`` by an operator and a new
     ``enable`` let it move again. Inside the context SIGTERM, SIGINT, SIGHUP,
-    SIGQUIT and SIGTSTP unwind the program through the exit; if it is killed, the servos' bus
-    watchdog stops them.
+    SIGQUIT and SIGTSTP unwind the program through the exit, unless they are ignored, as SIGHUP is
+    under nohup; if it is killed, the servos' bus watchdog stops them.
 
     With a ``recovery`` it does not latch at once when the line or a servo goes away: the chain
     holds, and goes on from where it stands if the policy of the recovery allows it; the same with a
@@ -82,7 +82,8 @@ class SafeLink:
     def __enter__(self) -> "SafeLink":
         if threading.current_thread() is threading.main_thread():
             for number in _SIGNALS:
-                self._handlers[number] = signal.signal(number, _unwind)
+                if signal.getsignal(number) is not signal.SIG_IGN:
+                    self._handlers[number] = signal.signal(number, _unwind)
         return self
 
     def __exit__(

@@ -159,6 +159,11 @@ class Wire(ABC):
     # the same, in seconds
 
     @property
+    def paced(self) -> bool:
+        """Whether bytes take the time that the baud rate says: they do."""
+        return True
+
+    @property
     def name(self) -> str:
         """For messages."""
         return "simulated line"

@@ -27,6 +27,11 @@ class ScriptedPort:
         self.arriving += [(now + delay, answer) for delay, answer in self.script(data)]
         self.arriving.sort(key=lambda item: item[0])
 
+    @property
+    def paced(self) -> bool:
+        """Bytes arrive when the script says."""
+        return False
+
     def read_until(self, count: int, deadline_s: float) -> bytes:
         got = b""
         while len(got) < count and self.arriving and self.arriving[0][0] <= deadline_s:

@@ -221,6 +221,17 @@ def test_signals_unwind_through_torque_off(
     assert signal.getsignal(number) is before
 
 
+def test_a_signal_that_is_ignored_stays_ignored(link: SafeLink) -> None:
+    """``nohup`` begins a program so: its run goes on when the terminal is gone."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with link:
+            signal.raise_signal(signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
 def test_a_second_signal_does_not_interrupt_torque_off(joints: Joints, clock: SimClock) -> None:
     class Impatient(Joints):
         def disable(self) -> None:
