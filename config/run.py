@@ -230,7 +230,7 @@ class RunConfig(Strict):
     seed: int = Field(0, ge=0, lt=2**63)
     cycle_hz: float = Field(50.0, gt=0.0, le=1000.0)
     physics_step_s: float | None = Field(
-        None, gt=0.0, le=0.01, description="default: 0.002 on a floor, 0.001 on a height field"
+        None, ge=2e-5, le=0.01, description="default: 0.002 on a floor, 0.001 on a height field"
     )
     time_limit_s: float = Field(240.0, gt=0.0)
     states: StatesConfig = StatesConfig()

@@ -37,6 +37,7 @@ RunName = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 Seed = Annotated[int | None, typer.Option(help="of every random choice")]
+FirstSeed = Annotated[int, typer.Option(min=0, max=2**62, help="the others follow it")]
 Motion = Annotated[
     str | None,
     typer.Option(

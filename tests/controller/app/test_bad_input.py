@@ -121,6 +121,12 @@ ROWS = [
     ("view empty", "is not an MCAP log"),
     ("view empty --view-at 127.0.0.1:99999", "expected HOST or HOST:PORT, e.g. 127.0.0.1:8080"),
     ("stop nosuch", "nosuch: no such run is under way"),
+    ("run flat-slalom --set run.physics_step_s=1e-9", "physics_step_s: must be at least 2e-05"),
+    ("run flat-slalom --set run.deviation.mass=0", "deviation.mass: must be over 0 (got 0)"),
+    (
+        "trials flat-slalom --first-seed 99999999999999999999999",
+        "'--first-seed': Input should be less",
+    ),
     ("stop nosuch --port /dev/nosuch", "stop takes a run or --port, not both"),
     ("stop --port /dev/nosuch", "/dev/nosuch: no such port"),
     ("stop --port file.txt", "file.txt: is no serial device, which is such as /dev/ttyUSB0"),

@@ -16,6 +16,7 @@ from snakewalk.controller.app.cli import completion
 from snakewalk.controller.app.cli.options import (
     VIEW_AT,
     Film,
+    FirstSeed,
     Force,
     GivenRobot,
     GivenWorld,
@@ -180,7 +181,7 @@ def policy_trials(
         typer.Option(help="may be given again; default: flat", autocompletion=completion.WORLDS),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a row")] = 10,
-    first_seed: Annotated[int, typer.Option(min=0, help="the others follow it")] = 0,
+    first_seed: FirstSeed = 0,
     seconds: Annotated[float, typer.Option(min=5.0, help="of each run")] = 12.0,
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
     as_json: Json = False,

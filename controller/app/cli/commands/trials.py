@@ -13,7 +13,15 @@ from rich.table import Table
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.cli import completion
-from snakewalk.controller.app.cli.options import DEFAULT_RUN, Force, Json, TrackFile, World, console
+from snakewalk.controller.app.cli.options import (
+    DEFAULT_RUN,
+    FirstSeed,
+    Force,
+    Json,
+    TrackFile,
+    World,
+    console,
+)
 from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.result_files import check_picture, refuse_to_overwrite
 
@@ -54,7 +62,7 @@ def trials(
         ),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a row")] = 20,
-    first_seed: Annotated[int, typer.Option(min=0, help="the others follow it")] = 0,
+    first_seed: FirstSeed = 0,
     start_spread: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="of the start in x and y, m; 0: not moved")
     ] = 0.04,
