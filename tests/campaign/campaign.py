@@ -112,7 +112,9 @@ def run_scenario(kinds: tuple[str, ...], seed: int, cycles: int) -> Tally:
             tally.too_long += clock.now_s() - started_s > LONGEST_CYCLE_S
         next_s = max(next_s + PERIOD_S, clock.now_s())
     tally.brought_back = rig.link.recoveries
-    for name in ("noticed", "unnoticed", "ended_otherwise"):
+    tally.unnoticed = len(rig.changes.unnoticed)
+    tally.complaints += [f"{kinds} {seed}: {line}" for line in rig.changes.unnoticed]
+    for name in ("noticed", "ended_otherwise"):
         setattr(tally, name, getattr(rig.changes, name))
     for name in ("beyond_limit", "too_fast", "old", "foreign", "not_held"):
         setattr(tally, name, getattr(rig.witness, name))

@@ -91,7 +91,8 @@ class ChangeWatch:
         self._cycles: dict[Change, int] = {}
         self._pending: set[Change] = set()
         self._recoveries = 0
-        self.noticed = self.unnoticed = self.ended_otherwise = 0
+        self.noticed = self.ended_otherwise = 0
+        self.unnoticed: list[str] = []
         chain.on_event = self.lines.append
         check = chain._check_liveness
 
@@ -115,7 +116,8 @@ class ChangeWatch:
         self._cycles = {
             each: self._cycles.get(each, 0) + bool(valid[list(each[0])].any()) for each in changed
         }
-        self.unnoticed += sum(count == NOTICED_CYCLES for count in self._cycles.values())
+        for joints, register in [c for c, k in self._cycles.items() if k == NOTICED_CYCLES]:
+            self.unnoticed.append(f"unnoticed: {register} of {', '.join(map(str, joints))}")
         self._pending = {each for each in changed if self._cycles[each] < NOTICED_CYCLES}
         self.lines.clear()
 
