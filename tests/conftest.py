@@ -1,6 +1,7 @@
 """Fixtures shared by all tests."""
 
 import gc
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +13,20 @@ from hypothesis import settings
 # and other examples are tried in every run: half as many as usual are enough for one
 settings.register_profile("untimed", deadline=None, max_examples=50)
 settings.load_profile("untimed")
+
+
+def pytest_configure() -> None:
+    """Have signals as a terminal has them, also where the tests were started by nohup or beside.
+
+    The programs that a test starts inherit it.
+    """
+    for number, handler in (
+        (signal.SIGINT, signal.default_int_handler),
+        (signal.SIGHUP, signal.SIG_DFL),
+        (signal.SIGQUIT, signal.SIG_DFL),
+    ):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, handler)
 
 
 def pytest_collection_finish() -> None:

@@ -40,7 +40,7 @@ class SafeLink:
     (called at each read and write) returns a reason, it latches: torque goes off, ``tripped`` says
     why, ``write`` raises; ``read`` goes on, for the log. Only ``reset`` by an operator and a new
     ``enable`` let it move again. Inside the context SIGTERM, SIGINT, SIGHUP,
-    SIGQUIT and SIGTSTP unwind the program through the exit, unless they are ignored, as SIGHUP is
+    SIGQUIT and SIGTSTP unwind the program through the exit, but for SIGHUP where it is ignored, as
     under nohup; if it is killed, the servos' bus watchdog stops them.
 
     With a ``recovery`` it does not latch at once when the line or a servo goes away: the chain
@@ -82,7 +82,9 @@ class SafeLink:
     def __enter__(self) -> "SafeLink":
         if threading.current_thread() is threading.main_thread():
             for number in _SIGNALS:
-                if signal.getsignal(number) is not signal.SIG_IGN:
+                # what a shell starts beside itself ignores SIGINT: it has to stop all the same
+                ignored = number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN
+                if not ignored:
                     self._handlers[number] = signal.signal(number, _unwind)
         return self
 
