@@ -28,7 +28,9 @@ class Recheck:
     names: tuple[str, ...]
     """Of these joints."""
     moved_rad: Floats
-    """(J,) from where each joint was last seen to where it is; NaN where it was not read."""
+    """(J,) from where each joint was believed to be to where it is; NaN where it was not read."""
+    position_rad: Floats
+    """(J,) where each joint is; NaN where it was not read."""
 
     def __str__(self) -> str:
         if self.faults:
@@ -44,7 +46,7 @@ def recheck(
     units: JointUnits,
     before: Inspection | None,
     configured: Mapping[int, Mapping[str, int]],
-    position_rad: Floats,
+    believed_rad: Floats,
 ) -> Recheck:
     """Compare model, firmware, alarm, torque, RAM settings and position with what they were.
 
@@ -54,7 +56,7 @@ def recheck(
         units: of its joints.
         before: as found at the start; None: nothing to compare with.
         configured: values of RAM registers as they were set, by joint.
-        position_rad: (J,) where the joints were last seen.
+        believed_rad: (J,) where the joints were when their readings could last be believed.
 
     Raises:
         BusError: a servo stops answering meanwhile.
@@ -62,9 +64,12 @@ def recheck(
 
     """
     now = inspect(bus, robot)
-    moved = np.full(robot.joint_count, np.nan)
+    here_rad = np.full(robot.joint_count, np.nan)
     if now.faults:
-        return Recheck(now.faults, (), (), moved)
+        return Recheck(now.faults, (), (), here_rad, here_rad)
+    for joint, servo in enumerate(now.servos):
+        here_rad[joint] = units.position_rad(joint, servo.registers["Present Position"])
+    moved = here_rad - believed_rad
     faults: list[ChainFault] = []
     known = {s.servo_id: s for s in before.servos} if before is not None else {}
     for joint, servo in enumerate(now.servos):
@@ -75,8 +80,6 @@ def recheck(
                 "another servo?"
             )
             faults.append(ChainFault(FaultCause.OTHER_FIRMWARE, text))
-        raw = servo.registers["Present Position"]
-        moved[joint] = units.position_rad(joint, raw) - position_rad[joint]
         name = robot.joint_name(joint)
         turns = round(moved[joint] / math.tau) if np.isfinite(moved[joint]) else 0
         if turns:
@@ -94,4 +97,6 @@ def recheck(
             faults.append(ChainFault(FaultCause.EXCHANGED, other))
         if not servo.torque_on or found != values:
             reset.append(joint)
-    return Recheck(tuple(faults), tuple(reset), tuple(map(robot.joint_name, reset)), moved)
+    return Recheck(
+        tuple(faults), tuple(reset), tuple(map(robot.joint_name, reset)), moved, here_rad
+    )

@@ -16,7 +16,7 @@ from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.group_read import GroupReadReply
 from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Readings
-from snakewalk.drivers.chain.recheck import Recheck, recheck
+from snakewalk.drivers.chain.recheck import MOVED_RAD, Recheck, recheck
 from snakewalk.drivers.chain.start_up import (
     IDENTITY,
     RAM_SETTINGS,
@@ -108,6 +108,7 @@ class ServoChain:
         self._reads = 0
         self._armed = False
         self._sent_at_s = -np.inf
+        self._goal_rad = np.full(robot.joint_count, np.nan)
 
     @property
     def joint_count(self) -> int:
@@ -157,23 +158,27 @@ class ServoChain:
         self._prepare_reads(fast=self.inspection.fast_reads)
         return self._begin()
 
-    def recheck(self) -> Recheck:
+    def recheck(self, believed_rad: Floats) -> Recheck:
         """Compare the chain after an interruption with what it was; moves nothing.
+
+        Args:
+            believed_rad: (J,) where its joints were when their readings could last be believed.
 
         Raises:
             BusError: a servo does not reply.
             PortError: the port is gone.
 
         """
-        before = self._readings.state(self._clock.now_s()).position_rad
         known, settings = self.inspection, self._configured
-        return recheck(self._bus, self.robot, self._units, known, settings, before)
+        return recheck(self._bus, self.robot, self._units, known, settings, believed_rad)
 
     def resume(self, found: Recheck) -> JointState:
         """Go on after an interruption: torque that is on stays on, nothing moves.
 
-        Servos that lost their torque or their settings (rebooted) are set up again. The others get
-        their watchdog cleared and, right behind it, goal = present.
+        A joint that is read elsewhere than ``found`` it is not gone on with: two servos with one
+        ID reply in turn, and the goal of the one would be where the other stands. Servos that lost
+        their torque or their settings (rebooted) are set up again. The others get their watchdog
+        cleared and, right behind it, goal = present.
 
         Raises:
             ChainError: ``found`` forbids it.
@@ -185,14 +190,16 @@ class ServoChain:
             raise ChainError([str(fault) for fault in found.faults])
         again = configure(self._bus, self.robot, self._units, found.reset, self.on_event)
         self._configured.update(again)
-        return self._begin()
+        return self._begin(found.position_rad)
 
-    def _begin(self) -> JointState:
+    def _begin(self, found_rad: Floats | None = None) -> JointState:
         """Read the first state, hold it and arm the watchdogs; torque is off if that fails."""
         self._reads = 0
         state = self._first_state()
         check_pose(self.robot, state.position_rad)
         try:
+            if found_rad is not None:
+                self._check_stillness(state.position_rad, found_rad)
             return self._hold_and_arm(state)
         except BaseException:
             self.disable()
@@ -217,16 +224,40 @@ class ServoChain:
         """
         self._bus.reopen()
 
-    def hold(self) -> None:
-        """Set all goals to the positions that were last read.
+    def _check_stillness(self, position_rad: Floats, found_rad: Floats) -> None:
+        """Compare where the joints are read with where they have just been found.
+
+        Raises:
+            ChainError: a joint is elsewhere, though its servo should hold.
+
+        """
+        moved_rad = position_rad - found_rad
+        joint = int(np.argmax(np.abs(moved_rad)))
+        if not abs(moved_rad[joint]) <= MOVED_RAD:
+            raise ChainError(
+                [
+                    f"{self.robot.joint_name(joint)}: read {moved_rad[joint]:+.2f} rad from where "
+                    "it was found just before: two servos with one ID, or moved by hand"
+                ]
+            )
+
+    def hold(self, believed_rad: Floats) -> None:
+        """Set the goals to the positions that were last read.
+
+        A joint that was read far from where it is believed to be keeps its goal: two servos have
+        one ID, or IDs were exchanged.
+
+        Args:
+            believed_rad: (J,) where the joints were when their readings could last be believed.
 
         Raises:
             PortError: the port is gone.
 
         """
-        here = self._readings.state(self._clock.now_s()).position_rad
-        if np.isfinite(here).all():
-            self._send_goals(here)
+        here_rad = self._readings.state(self._clock.now_s()).position_rad
+        if np.isfinite(here_rad).all():
+            believed = np.abs(here_rad - believed_rad) <= MOVED_RAD
+            self._send_goals(np.where(believed, here_rad, self._goal_rad))
 
     def _hold_and_arm(self, state: JointState) -> JointState:
         """Goal = present, torque on, watchdog armed; every step read back."""
@@ -435,6 +466,7 @@ class ServoChain:
     def _send_goals(self, goal_rad: Floats) -> Int32s:
         goals = self._goals.encode(goal_rad)
         self._cycle.write_goals(goals)
+        self._goal_rad = goal_rad
         return goals
 
     def _expect(self, name: str, values: Sequence[int]) -> None:

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Generic, Literal, Protocol, TypeVar
 
+from snakewalk.config.arrays import Floats
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import ChainFault, DriverError, FaultCause, PortError
 from snakewalk.drivers.types import JointState
@@ -44,16 +45,16 @@ class RecoverableLink(Protocol[C]):
         """Open the port again; raises ``PortError`` while it is not there."""
         ...
 
-    def hold(self) -> None:
-        """Set the goals to the positions that were last read."""
+    def hold(self, believed_rad: Floats) -> None:
+        """Set the goals to the positions that were last read, where these can be believed."""
         ...
 
     def reboot(self, joint: int) -> None:
         """Restart a joint's servo."""
         ...
 
-    def recheck(self) -> C:
-        """Compare the chain with what it was."""
+    def recheck(self, believed_rad: Floats) -> C:
+        """Compare the chain with what it was, and with where its joints were believed to be."""
         ...
 
     def resume(self, found: C) -> JointState:
@@ -94,11 +95,14 @@ class Recovery(Generic[C]):
         self.overload_reboots = overload_reboots
         """How many are left."""
 
-    def recover(self, reason: str, stopped: Callable[[], str | None]) -> JointState | None:
+    def recover(
+        self, reason: str, believed_rad: Floats, stopped: Callable[[], str | None]
+    ) -> JointState | None:
         """Hold, wait, compare, ask, go on; None if it must not or cannot go on.
 
         Args:
             reason: of the interruption.
+            believed_rad: (J,) where the joints were when their readings could last be believed.
             stopped: called while waiting; returns a reason to give up, or None.
 
         Raises:
@@ -108,16 +112,22 @@ class Recovery(Generic[C]):
         if self._policy == "stop" or self._remaining <= 0:
             return None
         self._remaining -= 1
-        return self._bring_back(f"interrupted: {reason}; the servos hold", stopped)
+        event = f"interrupted: {reason}; the servos hold"
+        return self._bring_back(event, believed_rad, stopped)
 
     def restart(
-        self, joint: int, reason: str, stopped: Callable[[], str | None]
+        self,
+        joint: int,
+        reason: str,
+        believed_rad: Floats,
+        stopped: Callable[[], str | None],
     ) -> JointState | None:
         """Hold, reboot the servo of a joint, compare, go on; None if it must not or cannot go on.
 
         Args:
             joint: its servo has been shut down by an overload, and nothing else is wrong.
             reason: in words.
+            believed_rad: as in ``recover``.
             stopped: called while waiting; returns a reason to give up, or None.
 
         Raises:
@@ -129,13 +139,17 @@ class Recovery(Generic[C]):
         self.overload_reboots -= 1
         left = self.overload_reboots or "no"
         text = f"{reason}: its servo is rebooted, the others hold; {left} more after this one"
-        return self._bring_back(text, stopped, joint)
+        return self._bring_back(text, believed_rad, stopped, joint)
 
     def _bring_back(
-        self, event: str, stopped: Callable[[], str | None], joint: int | None = None
+        self,
+        event: str,
+        believed_rad: Floats,
+        stopped: Callable[[], str | None],
+        joint: int | None = None,
     ) -> JointState | None:
         self._on_event(event)
-        found = self._wait(stopped, joint)
+        found = self._wait(believed_rad, stopped, joint)
         if found is None:
             return None
         self._on_event(f"verified: {found}")
@@ -150,7 +164,9 @@ class Recovery(Generic[C]):
         self._on_event("going on from where it stands")
         return state
 
-    def _wait(self, stopped: Callable[[], str | None], joint: int | None) -> C | None:
+    def _wait(
+        self, believed_rad: Floats, stopped: Callable[[], str | None], joint: int | None
+    ) -> C | None:
         """A chain that may go on; None if it does not come back in time.
 
         The servo of ``joint`` is rebooted; an alarm after that is not waited for.
@@ -160,12 +176,12 @@ class Recovery(Generic[C]):
         while True:
             try:
                 if not held:
-                    self._chain.hold()
+                    self._chain.hold(believed_rad)
                     held = True
                 if to_reboot is not None:
                     self._chain.reboot(to_reboot)
                     to_reboot = None
-                found = self._chain.recheck()
+                found = self._chain.recheck(believed_rad)
                 last = str(found)
                 if not found.faults:
                     return found

@@ -254,12 +254,13 @@ class SafeLink:
     ) -> JointState:
         """Recover from an interruption, or a joint's overload; else latch and raise."""
         state = None
-        if self._recovery is not None and self._memory is not None:
+        if self._recovery is not None and self._memory is not None and self._state is not None:
+            believed_rad = self._state.position_rad
             try:
                 if overloaded is None:
-                    state = self._recovery.recover(reason, self._stop)
+                    state = self._recovery.recover(reason, believed_rad, self._stop)
                 else:
-                    state = self._recovery.restart(overloaded, reason, self._stop)
+                    state = self._recovery.restart(overloaded, reason, believed_rad, self._stop)
                     self._restarted_at_s = self._clock.now_s()
             except DriverError as again:
                 fault = again

@@ -131,6 +131,13 @@ def _with(state: JointState, **changes: object) -> JointState:
     return state._replace(**changes)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("other", ["drop", "encoder"])
+def test_a_joint_whose_id_two_servos_have_is_not_sent_to_where_the_other_stands(other: str) -> None:
+    """Its reading is not believed: neither a hold nor going on may make a goal of it."""
+    kinds = ("drop", "clash") if other == "drop" else ("clash", other)
+    assert run_scenario(kinds, 3001, 240).complaints == []
+
+
 def test_a_hold_where_the_joints_were_just_read_is_not_too_fast() -> None:
     """The witness compared with the readings of the cycle before, from which fast joints go on."""
     tally = run_scenario(("drop", "clash"), 3, 240)
