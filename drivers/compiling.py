@@ -18,7 +18,9 @@ def readonly_array(number: str = "float64", dimensions: int = 1, layout: str = "
     return f"Array({number}, {dimensions}, '{layout}', readonly=True)"
 
 
-def compiled(signature: Any, *, nogil: bool = False) -> Callable[[F], F]:
+def compiled(
+    signature: Any, *, nogil: bool = False, divides_by_zero: bool = False
+) -> Callable[[F], F]:
     """Compile a function for ``signature``; the function as written is its ``py_func``.
 
     Without numba the function itself is given back: what drives servos names numba's types for its
@@ -27,6 +29,8 @@ def compiled(signature: Any, *, nogil: bool = False) -> Callable[[F], F]:
     Args:
         signature: a numba type, or its name, for modules that do not import numba themselves.
         nogil: release Python's lock meanwhile; worth its cost for a loop that waits.
+        divides_by_zero: a division by zero is infinite, not an error; without the question for it
+            a loop is made for several numbers at once.
 
     """
 
@@ -37,7 +41,24 @@ def compiled(signature: Any, *, nogil: bool = False) -> Callable[[F], F]:
             if error.name != "numba":
                 raise
             return function
-        made: F = njit(signature, nogil=nogil, cache=True)(function)
+        model = "numpy" if divides_by_zero else "python"
+        made: F = njit(signature, nogil=nogil, error_model=model, cache=True)(function)
         return made
 
     return decorate
+
+
+def inlined(function: F) -> F:
+    """Have numba write a function out where a compiled one calls it.
+
+    A loop around it is then made for several numbers at once. It has no types of its own; without
+    numba, and outside of compiled functions, it is called as it is written.
+    """
+    try:
+        from numba import njit  # noqa: PLC0415  slow to import
+    except ModuleNotFoundError as error:
+        if error.name != "numba":
+            raise
+        return function
+    made: F = njit(inline="always")(function)
+    return made

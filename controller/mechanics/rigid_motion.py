@@ -11,13 +11,25 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.world import FrictionConfig
-from snakewalk.drivers.compiling import compiled
-from snakewalk.drivers.least_squares import solve_positive_definite
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 _STILL_M_S = 1e-4  # smooths the kink of |v| at rest
 _STEPS = 50
-_ROUNDING = 1e-14
+_CLOSE = 1e-8
+"""Share of the power from which on what Newton's next step leaves is beyond notice: it squares."""
 _NONE = np.zeros((3, 3))
+
+LANES = 8
+"""Links that stand side by side in a table, so that the processor takes them at once."""
+POINT_X, POINT_Y, FORWARD_X, FORWARD_Y, SHAPE_X, SHAPE_Y = range(0, 6 * LANES, LANES)
+"""Where rows of a table begin: a link's centre, the unit vector along it, its velocity relative to
+the body frame."""
+NORMAL, MOVING_X, MOVING_Y = range(6 * LANES, 9 * LANES, LANES)
+"""A link's load, and how it moved in the step before."""
+OTHERS = 34 * LANES
+"""Where the rows begin of whoever else makes the table."""
+_SLIDES = 9 * LANES
+"""Where the rows of ``_power`` begin: 14 that it reads, 11 that it writes."""
 
 
 class NoBalanceError(ArithmeticError):
@@ -55,7 +67,8 @@ def rigid_velocity(
     """
     velocity = np.zeros(3) if guess is None else np.array(guess, dtype=float)
     linear = np.zeros(3) if tangential is None else _wrench(points_m, tangential)
-    if not _solved(points_m, headings_rad, shape_m_s, friction, normal, linear, _NONE, velocity):
+    table = _table(points_m, headings_rad, shape_m_s, normal)
+    if not _minimise(table, len(points_m), friction, linear, velocity):
         raise NoBalanceError
     return velocity
 
@@ -93,31 +106,80 @@ def inertial_velocity(
 
     """
     velocity = np.zeros(3) if guess is None else np.array(guess, dtype=float)
-    linear, quadratic = np.zeros(3), np.empty((3, 3))
-    add_inertia(points_m, shape_m_s, before_m_s, step_s, linear, quadratic)
-    if tangential is not None:
-        linear += _wrench(points_m, tangential)
-    _solved(points_m, headings_rad, shape_m_s, friction, normal, linear, quadratic, velocity)
+    linear = np.zeros(3) if tangential is None else _wrench(points_m, tangential)
+    table = _table(points_m, headings_rad, shape_m_s, normal, before_m_s)
+    _minimise(table, len(points_m), friction, linear, velocity, step_s)
     return velocity
 
 
-@compiled(
-    "void(float64[:, :], float64[:, :], float64[:, :], float64, float64[::1], float64[:, ::1])"
-)
-def add_inertia(
+def link_table(links: int, rows: int = OTHERS) -> Floats:
+    """Zeros (n,) for the numbers of ``links`` links; ``rows`` of all groups of ``LANES`` links.
+
+    The links stand in groups of ``LANES``: number ``k`` of a row that begins at ``ROW`` is at
+    ``k // LANES * rows + ROW + k % LANES``. Places beyond the last link stay zero: they bear
+    nothing.
+    """
+    return np.zeros(-(-links // LANES) * rows)
+
+
+def _table(
     points_m: Floats,
+    headings_rad: Floats,
     shape_m_s: Floats,
-    before_m_s: Floats,
-    step_s: float,
+    normal: Floats | None,
+    before_m_s: Floats | None = None,
+) -> Floats:
+    """A table of links given by arrays of any layout."""
+    links = len(points_m)
+    table = link_table(links)
+    groups = table.reshape(-1, OTHERS)
+    columns: tuple[tuple[int, Floats], ...] = (
+        (POINT_X, points_m[:, 0]),
+        (POINT_Y, points_m[:, 1]),
+        (FORWARD_X, np.cos(headings_rad)),
+        (FORWARD_Y, np.sin(headings_rad)),
+        (SHAPE_X, shape_m_s[:, 0]),
+        (SHAPE_Y, shape_m_s[:, 1]),
+        (NORMAL, np.ones(links) if normal is None else normal),
+    )
+    if before_m_s is not None:
+        columns += ((MOVING_X, before_m_s[:, 0]), (MOVING_Y, before_m_s[:, 1]))
+    for row, values in columns:
+        padded = np.zeros(len(groups) * LANES)
+        padded[:links] = values
+        groups[:, row : row + LANES] = padded.reshape(-1, LANES)
+    return table
+
+
+def _minimise(
+    table: Floats,
+    links: int,
+    friction: FrictionConfig,
     linear: Floats,
-    quadratic: Floats,
+    velocity: Floats,
+    step_s: float | None = None,
+) -> bool:
+    """``balance`` of a whole table; with a step, of a body with inertia."""
+    quadratic = _NONE
+    if step_s is not None:
+        quadratic = np.empty((3, 3))
+        add_inertia(table, OTHERS, links, step_s, linear, quadratic)
+    return balance(
+        *(table, OTHERS, links, friction.along, friction.across),
+        *(linear, quadratic, velocity, np.empty((6, 3))),
+    )
+
+
+@compiled("void(float64[::1], int64, int64, float64, float64[::1], float64[:, ::1])")
+def add_inertia(
+    table: Floats, rows: int, links: int, step_s: float, linear: Floats, quadratic: Floats
 ) -> None:
     """Inertia of a step in the power per weight of a link; as in ``inertial_velocity``.
 
     Args:
-        points_m: (L, 2)
-        shape_m_s: (L, 2)
-        before_m_s: (L, 2)
+        table: of ``link_table``; centres, change of shape and movement before are read.
+        rows: of it.
+        links: how many.
         step_s: of time.
         linear: (3,) gains the part that is linear in (vx, vy, omega).
         quadratic: (3, 3) becomes that of their products.
@@ -125,10 +187,11 @@ def add_inertia(
     """
     mass = 1.0 / (GRAVITY_M_S2 * step_s)
     quadratic[:] = 0.0
-    for i in range(len(points_m)):
-        x, y = points_m[i, 0], points_m[i, 1]
-        px = mass * (before_m_s[i, 0] - shape_m_s[i, 0])
-        py = mass * (before_m_s[i, 1] - shape_m_s[i, 1])
+    for k in range(links):
+        at = k // LANES * rows + k % LANES
+        x, y = table[at + POINT_X], table[at + POINT_Y]
+        px = mass * (table[at + MOVING_X] - table[at + SHAPE_X])
+        py = mass * (table[at + MOVING_Y] - table[at + SHAPE_Y])
         linear[0] += px
         linear[1] += py
         linear[2] += x * py - y * px
@@ -146,36 +209,44 @@ def _wrench(points_m: Floats, force: Floats) -> Floats:
     return np.array([px.sum(), py.sum(), x @ py - y @ px])
 
 
-def _solved(
-    points_m: Floats,
-    headings_rad: Floats,
-    shape_m_s: Floats,
-    friction: FrictionConfig,
-    normal: Floats | None,
-    linear: Floats,
-    quadratic: Floats,
-    velocity: Floats,
-) -> bool:
-    """``balance`` of arrays of any layout."""
-    return balance(
-        np.ascontiguousarray(points_m, dtype=float),
-        np.stack([np.cos(headings_rad), np.sin(headings_rad)], axis=-1),
-        np.ascontiguousarray(shape_m_s, dtype=float),
-        friction.along,
-        friction.across,
-        np.ones(len(points_m)) if normal is None else np.ascontiguousarray(normal, dtype=float),
-        linear,
-        quadratic,
-        velocity,
-    )
+@compiled("void(float64[::1], int64, float64, float64)")
+def _set_up(table: Floats, rows: int, along: float, across: float) -> None:
+    """Write the rows that ``_power`` reads, weighted by load and friction.
+
+    They say how each link's velocity along and across itself grows with (vx, vy, omega), three
+    numbers each; what the change of the shape makes of the two; and the lower triangle of the
+    product of what comes first with its transpose.
+    """
+    for group in range(len(table) // rows):
+        link = table[group * rows : (group + 1) * rows]
+        for j in range(LANES):
+            c, s = link[FORWARD_X + j], link[FORWARD_Y + j]
+            x, y = link[POINT_X + j], link[POINT_Y + j]
+            u, v = link[SHAPE_X + j], link[SHAPE_Y + j]
+            ahead, aside = along * link[NORMAL + j], across * link[NORMAL + j]
+            a0, a1, a2 = c * ahead, s * ahead, (s * x - c * y) * ahead
+            b0, b1, b2 = -s * aside, c * aside, (c * x + s * y) * aside
+            link[_SLIDES + j], link[_SLIDES + 8 + j], link[_SLIDES + 16 + j] = a0, a1, a2
+            link[_SLIDES + 24 + j], link[_SLIDES + 32 + j], link[_SLIDES + 40 + j] = b0, b1, b2
+            link[_SLIDES + 48 + j] = (c * u + s * v) * ahead
+            link[_SLIDES + 56 + j] = (c * v - s * u) * aside
+            link[_SLIDES + 64 + j] = a0 * a0 + b0 * b0
+            link[_SLIDES + 72 + j] = a1 * a0 + b1 * b0
+            link[_SLIDES + 80 + j] = a1 * a1 + b1 * b1
+            link[_SLIDES + 88 + j] = a2 * a0 + b2 * b0
+            link[_SLIDES + 96 + j] = a2 * a1 + b2 * b1
+            link[_SLIDES + 104 + j] = a2 * a2 + b2 * b2
 
 
 @compiled(
-    "UniTuple(float64, 2)(float64[:, ::1], float64, float64[::1], float64[:, ::1], float64[::1],"
-    " float64[::1], float64[:, ::1])"
+    f"UniTuple(float64, 2)(float64[::1], int64, int64, float64, {readonly_array(layout='C')},"
+    f" {readonly_array(dimensions=2, layout='C')}, float64[::1], float64[::1], float64[:, ::1])",
+    divides_by_zero=True,
 )
 def _power(
-    slides: Floats,
+    table: Floats,
+    rows: int,
+    links: int,
     still: float,
     linear: Floats,
     quadratic: Floats,
@@ -185,10 +256,13 @@ def _power(
 ) -> tuple[float, float]:
     """Power that all links dissipate, less gravity's; and what they would if the shape stood still.
 
+    What each link adds is worked out for ``LANES`` links at once, and added up in their order, so
+    that the bits do not depend on the processor.
+
     Args:
-        slides: (L, 14) of each link, weighted: how its velocity along and across itself grow with
-            (vx, vy, omega), three numbers each; what the change of the shape makes of the two; and
-            the lower triangle of the product of what comes first with its transpose.
+        table: of ``_set_up``.
+        rows: of it.
+        links: how many.
         still: as ``_STILL_M_S``, weighted.
         linear: as in ``balance``.
         quadratic: likewise.
@@ -198,30 +272,36 @@ def _power(
 
     """
     x, y, turn = w[0], w[1], w[2]
+    square = still * still
     power = rigid = 0.0
     g0, g1, g2 = -linear[0], -linear[1], -linear[2]
     h00, h10, h11 = quadratic[0, 0], quadratic[1, 0], quadratic[1, 1]
     h20, h21, h22 = quadratic[2, 0], quadratic[2, 1], quadratic[2, 2]
-    for k in range(len(slides)):
-        link = slides[k]
-        u = link[0] * x + link[1] * y + link[2] * turn
-        v = link[3] * x + link[4] * y + link[5] * turn
-        rigid += np.sqrt(u * u + v * v)
-        u, v = u + link[6], v + link[7]
-        size = np.sqrt(u * u + v * v + still * still)
-        power += size
-        inverse = 1.0 / size
-        u, v = u * inverse, v * inverse
-        d0 = u * link[0] + v * link[3]
-        d1 = u * link[1] + v * link[4]
-        d2 = u * link[2] + v * link[5]
-        g0, g1, g2 = g0 + d0, g1 + d1, g2 + d2
-        h00 += (link[8] - d0 * d0) * inverse
-        h10 += (link[9] - d1 * d0) * inverse
-        h11 += (link[10] - d1 * d1) * inverse
-        h20 += (link[11] - d2 * d0) * inverse
-        h21 += (link[12] - d2 * d1) * inverse
-        h22 += (link[13] - d2 * d2) * inverse
+    for group in range(len(table) // rows):
+        link = table[group * rows + _SLIDES : group * rows + OTHERS]
+        for j in range(LANES):
+            a0, a1, a2 = link[j], link[8 + j], link[16 + j]
+            b0, b1, b2 = link[24 + j], link[32 + j], link[40 + j]
+            u, v = a0 * x + a1 * y + a2 * turn, b0 * x + b1 * y + b2 * turn
+            link[112 + j] = np.sqrt(u * u + v * v)
+            u, v = u + link[48 + j], v + link[56 + j]
+            size = np.sqrt(u * u + v * v + square)
+            link[120 + j] = size
+            inverse = 1.0 / size
+            u, v = u * inverse, v * inverse
+            d0, d1, d2 = u * a0 + v * b0, u * a1 + v * b1, u * a2 + v * b2
+            link[128 + j], link[136 + j], link[144 + j] = d0, d1, d2
+            link[152 + j] = (link[64 + j] - d0 * d0) * inverse
+            link[160 + j] = (link[72 + j] - d1 * d0) * inverse
+            link[168 + j] = (link[80 + j] - d1 * d1) * inverse
+            link[176 + j] = (link[88 + j] - d2 * d0) * inverse
+            link[184 + j] = (link[96 + j] - d2 * d1) * inverse
+            link[192 + j] = (link[104 + j] - d2 * d2) * inverse
+        for j in range(min(LANES, links - group * LANES)):
+            rigid, power = rigid + link[112 + j], power + link[120 + j]
+            g0, g1, g2 = g0 + link[128 + j], g1 + link[136 + j], g2 + link[144 + j]
+            h00, h10, h11 = h00 + link[152 + j], h10 + link[160 + j], h11 + link[168 + j]
+            h20, h21, h22 = h20 + link[176 + j], h21 + link[184 + j], h22 + link[192 + j]
     hessian[0, 0], hessian[1, 0], hessian[1, 1] = h00, h10, h11
     hessian[2, 0], hessian[2, 1], hessian[2, 2] = h20, h21, h22
     gradient[0], gradient[1], gradient[2] = g0, g1, g2
@@ -233,67 +313,70 @@ def _power(
     return power, rigid
 
 
+@compiled("void(float64[:, ::1], float64[::1], float64[::1])", divides_by_zero=True)
+def _solve(hessian: Floats, gradient: Floats, step: Floats) -> None:
+    """Solve for Newton's step (3,) by Cholesky without roots; no loops, as it is asked so often."""
+    d0 = 1.0 / hessian[0, 0]
+    l10, l20 = hessian[1, 0] * d0, hessian[2, 0] * d0
+    d1 = 1.0 / (hessian[1, 1] - l10 * hessian[1, 0])
+    h21 = hessian[2, 1] - l20 * hessian[1, 0]
+    l21 = h21 * d1
+    d2 = 1.0 / (hessian[2, 2] - l20 * hessian[2, 0] - l21 * h21)
+    y1 = gradient[1] - l10 * gradient[0]
+    z = (gradient[2] - l20 * gradient[0] - l21 * y1) * d2
+    y = y1 * d1 - l21 * z
+    step[0], step[1], step[2] = gradient[0] * d0 - l10 * y - l20 * z, y, z
+
+
 @compiled(
-    "boolean(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, float64, float64[::1],"
-    " float64[::1], float64[:, ::1], float64[::1])"
+    "boolean(float64[::1], int64, int64, float64, float64, float64[::1], float64[:, ::1],"
+    " float64[::1], float64[:, ::1])"
 )
 def balance(
-    points_m: Floats,
-    forward: Floats,
-    shape_m_s: Floats,
+    table: Floats,
+    rows: int,
+    links: int,
     along: float,
     across: float,
-    normal: Floats,
     linear: Floats,
     quadratic: Floats,
     w: Floats,
+    work: Floats,
 ) -> bool:
     """Newton's method on the power, from ``w`` (3,) on, which is written; whether it has a minimum.
 
-    ``forward`` (L, 2) are unit vectors along the links; ``linear`` (3,) is gravity's power per (vx,
-    vy, omega), ``quadratic`` (3, 3) that of inertia.
+    ``table`` is of ``link_table``, with ``rows``; ``linear`` (3,) is gravity's power per (vx, vy,
+    omega), ``quadratic`` (3, 3) that of inertia; ``work`` (6, 3) is overwritten.
     """
-    links = len(points_m)
-    slides = np.empty((links, 14))
-    for k in range(links):
-        link = slides[k]
-        c, s = forward[k, 0], forward[k, 1]
-        x, y = points_m[k, 0], points_m[k, 1]
-        u, v = shape_m_s[k, 0], shape_m_s[k, 1]
-        along_k, across_k = along * normal[k], across * normal[k]
-        link[0], link[1], link[2] = c * along_k, s * along_k, (s * x - c * y) * along_k
-        link[3], link[4], link[5] = -s * across_k, c * across_k, (c * x + s * y) * across_k
-        link[6], link[7] = (c * u + s * v) * along_k, (c * v - s * u) * across_k
-        at = 8
-        for i in range(3):
-            for j in range(i + 1):
-                link[at] = link[i] * link[j] + link[3 + i] * link[3 + j]
-                at += 1
+    _set_up(table, rows, along, across)
     still = _STILL_M_S * across
-    work = np.empty((6, 3))
     gradient, step, trial, hessian = work[0], work[1], work[2], work[3:]
     may_slide = not quadratic.any() and (linear[0] != 0.0 or linear[1] != 0.0 or linear[2] != 0.0)
-    best, _ = _power(slides, still, linear, quadratic, w, gradient, hessian)
+    best, _ = _power(table, rows, links, still, linear, quadratic, w, gradient, hessian)
     for _ in range(_STEPS):
         steepest = max(abs(gradient[0]), abs(gradient[1]), abs(gradient[2]))
         if steepest < 1e-9 * links * across:
             break
         for i in range(3):
             hessian[i, i] += 1e-9
-        solve_positive_definite(hessian, gradient, step)
+        _solve(hessian, gradient, step)
         fall = gradient[0] * step[0] + gradient[1] * step[1] + gradient[2] * step[2]
-        if fall < _ROUNDING * abs(best):  # no power could tell whether a step is a better one
-            w[:] = w - step
+        if fall < _CLOSE * abs(best):
+            for i in range(3):
+                w[i] -= step[i]
             break
         now, scale = np.inf, 2.0
         while now > best - 1e-4 * scale * fall and scale > 1e-9:
             scale *= 0.5
             for i in range(3):
                 trial[i] = w[i] - scale * step[i]
-            now, rigid = _power(slides, still, linear, quadratic, trial, gradient, hessian)
+            now, rigid = _power(
+                table, rows, links, still, linear, quadratic, trial, gradient, hessian
+            )
         if now >= best:
             break
-        w[:] = trial
+        for i in range(3):
+            w[i] = trial[i]
         best = now
         gain = linear[0] * w[0] + linear[1] * w[1] + linear[2] * w[2]
         if may_slide and rigid < (1.0 - 1e-9) * gain:

@@ -18,8 +18,23 @@ from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import half_lengths_m, link_weights
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.mechanics.ground_step import FIELD, plane
-from snakewalk.controller.mechanics.rigid_motion import add_inertia, balance
-from snakewalk.drivers.compiling import compiled, readonly_array
+from snakewalk.controller.mechanics.rigid_motion import (
+    FORWARD_X,
+    FORWARD_Y,
+    LANES,
+    MOVING_X,
+    MOVING_Y,
+    NORMAL,
+    OTHERS,
+    POINT_X,
+    POINT_Y,
+    SHAPE_X,
+    SHAPE_Y,
+    add_inertia,
+    balance,
+    link_table,
+)
+from snakewalk.drivers.compiling import compiled, inlined, readonly_array
 
 _STEP_SEGMENTS = 2.5
 _BACK, _FORTH = 5, 40
@@ -28,6 +43,12 @@ _AHEAD = 30
 """Points of the path from the centre to where its direction is compared."""
 _STATE = 11
 """Numbers of a body between two steps."""
+_HALF, _WEIGHT, _HERE, _HERE_X, _HERE_Y = range(OTHERS, OTHERS + 5 * LANES, LANES)
+"""Rows of a rollout's table of links: half length and weight; heading and centre about that of
+mass, in the track's frame."""
+_NEXT, _NEXT_X, _NEXT_Y, _COS, _SIN = range(OTHERS + 5 * LANES, OTHERS + 10 * LANES, LANES)
+"""The same after the step; a cosine and a sine."""
+_ROWS = OTHERS + 10 * LANES
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +142,9 @@ class Followed:
     def rolled(self, headings_rad: Floats, points_m: Floats) -> Rolled:
         """Result for links that head so (L,) at the end, at points (L, 2) about the centre."""
         out, path = np.empty((1, 10)), self._path
-        given = self._steps, headings_rad, np.ascontiguousarray(points_m), path.points_m
-        _write_result(self._state, *given, self._from, path.waypoint_at, out[0])
+        body = float(headings_rad.mean()), float(points_m[0, 0]), float(points_m[0, 1])
+        given = path.points_m, self._from, path.waypoint_at
+        _write_result(self._state, self._steps, *body, *given, out[0])
         return Rolled(out[:, :2], *out.T[2:])
 
 
@@ -136,10 +158,15 @@ class Rollout:
         ground: HeightField | None,
         points: int,
     ) -> None:
+        self._level = True
         self.change_ground(ground or HeightField(np.zeros((2, 2)), 1.0, 0.0, 0.0))
         retarget = Retarget(robot, points)
-        shares = half_lengths_m(robot), link_weights(robot)
-        self._links = (*shares, retarget.edges, retarget.group_of_link)
+        self._table = link_table(robot.link_count, _ROWS)
+        groups = self._table.reshape(-1, _ROWS)
+        for row, values in ((_HALF, half_lengths_m(robot)), (_WEIGHT, link_weights(robot))):
+            for k, value in enumerate(values):
+                groups[k // LANES, row + k % LANES] = value
+        self._links = self._table, retarget.edges, retarget.group_of_link
         self.segment_m = robot.length_m / points
         """Length of a segment."""
         self._body = np.array(
@@ -153,6 +180,7 @@ class Rollout:
     def change_ground(self, ground: HeightField) -> None:
         """Roll out on another ground from now on."""
         self._field = np.ascontiguousarray(ground.z_m), ground.x0_m, ground.y0_m, ground.spacing_m
+        self._level = bool(np.ptp(ground.z_m) == 0.0)
 
     def steepest(self, points_m: Floats) -> float:
         """Greatest mean slope of the ground over ten points in a row of (n, 2)."""
@@ -184,25 +212,27 @@ class Rollout:
 
         """
         given = (
-            *(np.array([*start.centre_m, start.offset_rad]), *self._field, *self._links),
+            *(np.array([*start.centre_m, start.offset_rad]), *self._field, self._level),
+            *self._links,
             *(self._body, path.points_m, path_at),
             *(np.array([*path.waypoint_m, path.waypoint_at]), cruise_segments_s),
             np.array([drift.ahead_m, drift.left_m, drift.turn_rad]),
         )
-        return RolloutTree(samples_rad, head, len(self._links[0]), given)
+        return RolloutTree(samples_rad, head, len(self._table) // _ROWS, given)
 
 
 class RolloutTree:
     """Rollouts from one pose on one track: what pieces have in common is rolled out once."""
 
     def __init__(
-        self, samples_rad: Floats, head: float, links: int, given: tuple[Any, ...]
+        self, samples_rad: Floats, head: float, groups: int, given: tuple[Any, ...]
     ) -> None:
-        """Of ``Rollout.begin``; ``given`` are arguments of ``_roll``."""
+        """Of ``Rollout.begin``; ``groups`` of links; ``given`` are arguments of ``_roll``."""
         self._samples, self._head, self._given = samples_rad, head, given
         self._count = 0
         self._pieces = np.empty((0, 0))
-        self._states, self._moving = np.empty((0, 0, _STATE)), np.empty((0, 0, links, 2))
+        self._states = np.empty((0, 0, _STATE))
+        self._moving = np.empty((0, 0, 2 * groups * LANES))
 
     def roll(self, pieces_rad: Floats, pulse: float | None = None) -> Rolled:
         """Roll a body out over each piece.
@@ -232,14 +262,42 @@ class RolloutTree:
         before = self._count
         self._count += count
         if before == 0 or self._count > len(self._pieces):
-            room, links = 2 * self._count, self._moving.shape[2]
+            room = 2 * self._count
             pieces, states = np.empty((room, length)), np.empty((room, steps + 1, _STATE))
-            moving = np.empty((room, steps + 1, links, 2))
+            moving = np.empty((room, steps + 1, self._moving.shape[2]))
             if before > 0:
                 pieces[:before], states[:before] = self._pieces[:before], self._states[:before]
                 moving[:before] = self._moving[:before]
             self._pieces, self._states, self._moving = pieces, states, moving
         return before
+
+
+@inlined
+def _sine_cosine(x: float) -> tuple[float, float]:
+    """Sine and cosine of x, within 2^-52 for up to 10^5 turns.
+
+    The polynomials of fdlibm (Sun Microsystems, 1993). A loop over them is made for several numbers
+    at once, and their bits do not depend on the library of a machine.
+    """
+    k = np.floor(x * 0.6366197723675814 + 0.5)  # quarters of a turn
+    r = ((x - k * 1.57079632673412561417) - k * 6.07710050630396597660e-11) - (
+        k * 2.02226624879595063154e-21
+    )
+    z = r * r
+    s = 2.75573137070700676789e-06 + z * (
+        -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
+    )
+    s = 8.33333333332248946124e-03 + z * (-1.98412698298579493134e-04 + z * s)
+    s = r + r * z * (-1.66666666666666324348e-01 + z * s)
+    c = -2.75573143513906633035e-07 + z * (
+        2.08757232129817482790e-09 + z * -1.13596475577881948265e-11
+    )
+    c = -1.38888888888741095749e-03 + z * (2.48015872894767294178e-05 + z * c)
+    c = 1.0 - 0.5 * z + z * z * (4.16666666666666019037e-02 + z * c)
+    quarter = k - 4.0 * np.floor(0.25 * k)
+    back = np.floor(0.5 * quarter)
+    side, sign = quarter - 2.0 * back, 1.0 - 2.0 * back
+    return sign * ((1.0 - side) * s + side * c), sign * ((1.0 - side) * c - side * s)
 
 
 @compiled("float64(float64[::1], float64[::1], float64)")
@@ -250,8 +308,8 @@ def _area(total: Floats, track: Floats, at: float) -> float:
 
 
 @compiled(
-    f"void(float64[::1], float64[::1], float64, float64[::1], int64[::1], {readonly_array()},"
-    f" {readonly_array()}, float64[::1], float64[:, ::1], float64[::1])"
+    "void(float64[::1], float64[::1], float64, float64[::1], int64[::1], float64[::1],"
+    " float64[::1])"
 )
 def _lay(
     total: Floats,
@@ -259,32 +317,61 @@ def _lay(
     head: float,
     edges: Floats,
     group: Ints,
-    half_m: Floats,
-    weight: Floats,
-    headings: Floats,
-    points: Floats,
     groups: Floats,
+    table: Floats,
 ) -> None:
-    """Write headings of the links and their centres about that of mass, in the track's frame."""
+    """Write headings of the links and their centres about that of mass, in the track's frame.
+
+    They are the table's of after a step; ``groups`` gets the headings of the groups of links.
+    """
     ahead = _area(total, track, head - edges[0])
     for g in range(len(groups)):
         behind = _area(total, track, head - edges[g + 1])
         groups[g] = (ahead - behind) / (edges[g + 1] - edges[g])
         ahead = behind
+    links = len(group)
+    for i in range(links):
+        table[i // LANES * _ROWS + _NEXT + i % LANES] = groups[group[i]]
+    for g in range(len(table) // _ROWS):
+        link = table[g * _ROWS : (g + 1) * _ROWS]
+        for j in range(LANES):
+            sine, cosine = _sine_cosine(link[_NEXT + j])
+            link[_COS + j], link[_SIN + j] = link[_HALF + j] * cosine, link[_HALF + j] * sine
     x = y = sum_x = sum_y = whole = 0.0
-    links = len(headings)
     for i in range(links):
-        angle = groups[group[i]]
-        headings[i] = angle
-        c, s = half_m[i] * np.cos(angle), half_m[i] * np.sin(angle)
+        at = i // LANES * _ROWS + i % LANES
+        c, s, weight = table[at + _COS], table[at + _SIN], table[at + _WEIGHT]
         x, y = x - c, y - s
-        points[i, 0], points[i, 1] = x, y
+        table[at + _NEXT_X], table[at + _NEXT_Y] = x, y
+        sum_x, sum_y, whole = sum_x + weight * x, sum_y + weight * y, whole + weight
         x, y = x - c, y - s
-        sum_x, sum_y = sum_x + weight[i] * points[i, 0], sum_y + weight[i] * points[i, 1]
-        whole += weight[i]
-    for i in range(links):
-        points[i, 0] -= sum_x / whole
-        points[i, 1] -= sum_y / whole
+    centre_x, centre_y = sum_x / whole, sum_y / whole
+    for g in range(len(table) // _ROWS):
+        link = table[g * _ROWS : (g + 1) * _ROWS]
+        for j in range(LANES):
+            link[_NEXT_X + j] -= centre_x
+            link[_NEXT_Y + j] -= centre_y
+
+
+@compiled("void(float64[::1], float64[::1], boolean)")
+def _keep(table: Floats, moving: Floats, out: bool) -> None:
+    """Copy how the links move out of a table, or into it."""
+    for g in range(len(table) // _ROWS):
+        link, kept = table[g * _ROWS : (g + 1) * _ROWS], moving[2 * g * LANES :]
+        for j in range(2 * LANES):
+            if out:
+                kept[j] = link[MOVING_X + j]
+            else:
+                link[MOVING_X + j] = kept[j]
+
+
+@compiled("void(float64[::1])")
+def _stand_there(table: Floats) -> None:
+    """Make of the body after the step the one before the next."""
+    for g in range(len(table) // _ROWS):
+        link = table[g * _ROWS : (g + 1) * _ROWS]
+        for j in range(3 * LANES):
+            link[_HERE + j] = link[_NEXT + j]
 
 
 @compiled("UniTuple(float64, 2)(float64[:, ::1], int64, float64, float64)")
@@ -314,33 +401,27 @@ def _note(state: Floats, path: Floats, waypoint: Floats, x: float, y: float, dt:
     state[10] = min(state[10], dx * dx + dy * dy)
 
 
-@compiled(
-    "float64(float64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64, float64,"
-    " float64[:, ::1], float64[:, ::1], float64[:, ::1])"
-)
-def _turned(
-    here_rad: Floats,
-    here_m: Floats,
-    next_rad: Floats,
-    next_m: Floats,
-    offset_rad: float,
-    step_s: float,
-    forward: Floats,
-    points: Floats,
-    shape: Floats,
-) -> float:
+@compiled("float64(float64[::1], int64, float64, float64)", divides_by_zero=True)
+def _turned(table: Floats, links: int, offset_rad: float, step_s: float) -> float:
     """Write the body between two steps in the world, and how its links move; its mean heading."""
-    c, s = np.cos(offset_rad), np.sin(offset_rad)
-    mean, links = 0.0, len(forward)
+    s, c = _sine_cosine(offset_rad)
+    for g in range(len(table) // _ROWS):
+        link = table[g * _ROWS : (g + 1) * _ROWS]
+        for j in range(LANES):
+            here_x, here_y = link[_HERE_X + j], link[_HERE_Y + j]
+            next_x, next_y = link[_NEXT_X + j], link[_NEXT_Y + j]
+            x, y = 0.5 * (here_x + next_x), 0.5 * (here_y + next_y)
+            link[POINT_X + j], link[POINT_Y + j] = c * x - s * y, s * x + c * y
+            x, y = (next_x - here_x) / step_s, (next_y - here_y) / step_s
+            link[SHAPE_X + j], link[SHAPE_Y + j] = c * x - s * y, s * x + c * y
+            heading = offset_rad + 0.5 * (link[_HERE + j] + link[_NEXT + j])
+            sine, cosine = _sine_cosine(heading)
+            link[FORWARD_X + j], link[FORWARD_Y + j] = cosine, sine
+    mean = 0.0
     for i in range(links):
-        x, y = 0.5 * (here_m[i, 0] + next_m[i, 0]), 0.5 * (here_m[i, 1] + next_m[i, 1])
-        points[i, 0], points[i, 1] = c * x - s * y, s * x + c * y
-        x, y = (next_m[i, 0] - here_m[i, 0]) / step_s, (next_m[i, 1] - here_m[i, 1]) / step_s
-        shape[i, 0], shape[i, 1] = c * x - s * y, s * x + c * y
-        heading = offset_rad + 0.5 * (here_rad[i] + next_rad[i])
-        forward[i, 0], forward[i, 1] = np.cos(heading), np.sin(heading)
-        mean += heading / links
-    return float(mean)
+        at = i // LANES * _ROWS + i % LANES
+        mean += table[at + _HERE] + table[at + _NEXT]
+    return float(offset_rad + 0.5 * mean / links)
 
 
 @compiled("float64(float64[::1], float64[::1], float64, float64, float64)")
@@ -356,10 +437,7 @@ def _pulse_rate(
     return rate
 
 
-@compiled(
-    f"void({FIELD}, float64, float64, float64[:, ::1], {readonly_array()}, float64[::1],"
-    " float64[::1])"
-)
+@compiled(f"void({FIELD}, float64, float64, float64[::1], int64, float64[::1])")
 def _pull(
     z_m: Floats,
     x0: float,
@@ -367,71 +445,79 @@ def _pull(
     spacing: float,
     x: float,
     y: float,
-    points: Floats,
-    weight: Floats,
-    normal: Floats,
+    table: Floats,
+    links: int,
     linear: Floats,
 ) -> None:
     """Write each link's load, and add the slope's force and moment on all, in mean link weights."""
-    for i in range(len(points)):
-        _, gx, gy = plane(z_m, x0, y0, spacing, x + points[i, 0], y + points[i, 1])
-        normal[i] = weight[i] / np.sqrt(1.0 + gx * gx + gy * gy)
-        fx, fy = -gx * normal[i], -gy * normal[i]
+    for i in range(links):
+        at = i // LANES * _ROWS + i % LANES
+        px, py = table[at + POINT_X], table[at + POINT_Y]
+        _, gx, gy = plane(z_m, x0, y0, spacing, x + px, y + py)
+        normal = table[at + _WEIGHT] / np.sqrt(1.0 + gx * gx + gy * gy)
+        fx, fy = -gx * normal, -gy * normal
+        table[at + NORMAL] = normal
         linear[0] += fx
         linear[1] += fy
-        linear[2] += points[i, 0] * fy - points[i, 1] * fx
+        linear[2] += px * fy - py * fx
 
 
 @compiled(
-    "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1],"
-    " float64[::1], float64, float64[:, ::1], float64[::1])"
+    "void(float64[::1], int64, float64[::1], float64[::1], float64, float64[::1], float64[:, ::1])"
 )
 def _slide(
-    points: Floats,
-    forward: Floats,
-    shape: Floats,
+    table: Floats,
+    links: int,
     body: Floats,
-    normal: Floats,
     linear: Floats,
     step_s: float,
-    moving: Floats,
     velocity: Floats,
+    work: Floats,
 ) -> None:
     """Balance friction, with inertia where nothing holds the body; write how body and links move.
 
-    ``velocity`` (3,) and ``moving`` (L, 2) are those of the step before.
+    ``velocity`` (3,) and what moves in the table are those of the step before; ``work`` (9, 3).
     """
-    quadratic = np.zeros((3, 3))
-    held = balance(points, forward, shape, body[0], body[1], normal, linear, quadratic, velocity)
-    if not held:
-        add_inertia(points, shape, moving, step_s, linear, quadratic)
-        balance(points, forward, shape, body[0], body[1], normal, linear, quadratic, velocity)
-    for i in range(len(points)):
-        moving[i, 0] = shape[i, 0] + velocity[0] - velocity[2] * points[i, 1]
-        moving[i, 1] = shape[i, 1] + velocity[1] + velocity[2] * points[i, 0]
+    quadratic = work[6:]
+    quadratic[:] = 0.0
+    along, across = body[0], body[1]
+    if not balance(table, _ROWS, links, along, across, linear, quadratic, velocity, work[:6]):
+        add_inertia(table, _ROWS, links, step_s, linear, quadratic)
+        balance(table, _ROWS, links, along, across, linear, quadratic, velocity, work[:6])
+    x, y, turn = velocity[0], velocity[1], velocity[2]
+    for g in range(len(table) // _ROWS):
+        link = table[g * _ROWS : (g + 1) * _ROWS]
+        for j in range(LANES):
+            link[MOVING_X + j] = link[SHAPE_X + j] + x - turn * link[POINT_Y + j]
+            link[MOVING_Y + j] = link[SHAPE_Y + j] + y + turn * link[POINT_X + j]
 
 
 @compiled(
-    "void(float64[::1], int64, float64[::1], float64[:, ::1], float64[:, ::1], int64, float64,"
+    "void(float64[::1], int64, float64, float64, float64, float64[:, ::1], int64, float64,"
     " float64[::1])"
 )
 def _write_result(
     state: Floats,
     steps: int,
-    headings: Floats,
-    points: Floats,
+    heading: float,
+    head_x: float,
+    head_y: float,
     path: Floats,
     path_at: int,
     waypoint_at: float,
     row: Floats,
 ) -> None:
-    """Write the columns of ``Rolled`` (10,) from the state (11,) after all steps."""
+    """Write the columns of ``Rolled`` (10,) from the state (11,) after all steps.
+
+    ``heading`` is the links' mean, and the head link is at (head_x, head_y) about the centre, both
+    in the track's frame.
+    """
     x, y, phi, place = state[0], state[1], state[2], state[3]
     k = min(int(place) + _AHEAD, len(path) - 2)
-    error = phi + headings.mean()
+    error = phi + heading
     error -= np.arctan2(path[k + 1, 1] - path[k, 1], path[k + 1, 0] - path[k, 0])
-    head_x = x + np.cos(phi) * points[0, 0] - np.sin(phi) * points[0, 1]
-    head_y = y + np.sin(phi) * points[0, 0] + np.cos(phi) * points[0, 1]
+    c, s = np.cos(phi), np.sin(phi)
+    head_x, head_y = x + c * head_x - s * head_y, y + s * head_x + c * head_y
     row[0], row[1], row[2] = x, y, phi
     row[3], row[4] = np.sqrt(state[5] / steps), state[4]
     row[5] = _nearest(path, k, head_x, head_y)[1]
@@ -458,10 +544,9 @@ def _alike(pieces: Floats, piece: int) -> tuple[int, int]:
 
 @compiled(
     f"void({readonly_array(layout='C')}, float64[:, ::1], int64, float64, float64, float64[::1],"
-    f" {FIELD}, {readonly_array()}, {readonly_array()}, float64[::1], int64[::1], float64[::1],"
+    f" {FIELD}, boolean, float64[::1], float64[::1], int64[::1], float64[::1],"
     " float64[:, ::1], int64, float64[::1], float64, float64[::1], float64[:, :, ::1],"
-    " float64[:, :, :, ::1],"
-    " float64[:, ::1])"
+    " float64[:, :, ::1], float64[:, ::1])"
 )
 def _roll(
     samples: Floats,
@@ -474,8 +559,8 @@ def _roll(
     x0: float,
     y0: float,
     spacing: float,
-    half_m: Floats,
-    weight: Floats,
+    level: bool,
+    table: Floats,
     edges: Floats,
     group: Ints,
     body: Floats,
@@ -501,8 +586,8 @@ def _roll(
         x0: its corner.
         y0: likewise.
         spacing: of its samples.
-        half_m: (L,) half lengths of the links.
-        weight: (L,)
+        level: whether it is all of one height.
+        table: of the links: half lengths and weights are read, all else is overwritten.
         edges: of the groups of links.
         group: (L,) of each link.
         body: (3,) friction along and across; speed limit of the joints.
@@ -514,18 +599,18 @@ def _roll(
         states: (P, steps + 1, 11) of each piece before each step, and at its end: the body's place
             (2) and turn, place on the path, distance from it, sum of its squares, time, velocity
             (3), and the least square of its distance from the waypoint.
-        movings: (P, steps + 1, L, 2) velocities of the links; kept as ``states`` are.
+        movings: (P, steps + 1, m) velocities of the links; kept as ``states`` are.
         out: written.
 
     """
     known, new, links, steps = len(samples), pieces.shape[1], len(group), states.shape[1] - 1
     track, total = np.empty(known + new), np.zeros(known + new + 1)
     here_g, next_g = np.empty(len(edges) - 1), np.empty(len(edges) - 1)
-    here_h, next_h = np.empty(links), np.empty(links)
-    here_p, next_p, points = np.empty((links, 2)), np.empty((links, 2)), np.empty((links, 2))
-    shape, moving, normal = np.empty((links, 2)), np.empty((links, 2)), weight.copy()
-    forward, velocity, linear = np.empty((links, 2)), np.empty(3), np.empty(3)
-    level = z_m.min() == z_m.max()
+    velocity, linear, work = np.empty(3), np.empty(3), np.empty((9, 3))
+    for g in range(len(table) // _ROWS):
+        link = table[g * _ROWS : (g + 1) * _ROWS]
+        for j in range(LANES):
+            link[NORMAL + j] = link[_WEIGHT + j]
     track[:known] = samples
     for c in range(before, len(pieces)):
         track[known:] = pieces[c]
@@ -543,25 +628,34 @@ def _roll(
             states[c, begin], movings[c, begin] = states[like, begin], movings[like, begin]
         state = states[c, begin]
         x, y, phi = state[0], state[1], state[2]
-        velocity[:], moving[:] = state[7:10], movings[c, begin]
-        _lay(total, track, at, edges, group, half_m, weight, here_h, here_p, here_g)
+        velocity[:] = state[7:10]
+        _keep(table, movings[c, begin], False)
+        _lay(total, track, at, edges, group, here_g, table)
+        _stand_there(table)
         for n in range(begin, steps):
             at += step
-            _lay(total, track, at, edges, group, half_m, weight, next_h, next_p, next_g)
+            _lay(total, track, at, edges, group, next_g, table)
             dt = step / _pulse_rate(here_g, next_g, step, cruise, body[2])
-            mean = _turned(here_h, here_p, next_h, next_p, phi, dt, forward, points, shape)
+            mean = _turned(table, links, phi, dt)
             linear[:] = 0.0
             if not level:
-                _pull(z_m, x0, y0, spacing, x, y, points, weight, normal, linear)
-            _slide(points, forward, shape, body, normal, linear, dt, moving, velocity)
+                _pull(z_m, x0, y0, spacing, x, y, table, links, linear)
+            _slide(table, links, body, linear, dt, velocity, work)
             ahead, left = step * np.cos(mean), step * np.sin(mean)
             x += velocity[0] * dt + ahead * drift[0] - left * drift[1]
             y += velocity[1] * dt + left * drift[0] + ahead * drift[1]
             phi += velocity[2] * dt + step * drift[2]
-            here_h, next_h, here_p, next_p = next_h, here_h, next_p, here_p
             here_g, next_g = next_g, here_g
-            states[c, n + 1], movings[c, n + 1] = state, moving
+            _stand_there(table)
+            states[c, n + 1] = state
+            _keep(table, movings[c, n + 1], True)
             state = states[c, n + 1]
             _note(state, path, waypoint, x, y, dt)
             state[2], state[7:10] = phi, velocity
-        _write_result(*(state, steps, here_h, here_p, path, path_at, waypoint[2], out[c - before]))
+        heading = 0.0
+        for i in range(links):
+            heading += table[i // LANES * _ROWS + _HERE + i % LANES]
+        _write_result(
+            *(state, steps, heading / links, table[_HERE_X], table[_HERE_Y]),
+            *(path, path_at, waypoint[2], out[c - before]),
+        )

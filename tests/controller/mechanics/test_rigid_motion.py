@@ -64,6 +64,26 @@ def test_forces_and_moment_balance(friction: FrictionConfig) -> None:
         assert stuck <= 2
 
 
+@pytest.mark.parametrize("links", [1, 3, 7, 8, 9, 16, 17, 25])
+def test_any_number_of_links_spends_the_least_power(links: int) -> None:
+    """Links stand in groups of eight: a group that is not full adds nothing of its own."""
+    rng = np.random.default_rng(links)
+    points, shape = rng.normal(size=(links, 2)), rng.normal(size=(links, 2))
+    heading, normal = rng.uniform(-np.pi, np.pi, links), rng.uniform(0.5, 1.5, links)
+    axes = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    sides = np.stack([-axes[:, 1], axes[:, 0]], axis=1)
+
+    def power(w: np.ndarray) -> float:
+        v = shape + w[:2] + w[2] * np.stack([-points[:, 1], points[:, 0]], axis=1)
+        along, across = (v * axes).sum(axis=1), (v * sides).sum(axis=1)
+        return float((normal * np.hypot(SNAKE.along * along, SNAKE.across * across)).sum())
+
+    found = rigid_velocity(points, heading, shape, SNAKE, normal=normal)
+    least = power(found)
+    for _ in range(300):
+        assert least <= power(found + rng.normal(size=3) * rng.choice([1e-3, 0.1, 3.0])) + 1e-6
+
+
 def advance(friction: FrictionConfig) -> float:
     """Forward way of the centre over one period of the wave, in body lengths per unit of pulse."""
     steps, x, angle, w = 200, np.zeros(2), 0.0, np.zeros(3)

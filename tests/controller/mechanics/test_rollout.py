@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from numba import njit
 
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
@@ -18,6 +19,7 @@ from snakewalk.controller.mechanics.rollout import (
     PlanarPose,
     Rolled,
     Rollout,
+    _sine_cosine,
 )
 from tests.helpers.uneven import spelt_out
 
@@ -66,6 +68,23 @@ def test_a_waypoint_that_is_passed_is_as_far_as_the_body_came_near() -> None:
             np.testing.assert_allclose(made.passed_m, 0.5, atol=0.05)
         else:
             np.testing.assert_array_equal(made.passed_m, 0.0)
+
+
+def test_sines_and_cosines_have_the_same_bits_many_at_a_time_as_alone() -> None:
+    angles = np.random.default_rng(0).uniform(-300.0, 300.0, 4096)
+    angles[:6] = 0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi, 0.25 * np.pi, -np.pi
+
+    @njit
+    def many(x: np.ndarray, out: np.ndarray) -> None:
+        for k in range(len(x)):
+            out[k, 0], out[k, 1] = _sine_cosine(x[k])
+
+    together = np.empty((len(angles), 2))
+    many(angles, together)
+    alone = np.array([_sine_cosine.py_func(float(x)) for x in angles])
+    np.testing.assert_array_equal(together, alone)
+    np.testing.assert_allclose(together[:, 0], np.sin(angles), atol=2.3e-16)
+    np.testing.assert_allclose(together[:, 1], np.cos(angles), atol=2.3e-16)
 
 
 def test_a_straight_body_goes_nowhere() -> None:
