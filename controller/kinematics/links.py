@@ -38,8 +38,7 @@ class BodyView(NamedTuple):
 
     def advance_since_m(self, before: "BodyView") -> float:
         """How far the links have gone along themselves since ``before``, mean over the body."""
-        advance_m = (self.link_m - before.link_m).ravel().dot(self.forward.ravel())
-        return float(advance_m) / len(self.link_m)
+        return _mean_advance_m(before.link_m, self.link_m, self.rotation)
 
 
 def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> BodyView:
@@ -182,3 +181,16 @@ def pose_at(position_m: Floats, heading_rad: float, time_s: float = 0.0) -> Body
 def mean_heading_rad(robot: RobotConfig, joint_rad: Floats) -> float:
     """Mean heading of the links relative to the head link."""
     return float(body_in_world(robot, pose_at(np.zeros(2), 0.0), joint_rad).headings_rad.mean())
+
+
+@compiled(
+    f"float64({readonly_array(dimensions=2)}, {readonly_array(dimensions=2)},"
+    f" {readonly_array(dimensions=3)})"
+)
+def _mean_advance_m(before_m: Floats, here_m: Floats, rotation: Floats) -> float:
+    """Mean way from ``before_m`` (L, 3) to ``here_m`` along the links."""
+    total = 0.0
+    for k in range(len(here_m)):
+        for i in range(3):
+            total += (here_m[k, i] - before_m[k, i]) * rotation[k, i, 0]
+    return total / len(here_m)

@@ -12,6 +12,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.drivers.compiling import compiled
 
 _LEFT_IN_RAD = 1.0
 """Roll that is not compensated: the weight takes care of it (ours)."""
@@ -56,6 +57,16 @@ class RollCompensation:
 
 def body_roll_rad(view: BodyView) -> float:
     """Mean roll of the links about their own axes, from -pi to pi; positive with the left up."""
-    up = view.rotation[:, 2, 1:]
-    size = np.hypot(up[:, 0], up[:, 1])
-    return float(np.arctan2((up[:, 0] / size).sum(), (up[:, 1] / size).sum()))
+    return _mean_roll_rad(view.rotation)
+
+
+@compiled("float64(float64[:, :, ::1])")
+def _mean_roll_rad(rotation: Floats) -> float:
+    """Direction of the sum of unit vectors, each that of a link's up seen along the link."""
+    left_up = up = 0.0
+    for k in range(len(rotation)):
+        left_z, up_z = rotation[k, 2, 1], rotation[k, 2, 2]
+        size = np.hypot(left_z, up_z)
+        left_up += left_z / size
+        up += up_z / size
+    return float(np.arctan2(left_up, up))

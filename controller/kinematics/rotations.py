@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 
 def wrap(angle_rad: ArrayLike) -> Floats:
@@ -13,4 +14,13 @@ def wrap(angle_rad: ArrayLike) -> Floats:
 
 def offset_rad(measured_rad: Floats, believed_rad: Floats) -> float:
     """Rotation from believed to measured link headings: their circular mean difference."""
-    return float(np.angle(np.mean(np.exp(1j * (measured_rad - believed_rad)))))
+    return _mean_difference_rad(measured_rad, believed_rad)
+
+
+@compiled(f"float64({readonly_array()}, {readonly_array()})")
+def _mean_difference_rad(measured_rad: Floats, believed_rad: Floats) -> float:
+    sine = cosine = 0.0
+    for k in range(len(measured_rad)):
+        sine += np.sin(measured_rad[k] - believed_rad[k])
+        cosine += np.cos(measured_rad[k] - believed_rad[k])
+    return float(np.arctan2(sine, cosine))

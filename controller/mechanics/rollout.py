@@ -70,6 +70,9 @@ class Drift:
     turn_rad: float = 0.0
 
 
+OFF_PATH, END_OFF, HEAD_OFF, HEADING, PASSED, ALONG, TIME = range(3, 10)
+"""Columns of what became of a piece."""
+_COLUMNS = 10
 PATH_STEP_M = 0.01
 _BEYOND_M = 4.0
 
@@ -104,24 +107,53 @@ class PathTable:
 class Rolled:
     """What became of C pieces; lengths in metres."""
 
-    centre_m: Floats
-    """(C, 2) at the end."""
-    offset_rad: Floats
-    """(C,) at the end."""
-    off_path_m: Floats
-    """(C,) root mean square distance of the centre from the path."""
-    end_off_m: Floats
-    """(C,) signed distance of the centre from the path at the end, positive to its left."""
-    head_off_m: Floats
-    """(C,) that of the head link."""
-    heading_rad: Floats
-    """(C,) mean heading at the end less the path's direction a little ahead of the centre."""
-    passed_m: Floats
-    """(C,) least distance of the centre from the next waypoint; 0 where it is not passed."""
-    along_m: Floats
-    """(C,) progress on the path."""
-    time_s: Floats
-    """(C,) that the joints need for it."""
+    columns: Floats
+    """(C, 10) place (2) of the centre and turn, and what the properties from there on say."""
+
+    @property
+    def centre_m(self) -> Floats:
+        """(C, 2) at the end."""
+        return self.columns[:, :2]
+
+    @property
+    def offset_rad(self) -> Floats:
+        """(C,) at the end."""
+        return self.columns[:, 2]
+
+    @property
+    def off_path_m(self) -> Floats:
+        """(C,) root mean square distance of the centre from the path."""
+        return self.columns[:, OFF_PATH]
+
+    @property
+    def end_off_m(self) -> Floats:
+        """(C,) signed distance of the centre from the path at the end, positive to its left."""
+        return self.columns[:, END_OFF]
+
+    @property
+    def head_off_m(self) -> Floats:
+        """(C,) that of the head link."""
+        return self.columns[:, HEAD_OFF]
+
+    @property
+    def heading_rad(self) -> Floats:
+        """(C,) mean heading at the end less the path's direction a little ahead of the centre."""
+        return self.columns[:, HEADING]
+
+    @property
+    def passed_m(self) -> Floats:
+        """(C,) least distance of the centre from the next waypoint; 0 where it is not passed."""
+        return self.columns[:, PASSED]
+
+    @property
+    def along_m(self) -> Floats:
+        """(C,) progress on the path."""
+        return self.columns[:, ALONG]
+
+    @property
+    def time_s(self) -> Floats:
+        """(C,) that the joints need for it."""
+        return self.columns[:, TIME]
 
 
 class Followed:
@@ -141,11 +173,11 @@ class Followed:
 
     def rolled(self, headings_rad: Floats, points_m: Floats) -> Rolled:
         """Result for links that head so (L,) at the end, at points (L, 2) about the centre."""
-        out, path = np.empty((1, 10)), self._path
+        out, path = np.empty((1, _COLUMNS)), self._path
         body = float(headings_rad.mean()), float(points_m[0, 0]), float(points_m[0, 1])
         given = path.points_m, self._from, path.waypoint_at
         _write_result(self._state, self._steps, *body, *given, out[0])
-        return Rolled(out[:, :2], *out.T[2:])
+        return Rolled(out)
 
 
 class Rollout:
@@ -198,6 +230,7 @@ class Rollout:
         path_at: int,
         cruise_segments_s: float,
         drift: Drift,
+        room_of: "RolloutTree | None" = None,
     ) -> "RolloutTree":
         """Where every rollout of a decision begins.
 
@@ -209,6 +242,7 @@ class Rollout:
             path_at: index of its point nearest to the centre.
             cruise_segments_s: wanted speed of the pulse; joints at their speed limit slow it.
             drift: added to the balance.
+            room_of: a tree that is not used any more; its memory is taken over.
 
         """
         given = (
@@ -218,21 +252,30 @@ class Rollout:
             *(np.array([*path.waypoint_m, path.waypoint_at]), cruise_segments_s),
             np.array([drift.ahead_m, drift.left_m, drift.turn_rad]),
         )
-        return RolloutTree(samples_rad, head, len(self._table) // _ROWS, given)
+        return RolloutTree(samples_rad, head, len(self._table) // _ROWS, given, room_of)
 
 
 class RolloutTree:
     """Rollouts from one pose on one track: what pieces have in common is rolled out once."""
 
     def __init__(
-        self, samples_rad: Floats, head: float, groups: int, given: tuple[Any, ...]
+        self,
+        samples_rad: Floats,
+        head: float,
+        groups: int,
+        given: tuple[Any, ...],
+        room_of: "RolloutTree | None" = None,
     ) -> None:
         """Of ``Rollout.begin``; ``groups`` of links; ``given`` are arguments of ``_roll``."""
         self._samples, self._head, self._given = samples_rad, head, given
         self._count = 0
-        self._pieces = np.empty((0, 0))
-        self._states = np.empty((0, 0, _STATE))
-        self._moving = np.empty((0, 0, 2 * groups * LANES))
+        if room_of is None:
+            self._pieces = np.empty((0, 0))
+            self._states = np.empty((0, 0, _STATE))
+            self._moving = np.empty((0, 0, 2 * groups * LANES))
+        else:
+            self._pieces, self._states = room_of._pieces, room_of._states
+            self._moving = room_of._moving
 
     def roll(self, pieces_rad: Floats, pulse: float | None = None) -> Rolled:
         """Roll a body out over each piece.
@@ -248,20 +291,21 @@ class RolloutTree:
         steps = max(1, round(pulse / _STEP_SEGMENTS))
         before = self._make_room(count, length, steps)
         self._pieces[before : self._count] = pieces_rad
-        out = np.empty((count, 10))
+        out = np.empty((count, _COLUMNS))
         _roll(
             *(self._samples, self._pieces[: self._count], before, self._head, pulse / steps),
             *(*self._given, self._states, self._moving, out),
         )
-        return Rolled(out[:, :2], *out.T[2:])
+        return Rolled(out)
 
     def _make_room(self, count: int, length: int, steps: int) -> int:
         """Make room for so many more pieces; the place of the first."""
-        if (length, steps + 1) != (self._pieces.shape[1], self._states.shape[1]):
+        fits = (length, steps + 1) == (self._pieces.shape[1], self._states.shape[1])
+        if not fits:
             self._count = 0
         before = self._count
         self._count += count
-        if before == 0 or self._count > len(self._pieces):
+        if not fits or self._count > len(self._pieces):
             room = 2 * self._count
             pieces, states = np.empty((room, length)), np.empty((room, steps + 1, _STATE))
             moving = np.empty((room, steps + 1, self._moving.shape[2]))
@@ -519,11 +563,11 @@ def _write_result(
     c, s = np.cos(phi), np.sin(phi)
     head_x, head_y = x + c * head_x - s * head_y, y + s * head_x + c * head_y
     row[0], row[1], row[2] = x, y, phi
-    row[3], row[4] = np.sqrt(state[5] / steps), state[4]
-    row[5] = _nearest(path, k, head_x, head_y)[1]
-    row[6] = error - 2.0 * np.pi * np.floor(error / (2.0 * np.pi) + 0.5)
-    row[7] = np.sqrt(state[10]) if place >= waypoint_at else 0.0
-    row[8], row[9] = PATH_STEP_M * (place - path_at), state[6]
+    row[OFF_PATH], row[END_OFF] = np.sqrt(state[5] / steps), state[4]
+    row[HEAD_OFF] = _nearest(path, k, head_x, head_y)[1]
+    row[HEADING] = error - 2.0 * np.pi * np.floor(error / (2.0 * np.pi) + 0.5)
+    row[PASSED] = np.sqrt(state[10]) if place >= waypoint_at else 0.0
+    row[ALONG], row[TIME] = PATH_STEP_M * (place - path_at), state[6]
 
 
 @compiled("UniTuple(int64, 2)(float64[:, ::1], int64)")

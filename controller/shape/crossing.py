@@ -1,13 +1,9 @@
 """Whether a body touches itself: a thick curve against its own other parts."""
 
-from functools import cache
-
 import numpy as np
 
-from snakewalk.config.arrays import Bools, Floats, Indices
-
-_AT_ONCE = 256  # bodies in memory
-_GROUP = 4  # segments
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.drivers.compiling import compiled
 
 
 def self_touches(skeleton_rad: Floats, length_m: float, radius_m: float) -> Bools:
@@ -25,73 +21,64 @@ def self_touches(skeleton_rad: Floats, length_m: float, radius_m: float) -> Bool
     touches = np.zeros(len(shapes), dtype=bool)
     if lag >= points:
         return touches
-    reach = 2.0 * radius_m + piece  # segments this far apart at their middles cannot touch
-    for first in range(0, len(shapes), _AT_ONCE):
-        some = shapes[first : first + _AT_ONCE]
-        step = np.stack([np.cos(some), np.sin(some)], axis=-1) * piece
-        ends = np.concatenate([np.zeros((len(some), 1, 2)), np.cumsum(step, axis=1)], axis=1)
-        body, i, j = _near_pairs(ends, lag, reach, piece)
-        if not len(body):  # the usual case
-            continue
-        a, b, c, d = ends[body, i], ends[body, i + 1], ends[body, j], ends[body, j + 1]
-        near = _segments_cross(a, b, c, d)
-        for point, start, stop in ((a, c, d), (b, c, d), (c, a, b), (d, a, b)):
-            near |= _distance(point, start, stop) < 2.0 * radius_m
-        touches[first + body[near]] = True
+    _find(np.ascontiguousarray(shapes, dtype=float), piece, lag, 2.0 * radius_m, touches)
     return touches
 
 
-def _near_pairs(
-    ends: Floats, lag: int, reach_m: float, piece_m: float
-) -> tuple[Indices, Indices, Indices]:
-    """Body, first and second segment of all pairs ``lag`` apart whose middles are within reach.
-
-    Looked for between groups of segments first: a middle is at most 1.5 pieces from its group's.
-    """
-    points = ends.shape[1] - 1
-    group_i, group_j, part_i, part_j = _groups(points, lag)
-    last = (points - 1) // _GROUP
-    centres = ends[:, np.minimum(np.arange(last + 1) * _GROUP + 2, points)]
-    gap = centres[:, group_i] - centres[:, group_j]
-    far = reach_m + 3.0 * piece_m
-    body, pair = np.nonzero(gap[..., 0] ** 2 + gap[..., 1] ** 2 < far**2)
-    i = (group_i[pair][:, None] * _GROUP + part_i).ravel()
-    j = (group_j[pair][:, None] * _GROUP + part_j).ravel()
-    real = (j - i >= lag) & (j < points)
-    body, i, j = body.repeat(len(part_i))[real], i[real], j[real]
-    middle = 0.5 * (ends[:, 1:] + ends[:, :-1])
-    gap = middle[body, i] - middle[body, j]
-    near = gap[:, 0] ** 2 + gap[:, 1] ** 2 < reach_m**2
-    return body[near], i[near], j[near]
+@compiled("float64(float64[::1], float64[::1], int64, int64)")
+def _square_m2(x: Floats, y: Floats, point: int, segment: int) -> float:
+    """Square of the distance of a point of the curve from a segment."""
+    u, v = x[segment + 1] - x[segment], y[segment + 1] - y[segment]
+    dx, dy = x[point] - x[segment], y[point] - y[segment]
+    part = min(max((dx * u + dy * v) / (u * u + v * v), 0.0), 1.0)
+    dx, dy = dx - part * u, dy - part * v
+    return float(dx * dx + dy * dy)
 
 
-@cache
-def _groups(points: int, lag: int) -> tuple[Indices, Indices, Indices, Indices]:
-    """Pairs of groups with segments ``lag`` apart, and of the segments in them."""
-    count = (points - 1) // _GROUP + 1
-    apart = max(0, -(-(lag - _GROUP + 1) // _GROUP))
-    parts = np.divmod(np.arange(_GROUP * _GROUP), _GROUP)
-    made = (*np.triu_indices(count, apart), *parts)
-    for each in made:
-        each.setflags(write=False)
-    return made
+@compiled("float64(float64[::1], float64[::1], int64, int64)")
+def _side(x: Floats, y: Floats, segment: int, point: int) -> float:
+    """On which side of a segment's line a point of the curve lies; 0 is on it."""
+    u, v = x[segment + 1] - x[segment], y[segment + 1] - y[segment]
+    return float(u * (y[point] - y[segment]) - v * (x[point] - x[segment]))
 
 
-def _distance(point: Floats, start: Floats, stop: Floats) -> Floats:
-    """From points (K, 2) to segments."""
-    along = stop - start
-    part = np.einsum("ij,ij->i", point - start, along) / np.einsum("ij,ij->i", along, along)
-    nearest = start + np.clip(part, 0.0, 1.0)[:, None] * along
-    return np.asarray(np.hypot(*(point - nearest).T))
-
-
-def _segments_cross(a: Floats, b: Floats, c: Floats, d: Floats) -> Bools:
-    """Whether segments ab and cd (K, 2 each) cross properly."""
-    return np.asarray(
-        (_side(a, b, c) * _side(a, b, d) < 0.0) & (_side(c, d, a) * _side(c, d, b) < 0.0)
+@compiled("boolean(float64[::1], float64[::1], int64, int64, float64)")
+def _is_near(x: Floats, y: Floats, i: int, j: int, width_m: float) -> bool:
+    """Whether segments ``i`` and ``j`` of a curve are nearer than ``width_m``, or cross."""
+    crosses = (
+        _side(x, y, i, j) * _side(x, y, i, j + 1) < 0.0
+        and _side(x, y, j, i) * _side(x, y, j, i + 1) < 0.0
     )
+    square = min(_square_m2(x, y, i, j), _square_m2(x, y, i + 1, j))
+    square = min(square, _square_m2(x, y, j, i))
+    square = min(square, _square_m2(x, y, j + 1, i))
+    return crosses or square < width_m * width_m
 
 
-def _side(a: Floats, b: Floats, p: Floats) -> Floats:
-    u, v = b - a, p - a
-    return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+@compiled("boolean(float64[::1], float64[::1], int64, float64, float64)")
+def _touches(x: Floats, y: Floats, lag: int, width_m: float, piece_m: float) -> bool:
+    """Whether a curve's segments touch, which are ``piece_m`` long."""
+    points, reach_m = len(x) - 1, width_m + piece_m  # of middles that may belong to a touch
+    for i in range(points - lag):
+        j = i + lag
+        while j < points:
+            gap_x, gap_y = x[i] + x[i + 1] - x[j] - x[j + 1], y[i] + y[i + 1] - y[j] - y[j + 1]
+            square = 0.25 * (gap_x * gap_x + gap_y * gap_y)
+            if square < reach_m * reach_m and _is_near(x, y, i, j, width_m):
+                return True
+            # a step brings the middles nearer by a segment's length at most
+            j += max(1, int((np.sqrt(square) - reach_m) / piece_m))
+    return False
+
+
+@compiled("void(float64[:, ::1], float64, int64, float64, boolean[::1])")
+def _find(shapes_rad: Floats, piece_m: float, lag: int, width_m: float, touches: Bools) -> None:
+    """Note of each body (S, N) whether two segments ``lag`` apart are nearer than ``width_m``."""
+    points = shapes_rad.shape[1]
+    x, y = np.empty(points + 1), np.empty(points + 1)
+    for body in range(len(shapes_rad)):
+        x[0] = y[0] = 0.0
+        for k in range(points):
+            x[k + 1] = x[k] + piece_m * np.cos(shapes_rad[body, k])
+            y[k + 1] = y[k] + piece_m * np.sin(shapes_rad[body, k])
+        touches[body] = _touches(x, y, lag, width_m, piece_m)

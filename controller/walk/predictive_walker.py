@@ -9,6 +9,7 @@ chooses among the first of them.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from snakewalk.controller.shape.star import StarVisits
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.serpenoid import SERPENOID, SerpenoidParameters, phase_at_end
 from snakewalk.controller.walk.steering import PathPose, Steering
+from snakewalk.drivers.compiling import compiled
 
 PIECES = 10
 """Decisions per body length."""
@@ -68,9 +70,8 @@ class _Option:
     """Sample of the carrier at the begin."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Tried:
-    """A piece of track, and what its rollout costs."""
+class _Tried(NamedTuple):
+    """A piece of track, and what its rollout costs; many a decision."""
 
     cost_m2: float
     progress: float
@@ -263,22 +264,18 @@ class PredictiveWalker:
         return min(self._tried, key=lambda each: each.cost_m2)
 
     def _roll(self, pose: PathPose, tried: list[tuple[_Option, Floats]]) -> None:
-        bends = np.array([each for _, each in tried])
         points = self.track.points
-        waves = np.array([option.base_rad + option.wave_rad[:points] for option, _ in tried])
-        pieces = waves + self._bent(bends, waves.shape[1])
+        pieces = np.array([option.wave_rad[:points] for option, _ in tried])
+        bases = np.array([option.base_rad for option, _ in tried])
+        bends = np.array([each for _, each in tried])
+        _bend(pieces, bases, bends, self._walk.bend_limit_rad, points)
         cost_m2, progress = self.steering.judge(pose, pieces)
         self._tried += [
-            _Tried(float(cost_m2[k]), float(progress[k]), option, bends[k], pieces[k])
-            for k, (option, _) in enumerate(tried)
+            _Tried(cost, on, option, bend, piece)
+            for cost, on, (option, bend), piece in zip(
+                cost_m2.tolist(), progress.tolist(), tried, pieces, strict=True
+            )
         ]
-
-    def _bent(self, bends: Floats, count: int) -> Floats:
-        """Turn (C, count) of mean lines by ``bends`` (C, 2)."""
-        points, limit = self.track.points, self._walk.bend_limit_rad
-        k, half = np.arange(1, count + 1), points // 2
-        first, second = np.minimum(k, half) / points, np.maximum(k - half, 0) / points
-        return np.asarray(limit * (bends[:, :1] * first + bends[:, 1:] * second))
 
     def _options(self, pose: PathPose, carrier: SerpenoidParameters | None = None) -> list[_Option]:
         """What may come next: the rest of the state, or another."""
@@ -341,3 +338,16 @@ class PredictiveWalker:
         mean = (total[:, span:] - total[:, :-span]) / span
         joint = mean[:, span:] - mean[:, :-span]
         return np.asarray((np.diff(joint, 2, axis=1) ** 2).mean(axis=1))
+
+
+@compiled("void(float64[:, ::1], float64[::1], float64[:, ::1], float64, int64)")
+def _bend(
+    pieces_rad: Floats, bases_rad: Floats, bends: Floats, limit_rad: float, points: int
+) -> None:
+    """Add mean lines to waves (C, n): bases (C,), turned by bends (C, 2) over two half bodies."""
+    half = points // 2
+    for c in range(len(pieces_rad)):
+        for k in range(pieces_rad.shape[1]):
+            first, second = min(k + 1, half) / points, max(k + 1 - half, 0) / points
+            turn = limit_rad * (bends[c, 0] * first + bends[c, 1] * second)
+            pieces_rad[c, k] = bases_rad[c] + pieces_rad[c, k] + turn

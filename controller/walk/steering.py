@@ -5,13 +5,20 @@ added to every rollout: friction that differs from the configured, uneven loads,
 """
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.mechanics.rollout import (
+    ALONG,
+    END_OFF,
+    HEAD_OFF,
+    HEADING,
+    OFF_PATH,
+    PASSED,
+    TIME,
     Drift,
     PathTable,
     PlanarPose,
@@ -20,6 +27,7 @@ from snakewalk.controller.mechanics.rollout import (
     RolloutTree,
 )
 from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,16 +89,18 @@ class Steering:
         self._rollout = rollout
         self._track = track
         self._cruise = cruise_segments_s
-        self._weights = SteeringWeights()
+        self._cruise_m_s = cruise_segments_s * rollout.segment_m
+        self._weights = np.array(astuple(SteeringWeights()))
         self._past: deque[PathPose] = deque()
         self._tree: RolloutTree | None = None
         self._tree_of: PathPose | None = None
+        self._past_tree: RolloutTree | None = None
         self.drift = Drift()
         """Identified so far."""
 
     def observe(self, pose: PathPose) -> None:
         """Compare what the body did over the last span of pulse with its prediction."""
-        past, self._tree = self._past, None
+        past, self._tree_of = self._past, None
         past.append(pose)
         while len(past) > 2 and past[1].head <= pose.head - _SPAN_SEGMENTS:
             past.popleft()
@@ -98,7 +108,8 @@ class Steering:
         pulse = pose.head - before.head
         if pulse < 0.5 * _SPAN_SEGMENTS:
             return
-        made = self._begin(before, Drift()).roll(np.empty((1, 0)), pulse)
+        self._past_tree = self._begin(before, Drift(), self._past_tree)
+        made = self._past_tree.roll(np.empty((1, 0)), pulse)
         gap_m = pose.centre_m - made.centre_m[0]
         mean = pose.offset_rad + float(self._track.body_rad(pose.head).mean())
         c, s = np.cos(mean), np.sin(mean)
@@ -115,7 +126,7 @@ class Steering:
         What pieces have in common is rolled out once for a pose, until another one is observed.
         """
         if self._tree is None or self._tree_of is not pose:
-            self._tree, self._tree_of = self._begin(pose, self.drift), pose
+            self._tree, self._tree_of = self._begin(pose, self.drift, self._tree), pose
         return self._tree.roll(pieces_rad)
 
     def is_steep(self, pose: PathPose) -> bool:
@@ -139,19 +150,11 @@ class Steering:
 
     def cost(self, rolled: Rolled) -> tuple[Floats, Floats]:
         """Cost and progress, as ``judge`` returns them, of rollouts that have been made."""
-        weights = self._weights
-        progress = rolled.along_m / (rolled.time_s * self._cruise * self._rollout.segment_m)
-        cost = (
-            weights.off_path * rolled.off_path_m**2
-            + weights.end * rolled.end_off_m**2
-            + weights.head * rolled.head_off_m**2
-            + (weights.heading_m * rolled.heading_rad) ** 2
-            + weights.pass_by * np.maximum(rolled.passed_m - weights.near_m, 0.0) ** 2
-            + weights.delay_m2 * (1.0 - progress)
-        )
-        return np.asarray(cost), np.asarray(progress)
+        cost, progress = np.empty(len(rolled.columns)), np.empty(len(rolled.columns))
+        _cost(rolled.columns, self._weights, self._cruise_m_s, cost, progress)
+        return cost, progress
 
-    def _begin(self, pose: PathPose, drift: Drift) -> RolloutTree:
+    def _begin(self, pose: PathPose, drift: Drift, room_of: RolloutTree | None) -> RolloutTree:
         first = max(int(pose.head) - self._track.points - 1, 0)
         return self._rollout.begin(
             self._track.samples(first),
@@ -161,4 +164,28 @@ class Steering:
             pose.path_at,
             self._cruise,
             drift,
+            room_of,
+        )
+
+
+@compiled(
+    f"void(float64[:, ::1], {readonly_array(layout='C')}, float64, float64[::1], float64[::1])"
+)
+def _cost(
+    columns: Floats, weights: Floats, cruise_m_s: float, cost: Floats, progress: Floats
+) -> None:
+    """Write the cost (C,), and the progress over that at the cruise speed, of ``Rolled``."""
+    off_path, end, head, heading_m = weights[0], weights[1], weights[2], weights[3]
+    pass_by, near_m, delay_m2 = weights[4], weights[5], weights[6]
+    for k in range(len(columns)):
+        row = columns[k]
+        progress[k] = row[ALONG] / (row[TIME] * cruise_m_s)
+        heading, beyond = heading_m * row[HEADING], max(row[PASSED] - near_m, 0.0)
+        cost[k] = (
+            off_path * row[OFF_PATH] * row[OFF_PATH]
+            + end * row[END_OFF] * row[END_OFF]
+            + head * row[HEAD_OFF] * row[HEAD_OFF]
+            + heading * heading
+            + pass_by * beyond * beyond
+            + delay_m2 * (1.0 - progress[k])
         )

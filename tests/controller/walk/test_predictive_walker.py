@@ -9,7 +9,10 @@ from snakewalk.config.loader import load_robot
 from snakewalk.config.run import WalkConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.mechanics.rollout import (
+    END_OFF,
+    OFF_PATH,
     PATH_STEP_M,
+    TIME,
     Drift,
     PathTable,
     PlanarPose,
@@ -77,9 +80,10 @@ def test_what_fails_on_a_second_body_is_not_walked(monkeypatch: pytest.MonkeyPat
 
     def try_piece(pose: PathPose, piece_rad: np.ndarray) -> Rolled:
         tried.append(piece_rad)
-        off_m = np.array([0.0 if len(tried) == 2 else 2.0])
-        zero = np.zeros(1)
-        return Rolled(np.zeros((1, 2)), zero, off_m, off_m, zero, zero, zero, zero, np.ones(1))
+        columns = np.zeros((1, 10))
+        columns[0, [OFF_PATH, END_OFF]] = 0.0 if len(tried) == 2 else 2.0
+        columns[0, TIME] = 1.0
+        return Rolled(columns)
 
     chooser.try_piece = try_piece
     for _ in range(4):
