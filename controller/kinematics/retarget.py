@@ -9,6 +9,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 
 class Retarget:
@@ -39,12 +40,10 @@ class Retarget:
 
     def group_headings_rad(self, skeleton_rad: Floats) -> Floats:
         """(..., G) mean tangent angle over each rigid group; ``skeleton_rad`` is (..., points)."""
-        zero = np.zeros((*skeleton_rad.shape[:-1], 1))
-        area = np.concatenate([zero, np.cumsum(skeleton_rad, axis=-1)], axis=-1)
-        low = np.minimum(self.edges.astype(int), self._points - 1)
-        part = self.edges - low
-        at_edges = area[..., low] * (1.0 - part) + area[..., low + 1] * part
-        return np.asarray(np.diff(at_edges, axis=-1) / np.diff(self.edges))
+        rows = np.ascontiguousarray(skeleton_rad, dtype=float).reshape(-1, self._points)
+        headings = np.empty((len(rows), len(self.edges) - 1))
+        _mean_angles(rows, self.edges, headings)
+        return headings.reshape(*skeleton_rad.shape[:-1], -1)
 
     def joints_rad(self, skeleton_rad: Floats) -> Floats:
         """(..., J) joint angles; pitch joints are 0; the pitch fit sets them."""
@@ -65,6 +64,24 @@ class Retarget:
         gap = robot - curve
         gap = gap - gap.mean(axis=-2, keepdims=True)
         return np.asarray(np.hypot(gap[..., 0], gap[..., 1]).max(axis=-1))
+
+
+@compiled(f"void({readonly_array(dimensions=2, layout='C')}, float64[::1], float64[:, ::1])")
+def _mean_angles(rows_rad: Floats, edges: Floats, means: Floats) -> None:
+    """Means (S, G) of angles (S, N) between ``edges`` (G + 1,), counted in samples."""
+    points = rows_rad.shape[1]
+    for row in range(len(rows_rad)):
+        area, before, at = 0.0, 0.0, 0
+        for g in range(len(edges)):
+            low = min(int(edges[g]), points - 1)
+            while at < low:
+                area += rows_rad[row, at]
+                at += 1
+            part = edges[g] - low
+            here = area * (1.0 - part) + (area + rows_rad[row, low]) * part
+            if g > 0:
+                means[row, g - 1] = (here - before) / (edges[g] - edges[g - 1])
+            before = here
 
 
 def _ends(angles_rad: Floats, step_m: Floats | float) -> Floats:

@@ -1,7 +1,8 @@
 """One run: link, motion, log and alarms joined in the loop; the same on metal and in simulation."""
 
-from collections.abc import Callable
-from contextlib import suppress
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -44,6 +45,22 @@ class Ramp:
         """Joint angles (J,) after ``time_s``; the goal from ``duration_s`` on."""
         t = 1.0 if self.duration_s == 0.0 else min(max(time_s / self.duration_s, 0.0), 1.0)
         return np.asarray(self._start + quintic(t) * (self._goal - self._start))
+
+
+@contextmanager
+def _no_long_collections() -> Iterator[None]:
+    """Leave what is there already out of Python's garbage collections.
+
+    One over all that a run has imported and planned stops the program for 0.1 s and more, and the
+    servos' bus watchdogs trip at 0.2 s.
+    """
+    was_frozen = gc.get_freeze_count() > 0
+    gc.freeze()
+    try:
+        yield
+    finally:
+        if not was_frozen:
+            gc.unfreeze()
 
 
 PoseSource = Callable[[JointState], BodyPose]
@@ -154,7 +171,7 @@ class Drive:
         """Enable, ramp to the first shape, follow the path, settle, disable."""
         clock, log, motion, path = self._clock, self._log, self._motion, self._path
         period_s = 1.0 / self._run.cycle_hz
-        with self._link:
+        with _no_long_collections(), self._link:
             state = self._link.enable()
             self._wire_s = self._wire_busy_s()
             if self._observer is not None:

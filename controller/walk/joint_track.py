@@ -86,14 +86,27 @@ class JointTrack:
         q = self._q[low:]
         if len(q) < 2:
             return np.zeros(1), np.zeros(1)
-        steps = np.diff(q, axis=0)
-        slope = np.abs(steps).max(axis=1)
-        turn = np.abs(np.diff(steps, axis=0)).max(axis=1) if len(q) > 2 else np.zeros(0)
-        slope = np.maximum(np.append(slope, slope[-1]), np.insert(slope, 0, slope[0]))
-        turn = np.concatenate([[0.0], turn, [0.0]])
-        wide = np.maximum(turn, np.maximum(np.append(turn[1:], 0.0), np.insert(turn[:-1], 0, 0.0)))
+        slope, turn = np.empty(len(q)), np.empty(len(q))
+        _bends(q, slope, turn)
         skip = start - self.first - low
-        return slope[skip:], wide[skip:]
+        return slope[skip:], turn[skip:]
+
+
+@compiled("void(float64[:, ::1], float64[::1], float64[::1])")
+def _bends(q: Floats, slope: Floats, turn: Floats) -> None:
+    """Largest |dq/dS| and |d2q/dS2| of rows ``q`` (n, J) within one row to either side, (n,)."""
+    last = len(q) - 1
+    for k in range(last + 1):
+        slope[k] = turn[k] = 0.0
+    for k in range(last):
+        step = bend = 0.0
+        for j in range(q.shape[1]):
+            step = max(step, abs(q[k + 1, j] - q[k, j]))
+            if k > 0:
+                bend = max(bend, abs((q[k + 1, j] - q[k, j]) - (q[k, j] - q[k - 1, j])))
+        slope[k], slope[k + 1] = max(slope[k], step), max(slope[k + 1], step)
+        for near in range(max(k - 1, 0), k + 2):
+            turn[near] = max(turn[near], bend)
 
 
 @compiled("void(float64[:, ::1], float64, float64[::1])")

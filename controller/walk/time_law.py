@@ -93,13 +93,9 @@ class TimeLaw:
         """Tabulate the speed allowed from the head's place on, braking distance included."""
         self._first = max(self.joints.first, int(self.head) - 1)
         slope, turn = self.joints.bends(self._first)
-        by_speed = self._speed_limit / np.maximum(slope, _TINY)
-        by_bend = np.sqrt(self._half_acceleration / np.maximum(turn, _TINY))
         self._slope = slope
-        here = np.minimum(np.minimum(by_speed, by_bend), self._cruise)
-        # least of three neighbours: between two places no limit is missed, and none is a step
-        around = np.pad(here, 1, mode="edge")
-        allowed = np.minimum(np.minimum(around[:-2], around[2:]), here)
+        allowed = np.empty(len(slope))
+        _allow(slope, turn, self._speed_limit, self._half_acceleration, self._cruise, allowed)
         # what comes behind the end may be as steep as the steepest so far: be able to brake for it
         self._least = min(self._least, float(allowed.min()))
         allowed[-1] = self._least
@@ -136,6 +132,28 @@ def _moved(
     limit = min(_limit_at(allowed, at), _limit_at(allowed, at + speed * dt_s))
     speed = max(0.0, min(limit, speed + (thrust if slew > 0.0 else -thrust) * dt_s))
     return at + speed * dt_s, speed
+
+
+@compiled("void(float64[::1], float64[::1], float64, float64, float64, float64[::1])")
+def _allow(
+    slope: Floats,
+    turn: Floats,
+    speed_limit: float,
+    half_acceleration: float,
+    cruise: float,
+    allowed: Floats,
+) -> None:
+    """Write the speed allowed at each place: the least of it and its neighbours.
+
+    So between two places no limit is missed, and none is a step.
+    """
+    for k in range(len(slope)):
+        allowed[k] = cruise
+    for k in range(len(slope)):
+        by_bend = np.sqrt(half_acceleration / max(turn[k], _TINY))
+        here = min(speed_limit / max(slope[k], _TINY), by_bend)
+        for near in range(max(k - 1, 0), min(k + 2, len(slope))):
+            allowed[near] = min(allowed[near], here)
 
 
 @compiled("void(float64[::1], float64[::1], float64)")

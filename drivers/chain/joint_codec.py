@@ -178,12 +178,16 @@ class Readings:
         self._numbers = np.full((7, joints), np.nan)
         self._motion = self._numbers[:3]
         self._temperature, self._voltage = self._numbers[3:5]
-        self._measured_at_s, self._slow_at_s = self._numbers[5:]
+        self._measured_at_s, self._slow_measured_at_s = self._numbers[5:]
         self._numbers[5:] = -np.inf
         self._hardware_error = np.zeros(joints, np.uint8)
         self._error = np.zeros(joints, np.uint8)
         self._valid = np.zeros(joints, np.bool_)
         self._alarmed = False
+        self.alert = False
+        """Whether a servo's newest reply says that it has an alarm."""
+        self.slow_at_s = -math.inf
+        """When the oldest temperature and voltage were measured; before the first, -inf."""
         self._flags = self._frozen_flags()
 
     def update(self, reply: GroupReadReply, measured_at_s: float) -> Sequence[int]:
@@ -203,6 +207,7 @@ class Readings:
         self._motion[:, ok] = motion[:, ok]
         self._measured_at_s[ok] = measured_at_s
         self._error[reply.answered] = reply.error[reply.answered]
+        self.alert = bool((self._error & ALERT).any())
         alert = (reply.error & ALERT) != 0
         self._hardware_error[reply.answered & ~alert] = 0  # without the alert bit register 70 is 0
         self._alarmed = bool(self._error.any() or self._hardware_error.any())
@@ -220,16 +225,8 @@ class Readings:
         ok = reply.valid
         self._voltage[ok] = voltages_v(reply.data[ok])
         self._temperature[ok] = reply.data[ok, 2]
-        self._slow_at_s[ok] = measured_at_s
-
-    @property
-    def alert(self) -> bool:
-        """Whether a servo's newest reply says that it has an alarm."""
-        return bool((self._error & ALERT).any())
-
-    def slow_at_s(self) -> float:
-        """When the oldest temperature and voltage were measured; before the first, -inf."""
-        return float(self._slow_at_s.min())
+        self._slow_measured_at_s[ok] = measured_at_s
+        self.slow_at_s = float(self._slow_measured_at_s.min())
 
     def state(self, now_s: float) -> JointState:
         """Read-only copies of everything."""

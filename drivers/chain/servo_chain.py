@@ -385,7 +385,7 @@ class ServoChain:
         measured_at_s = self._take(reply)
         place = self._reads % SLOW_EVERY
         self._reads += 1
-        if place == 0 or measured_at_s - self._readings.slow_at_s() > _SLOW_S:
+        if place == 0 or measured_at_s - self._readings.slow_at_s > _SLOW_S:
             reply = self._slow.read()
             self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
             self._readings.update_slow(reply, self._sent_at_s)
