@@ -31,14 +31,15 @@ def stop_share(centre_m: Floats, radius_m: float) -> float:
     links = len(centre_m)
     x = y = xx = xy = yy = 0.0
     for i in range(links):
-        x += centre_m[i, 0] / links
-        y += centre_m[i, 1] / links
+        x += centre_m[i, 0]
+        y += centre_m[i, 1]
+    x, y = x / links, y / links
     for i in range(links):
         dx, dy = centre_m[i, 0] - x, centre_m[i, 1] - y
-        xx += dx * dx / links
-        xy += dx * dy / links
-        yy += dy * dy / links
-    off_axis = 0.5 * (xx + yy) - math.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
+        xx += dx * dx
+        xy += dx * dy
+        yy += dy * dy
+    off_axis = (0.5 * (xx + yy) - math.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)) / links
     square = radius_m * radius_m
     lightness = 1.0 + square / (0.5 * square + max(off_axis, 0.0))
     return min(STOP_SHARE / lightness, BENT_STOP_SHARE)
@@ -60,7 +61,8 @@ def ellipse_force(
     """
     mu_forward, mu_across, mu_back = mu
     mu_along = mu_forward if along_m_s >= 0.0 else mu_back
-    gauge = math.hypot(mu_along * along_m_s, mu_across * across_m_s)
+    u, v = mu_along * along_m_s, mu_across * across_m_s
+    gauge = math.sqrt(u * u + v * v)
     floor = link_normal_n / still_n_s_m
     slow_along = max(gauge, mu_along * mu_along * floor)
     slow_across = max(gauge, mu_across * mu_across * floor)

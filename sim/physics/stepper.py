@@ -87,13 +87,14 @@ def _move(
 ) -> None:
     """Rate at which each link's centre moved in the last step, and its spin, from the head on."""
     centre, rotation, _, axis = chain
+    rate = 1.0 / step_s
     for k in range(3):
         w[0, k] = 0.0
         for i in range(3):
             w[0, k] += rotation[1, 3 * k + i] * qvel[3 + i]
     for i in range(len(v)):
         for k in range(3):
-            v[i, k] = (centre[i + 1, k] - before[i, k]) / step_s
+            v[i, k] = (centre[i + 1, k] - before[i, k]) * rate
             before[i, k] = centre[i + 1, k]
             if i > 0:
                 w[i, k] = w[parents[i + 1] - 1, k] + axis[i, k] * qvel[5 + i]
@@ -158,7 +159,8 @@ def _add_friction(
     v, w, wrench, depth, before = work
     mu, radius_m, step_s = (law[0], law[1], law[2]), law[3], law[4]
     centre, rotation = chain[0], chain[1]
-    stop = stop_share(centre[1 : spine + 1], radius_m)
+    stop_per_s = stop_share(centre[1 : spine + 1], radius_m) / step_s
+    mean_s = step_s / len(v)
     depth[:] = 0.0
     for c in range(count):
         i = _sliding_link(integers, 2 * size * c + at_geom, geom_body, role)
@@ -181,15 +183,15 @@ def _add_friction(
         e0, e1, e2 = rotation[i + 1, 0], rotation[i + 1, 3], rotation[i + 1, 6]
         lift = e0 * n[0] + e1 * n[1] + e2 * n[2]
         e0, e1, e2 = e0 - lift * n[0], e1 - lift * n[1], e2 - lift * n[2]
-        norm = max(np.sqrt(e0 * e0 + e1 * e1 + e2 * e2), 1e-9)
-        e0, e1, e2 = e0 / norm, e1 / norm, e2 / norm
+        scale = 1.0 / max(np.sqrt(e0 * e0 + e1 * e1 + e2 * e2), 1e-9)
+        e0, e1, e2 = scale * e0, scale * e1, scale * e2
         g0, g1, g2 = n[1] * e2 - n[2] * e1, n[2] * e0 - n[0] * e2, n[0] * e1 - n[1] * e0
         v_along = s0 * e0 + s1 * e1 + s2 * e2
         v_across = s0 * g0 + s1 * g1 + s2 * g2
-        still = stop * mass_kg[i] / step_s
+        still = stop_per_s * mass_kg[i]
         f_along, f_across = ellipse_force(share * load[i], v_along, v_across, mu, still, load[i])
         totals[0] -= (f_along * v_along + f_across * v_across) * step_s
-        totals[1] += abs(v_across) * share * step_s / len(v)
+        totals[1] += abs(v_across) * share * mean_s
         f0 = f_along * e0 + f_across * g0
         f1 = f_along * e1 + f_across * g1
         f2 = f_along * e2 + f_across * g2
