@@ -36,7 +36,7 @@ from snakewalk.controller.mechanics.rigid_motion import (
 )
 from snakewalk.drivers.compiling import compiled, inlined, readonly_array
 
-_STEP_SEGMENTS = 2.5
+_STEP_SEGMENTS = 4.0
 _BACK, _FORTH = 5, 40
 """Points of the path among which a place is looked for after a step."""
 _AHEAD = 30
