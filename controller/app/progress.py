@@ -157,6 +157,7 @@ def show_progress(
 ) -> Iterator[T]:
     """Yield items under a bar that counts them; ``done`` of ``total`` were done before."""
     with ProgressBar(description, total, transient=transient) as bar:
+        bar.update(done)
         for number, item in enumerate(items, start=done + 1):
             yield item
             bar.update(number)

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from snakewalk.controller.app.cli.commands.analyse import analyse
 from snakewalk.controller.app.cli.commands.bench.cable_drop import power
@@ -123,6 +123,27 @@ class _Commands(TyperGroup):
             raise SystemExit(130) from None
 
 
+class _Command(TyperCommand):
+    """A command that refuses a value which would replace another one of the same option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:
+        """Read the words behind a command's name."""
+        words = list(args)
+        rest = super().parse_args(ctx, args)  # --help ends here
+        if not ctx.resilient_parsing:  # of completion
+            order: list[Any] = self.make_parser(ctx).parse_args(words)[2]
+            for option in dict.fromkeys(order):
+                if order.count(option) > 1 and _takes_one_value(option):
+                    told = f"given {order.count(option)} times, and takes one value: leave one"
+                    raise typer.BadParameter(told, ctx=ctx, param=option)
+        return rest
+
+
+def _takes_one_value(option: Any) -> bool:
+    """Whether a second value of an option replaces the first; a flag that only sets does not."""
+    return not (option.multiple or (option.is_flag and not option.secondary_opts))
+
+
 @contextmanager
 def _faults_in_one_line() -> Iterator[None]:
     """Have typer print what is wrong with a command's words in one line, in place of its box."""
@@ -204,7 +225,7 @@ class _App(typer.Typer):
 def _whole(name: str, function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """Build a command with its options."""
     alone = typer.Typer(add_completion=False, rich_markup_mode="rich")
-    alone.command(name, **options)(_with_messages(function))
+    alone.command(name, cls=_Command, **options)(_with_messages(function))
     return typer.main.get_command(alone)
 
 

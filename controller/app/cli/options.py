@@ -197,10 +197,10 @@ def check_files(run: str | None, robot: str | None, world: str | None) -> None:
 
 
 def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") -> dict[str, Any]:
-    """Read an option's KEY=VALUE pairs, the last of a key; a value is JSON, or else text.
+    """Read an option's KEY=VALUE pairs; a value is JSON, or else text.
 
     Raises:
-        InputError: there is no key, or no value.
+        InputError: there is no key, or no value, or a key stands twice.
 
     """
     values: dict[str, Any] = {}
@@ -208,6 +208,8 @@ def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") ->
         key, equals, value = (part.strip() for part in text.partition("="))
         if not (key and equals and value):
             raise InputError(f"{option} {text}: expected {form}")
+        if key in values:
+            raise InputError(f"{option} {text}: {key} has a value already: leave one")
         try:
             values[key] = parse_json(value)
         except ValueError:  # no JSON; too long a number; too deep a list

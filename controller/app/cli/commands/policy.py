@@ -193,6 +193,7 @@ def policy_trials(
     from snakewalk.controller.app.studies import policy_trials as study  # noqa: PLC0415
 
     rows = [(motion, ground) for ground in world or ["flat"] for motion in motions]
+    rows = list(dict.fromkeys(rows))  # what is given twice is run once
     planned = [
         study.PolicyTrial(motion, ground, seed, seconds)
         for motion, ground in rows
