@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.commands.analyse import analyse
 from snakewalk.controller.app.cli.commands.bench.cable_drop import power
 from snakewalk.controller.app.cli.commands.bench.calibrate import calibrate
@@ -75,7 +76,14 @@ from snakewalk.controller.app.cli.commands.track import track
 from snakewalk.controller.app.cli.commands.trials import trials
 from snakewalk.controller.app.cli.commands.tune import tune
 from snakewalk.controller.app.cli.commands.walk import walk
-from snakewalk.controller.app.cli.options import LogFile, LogLevel, Quiet, Verbose, check_files
+from snakewalk.controller.app.cli.options import (
+    LogFile,
+    LogLevel,
+    Quiet,
+    Verbose,
+    check_files,
+    check_idle,
+)
 from snakewalk.controller.app.messages import messages
 
 _JOB, _MOTION, _RECORDINGS, _BUS = "The job", "Motion", "Recordings", "The bus"
@@ -172,11 +180,15 @@ def _with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
     Faults in these files are told before anything heavy is imported.
     """
     signature = inspect.signature(function, eval_str=True)
+    defaults = {name: one.default for name, one in signature.parameters.items()}
 
     @wraps(function)
     def command(
         *, verbose: Verbose, quiet: Quiet, log_level: LogLevel, log_file: LogFile, **options: Any
     ) -> Any:
+        if (log_level is not None) + verbose + quiet > 1:
+            raise InputError("--verbose, --quiet and --log-level say the same thing: leave one")
+        check_idle(options, defaults)
         level = log_level or ("debug" if verbose else "warning" if quiet else "info")
         with messages(level, log_file):
             named = {key: value for key, value in options.items() if isinstance(value, str)}

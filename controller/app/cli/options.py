@@ -196,6 +196,27 @@ def check_files(run: str | None, robot: str | None, world: str | None) -> None:
         load_world(world, beside)
 
 
+def check_idle(options: Mapping[str, object], defaults: Mapping[str, object]) -> None:
+    """Refuse options of a command that another one, or its absence, makes idle.
+
+    Raises:
+        InputError: one line for each.
+
+    """
+    given = {name for name, value in options.items() if value != defaults.get(name)}
+    faults = []
+    if options.get("view") is False and "view_at" in given:
+        faults.append("--view-at: is of the page: add --view")
+    if options.get("film") is False and "film" in given:
+        faults += [
+            f"--{name}: is of the film, which --no-film leaves out"
+            for name in ("look", "fine")
+            if name in given
+        ]
+    if faults:
+        raise InputError(faults)
+
+
 def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") -> dict[str, Any]:
     """Read an option's KEY=VALUE pairs; a value is JSON, or else text.
 

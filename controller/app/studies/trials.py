@@ -24,6 +24,7 @@ from snakewalk.controller.app.runs.factory import (
 from snakewalk.controller.app.runs.gait_run import GaitRun
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.app.studies.pool import each
+from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
@@ -251,9 +252,12 @@ def plan_trials(
     A case of which all seeds give the same run stands once.
 
     Raises:
-        InputError: a case cannot be prepared.
+        InputError: a case cannot be prepared, or the recording that its shapes come from not read.
 
     """
+    shaped = [case for case in cases if case.motion not in {"serpenoid", "gait"}]
+    for track in dict.fromkeys(prepare_case(case, 0, 0.0, changes).run.track for case in shaped):
+        load_track(track)
     fixed = {case: is_fixed(case, spread_m, changes) for case in cases}
     return [(case, seed) for seed in seeds for case in cases if seed == seeds[0] or not fixed[case]]
 

@@ -92,7 +92,7 @@ def trials(
         list[str] | None,
         typer.Option(help="on, off: joints yield to current; may be given again"),
     ] = None,
-    seconds: Annotated[float, typer.Option(min=5.0, help="of a gait")] = 20.0,
+    seconds: Annotated[float | None, typer.Option(min=5.0, help="of a gait; default: 20")] = None,
     world: Annotated[
         list[str] | None,
         typer.Option(
@@ -130,9 +130,7 @@ def trials(
     motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
     overs = [study.parse_over(text) for text in over or ()]
     keys, axes = [key for key, _ in overs], [values for _, values in overs]
-    for place, key in enumerate(keys):
-        if key in keys[:place]:
-            raise InputError(f"--over {key}: given twice; put its values in one: {key}=V1,V2")
+    _check_keys(keys)
     for word in compliance or ():
         if word not in {"on", "off"}:
             raise InputError(f"--compliance {word}: expected on or off")
@@ -148,6 +146,10 @@ def trials(
         for values in product(*axes)
     ]
     cases = list(dict.fromkeys(cases))  # what is given twice is run once
+    if track is not None and all(case.motion in {"gait", "serpenoid"} for case in cases):
+        raise InputError(f"--track {track}: is of walks, and none is tried")
+    if seconds is not None and not any(case.is_gait for case in cases):
+        raise InputError(f"--seconds {seconds:g}: is of gaits; a run has run.time_limit_s (--over)")
     changes = {"track": track, "seconds": seconds}
     seen = range(first_seed, first_seed + seeds)
     planned = study.plan_trials(cases, seen, start_spread, changes)  # refuses bad input first
@@ -180,6 +182,18 @@ def trials(
         _print(rows, [key for key, values in overs if len(values) > 1])
     if all(trial.cause == "refused" for trial in found):
         raise InputError(f"no run was possible: {study.reasons(found)}")
+
+
+def _check_keys(keys: list[str]) -> None:
+    """Refuse a key that stands twice: its last value would replace the others.
+
+    Raises:
+        InputError: one does.
+
+    """
+    for place, key in enumerate(keys):
+        if key in keys[:place]:
+            raise InputError(f"--over {key}: given twice; put its values in one: {key}=V1,V2")
 
 
 def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
