@@ -170,7 +170,7 @@ def _in_one_line(error: Any) -> None:
         return
     context = getattr(error, "ctx", None)
     path = "snakewalk" if context is None else context.command_path
-    text = " ".join(error.format_message().split())
+    text = " ".join(error.format_message().split()).replace(": Value error, ", ": ")  # pydantic's
     print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)
 
 
@@ -204,6 +204,8 @@ def _with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
             ("log_file", LogFile, None),
         )
     ]
+    paragraphs = (inspect.getdoc(function) or "").split("\n\n")
+    command.__doc__ = "\n\n".join(" ".join(each.split()) for each in paragraphs)
     command.__annotations__ = function.__annotations__ | {one.name: one.annotation for one in own}
     command.__signature__ = signature.replace(  # type: ignore[attr-defined]
         parameters=[*signature.parameters.values(), *own]

@@ -37,7 +37,7 @@ RunName = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 Seed = Annotated[int | None, typer.Option(help="of every random choice")]
-FirstSeed = Annotated[int, typer.Option(min=0, max=2**62, help="the others follow it")]
+FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="the others follow it")]
 Motion = Annotated[
     str | None,
     typer.Option(
@@ -47,21 +47,21 @@ Motion = Annotated[
 Port = Annotated[
     str | None,
     typer.Option(
-        help="serial port, or a URL such as socket://host:5000; default: the only USB adapter "
+        help="serial port, or a URL such as socket://pi:5000; default: the only USB adapter "
         "there is"
     ),
 ]
 ChainPort = Annotated[
     str | None,
     typer.Option(
-        help="serial port, or a URL such as socket://host:5000; 1-8=PORT,9-16=PORT where segments "
+        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
         "of the chain have ports of their own; default: the only USB adapter there is"
     ),
 ]
 RunPort = Annotated[
     str | None,
     typer.Option(
-        help="serial port, or a URL such as socket://host:5000; 1-8=PORT,9-16=PORT where segments "
+        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
         "of the chain have ports of their own (sim: simulated servos beside real ones), or robot, "
         "whose file says which; without it, the simulator"
     ),
@@ -145,7 +145,7 @@ Set = Annotated[
     typer.Option(
         "--set",
         help="replace a value of the run's, robot's or world's file, e.g. "
-        "world.ground.slope_deg=10; may be given again",
+        "run.cycle_hz=25; may be given again",
         metavar="KEY=VALUE",
         autocompletion=completion.keys,
     ),

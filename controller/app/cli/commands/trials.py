@@ -84,7 +84,7 @@ def trials(
         list[str] | None,
         typer.Option(
             help="values that a key of the run, robot or world takes, e.g. "
-            "world.ground.slope_deg=5,10,15; given again: every combination",
+            "run.cycle_hz=25,50; given again: every combination",
             metavar="KEY=V1,V2",
         ),
     ] = None,
