@@ -22,10 +22,10 @@ class ProgressBar:
         self, description: str, total: float | None = None, *, transient: bool = False
     ) -> None:
         self._progress = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),  # a file may be named [red]
             BarColumn(),
             TaskProgressColumn(),
-            TextColumn("{task.fields[note]}"),
+            TextColumn("{task.fields[note]}", markup=False),
             TimeElapsedColumn(),
             console=stderr_console(),
             transient=transient,

@@ -27,7 +27,12 @@ if TYPE_CHECKING:
 
 _WIDE: Final = 200
 """Columns of a pipe or a file, which break no line."""
-console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else _WIDE)
+console = Console(
+    highlight=False,
+    markup=False,
+    emoji=False,  # er:100:9 is a graph
+    width=None if sys.stdout.isatty() else _WIDE,
+)
 DEFAULT_RUN = "jacksboro-traverse"
 RunName = Annotated[
     str,

@@ -24,6 +24,14 @@ def test_a_table_speaks_no_python(capsys: pytest.CaptureFixture[str]) -> None:
     ]  # fmt: skip
 
 
+def test_a_table_shows_names_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    """``:100:`` is no picture, and ``[red]`` no colour."""
+    show({"graph": "er:100:9", "file": "[red].csv"}, False)
+    shown = capsys.readouterr().out
+    assert "er:100:9" in shown
+    assert "[red].csv" in shown
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
