@@ -195,6 +195,10 @@ def table_models(annotation: Any) -> list[type[BaseModel]]:
 
 
 def _kind(annotation: Any) -> str:
+    if get_origin(annotation) is Annotated:
+        inner, *rules = get_args(annotation)
+        bounds = [_bounds(rule).removeprefix(", ") for rule in rules if isinstance(rule, FieldInfo)]
+        return _kind(inner) + "".join(f" ({told})" for told in bounds if told)
     if get_origin(annotation) is Literal:
         return " or ".join(f"`{value}`" for value in get_args(annotation))
     if get_origin(annotation) in {Union, UnionType}:

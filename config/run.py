@@ -31,7 +31,7 @@ register over 128, an error is counted in 4096ths of a turn (e-manual, X series)
 
 
 Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
-"""Of a waypoint, m."""
+"""Of a waypoint or of the start, m."""
 
 
 class StatesConfig(Strict):
@@ -224,7 +224,7 @@ class RunConfig(Strict):
         description="in order; playback and source need none; with them a gait of legs is steered "
         "along its path",
     )
-    start_m: tuple[float, float] = Field((0.0, 0.0), description="where the head starts")
+    start_m: tuple[Place, Place] = Field((0.0, 0.0), description="where the head starts")
     start_heading_rad: float | None = Field(None, description="default: towards the path")
     waypoint_radius_m: float = Field(0.3, gt=0.0)
     seed: int = Field(0, ge=0, lt=2**63)

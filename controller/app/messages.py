@@ -53,7 +53,7 @@ def stderr_console() -> "Console":
     from rich.console import Console  # noqa: PLC0415  a program starts without it
 
     screens = [one for one in LOGGER.handlers if isinstance(one, _Screen)]
-    return Console(stderr=True, quiet=any(one.level > logging.INFO for one in screens))
+    return Console(stderr=True, emoji=False, quiet=any(one.level > logging.INFO for one in screens))
 
 
 @contextmanager

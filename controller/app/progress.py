@@ -22,10 +22,10 @@ class ProgressBar:
         self, description: str, total: float | None = None, *, transient: bool = False
     ) -> None:
         self._progress = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),  # a file may be named [red]
             BarColumn(),
             TaskProgressColumn(),
-            TextColumn("{task.fields[note]}"),
+            TextColumn("{task.fields[note]}", markup=False),
             TimeElapsedColumn(),
             console=stderr_console(),
             transient=transient,
@@ -157,6 +157,7 @@ def show_progress(
 ) -> Iterator[T]:
     """Yield items under a bar that counts them; ``done`` of ``total`` were done before."""
     with ProgressBar(description, total, transient=transient) as bar:
+        bar.update(done)
         for number, item in enumerate(items, start=done + 1):
             yield item
             bar.update(number)

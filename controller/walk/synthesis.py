@@ -328,7 +328,8 @@ class Targets:
         length_m = float(np.hypot(*np.diff(points_m, axis=0).T).sum())
         s_m = self._along_m(head)
         waypoint = self._at + int(np.argmax(self.required[self._at :]))
-        if s_m > self._marks_m[waypoint] + length_m and self._replan is not None:
+        passed = s_m > self._marks_m[waypoint] + length_m and self.index < self.count
+        if passed and self._replan is not None:
             self.missed += 1
             left = self._waypoints_m[int(self.required[: self.index].sum()) :]
             self.points_m, self.required = self.points_m[: self.index], self.required[: self.index]

@@ -15,6 +15,12 @@ def test_the_page_says_what_the_schema_says() -> None:
     )
 
 
+def test_numbers_of_a_list_are_told_in_words() -> None:
+    row = next(line for line in reference().splitlines() if line.startswith("| `start_m` |"))
+    assert "| [number (≥ -1000, ≤ 1000), number (≥ -1000, ≤ 1000)] |" in row
+    assert "Annotated" not in reference()
+
+
 def test_every_key_of_a_run_has_its_line_or_its_table() -> None:
     text = reference()
     for name in RunConfig.model_fields:

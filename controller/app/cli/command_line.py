@@ -10,8 +10,9 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.commands.analyse import analyse
 from snakewalk.controller.app.cli.commands.bench.cable_drop import power
 from snakewalk.controller.app.cli.commands.bench.calibrate import calibrate
@@ -75,7 +76,14 @@ from snakewalk.controller.app.cli.commands.track import track
 from snakewalk.controller.app.cli.commands.trials import trials
 from snakewalk.controller.app.cli.commands.tune import tune
 from snakewalk.controller.app.cli.commands.walk import walk
-from snakewalk.controller.app.cli.options import LogFile, LogLevel, Quiet, Verbose, check_files
+from snakewalk.controller.app.cli.options import (
+    LogFile,
+    LogLevel,
+    Quiet,
+    Verbose,
+    check_files,
+    check_idle,
+)
 from snakewalk.controller.app.messages import messages
 
 _JOB, _MOTION, _RECORDINGS, _BUS = "The job", "Motion", "Recordings", "The bus"
@@ -123,6 +131,27 @@ class _Commands(TyperGroup):
             raise SystemExit(130) from None
 
 
+class _Command(TyperCommand):
+    """A command that refuses a value which would replace another one of the same option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:
+        """Read the words behind a command's name."""
+        words = list(args)
+        rest = super().parse_args(ctx, args)  # --help ends here
+        if not ctx.resilient_parsing:  # of completion
+            order: list[Any] = self.make_parser(ctx).parse_args(words)[2]
+            for option in dict.fromkeys(order):
+                if order.count(option) > 1 and _takes_one_value(option):
+                    told = f"given {order.count(option)} times, and takes one value: leave one"
+                    raise typer.BadParameter(told, ctx=ctx, param=option)
+        return rest
+
+
+def _takes_one_value(option: Any) -> bool:
+    """Whether a second value of an option replaces the first; a flag that only sets does not."""
+    return not (option.multiple or (option.is_flag and not option.secondary_opts))
+
+
 @contextmanager
 def _faults_in_one_line() -> Iterator[None]:
     """Have typer print what is wrong with a command's words in one line, in place of its box."""
@@ -141,7 +170,7 @@ def _in_one_line(error: Any) -> None:
         return
     context = getattr(error, "ctx", None)
     path = "snakewalk" if context is None else context.command_path
-    text = " ".join(error.format_message().split())
+    text = " ".join(error.format_message().split()).replace(": Value error, ", ": ")  # pydantic's
     print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)
 
 
@@ -151,11 +180,15 @@ def _with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
     Faults in these files are told before anything heavy is imported.
     """
     signature = inspect.signature(function, eval_str=True)
+    defaults = {name: one.default for name, one in signature.parameters.items()}
 
     @wraps(function)
     def command(
         *, verbose: Verbose, quiet: Quiet, log_level: LogLevel, log_file: LogFile, **options: Any
     ) -> Any:
+        if (log_level is not None) + verbose + quiet > 1:
+            raise InputError("--verbose, --quiet and --log-level say the same thing: leave one")
+        check_idle(options, defaults)
         level = log_level or ("debug" if verbose else "warning" if quiet else "info")
         with messages(level, log_file):
             named = {key: value for key, value in options.items() if isinstance(value, str)}
@@ -171,6 +204,8 @@ def _with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
             ("log_file", LogFile, None),
         )
     ]
+    paragraphs = (inspect.getdoc(function) or "").split("\n\n")
+    command.__doc__ = "\n\n".join(" ".join(each.split()) for each in paragraphs)
     command.__annotations__ = function.__annotations__ | {one.name: one.annotation for one in own}
     command.__signature__ = signature.replace(  # type: ignore[attr-defined]
         parameters=[*signature.parameters.values(), *own]
@@ -204,7 +239,7 @@ class _App(typer.Typer):
 def _whole(name: str, function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """Build a command with its options."""
     alone = typer.Typer(add_completion=False, rich_markup_mode="rich")
-    alone.command(name, **options)(_with_messages(function))
+    alone.command(name, cls=_Command, **options)(_with_messages(function))
     return typer.main.get_command(alone)
 
 

@@ -27,7 +27,12 @@ if TYPE_CHECKING:
 
 _WIDE: Final = 200
 """Columns of a pipe or a file, which break no line."""
-console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else _WIDE)
+console = Console(
+    highlight=False,
+    markup=False,
+    emoji=False,  # er:100:9 is a graph
+    width=None if sys.stdout.isatty() else _WIDE,
+)
 DEFAULT_RUN = "jacksboro-traverse"
 RunName = Annotated[
     str,
@@ -37,7 +42,7 @@ RunName = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 Seed = Annotated[int | None, typer.Option(help="of every random choice")]
-FirstSeed = Annotated[int, typer.Option(min=0, max=2**62, help="the others follow it")]
+FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="the others follow it")]
 Motion = Annotated[
     str | None,
     typer.Option(
@@ -47,21 +52,21 @@ Motion = Annotated[
 Port = Annotated[
     str | None,
     typer.Option(
-        help="serial port, or a URL such as socket://host:5000; default: the only USB adapter "
+        help="serial port, or a URL such as socket://pi:5000; default: the only USB adapter "
         "there is"
     ),
 ]
 ChainPort = Annotated[
     str | None,
     typer.Option(
-        help="serial port, or a URL such as socket://host:5000; 1-8=PORT,9-16=PORT where segments "
+        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
         "of the chain have ports of their own; default: the only USB adapter there is"
     ),
 ]
 RunPort = Annotated[
     str | None,
     typer.Option(
-        help="serial port, or a URL such as socket://host:5000; 1-8=PORT,9-16=PORT where segments "
+        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
         "of the chain have ports of their own (sim: simulated servos beside real ones), or robot, "
         "whose file says which; without it, the simulator"
     ),
@@ -145,7 +150,7 @@ Set = Annotated[
     typer.Option(
         "--set",
         help="replace a value of the run's, robot's or world's file, e.g. "
-        "world.ground.slope_deg=10; may be given again",
+        "run.cycle_hz=25; may be given again",
         metavar="KEY=VALUE",
         autocompletion=completion.keys,
     ),
@@ -196,11 +201,32 @@ def check_files(run: str | None, robot: str | None, world: str | None) -> None:
         load_world(world, beside)
 
 
-def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") -> dict[str, Any]:
-    """Read an option's KEY=VALUE pairs, the last of a key; a value is JSON, or else text.
+def check_idle(options: Mapping[str, object], defaults: Mapping[str, object]) -> None:
+    """Refuse options of a command that another one, or its absence, makes idle.
 
     Raises:
-        InputError: there is no key, or no value.
+        InputError: one line for each.
+
+    """
+    given = {name for name, value in options.items() if value != defaults.get(name)}
+    faults = []
+    if options.get("view") is False and "view_at" in given:
+        faults.append("--view-at: is of the page: add --view")
+    if options.get("film") is False and "film" in given:
+        faults += [
+            f"--{name}: is of the film, which --no-film leaves out"
+            for name in ("look", "fine")
+            if name in given
+        ]
+    if faults:
+        raise InputError(faults)
+
+
+def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") -> dict[str, Any]:
+    """Read an option's KEY=VALUE pairs; a value is JSON, or else text.
+
+    Raises:
+        InputError: there is no key, or no value, or a key stands twice.
 
     """
     values: dict[str, Any] = {}
@@ -208,6 +234,8 @@ def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") ->
         key, equals, value = (part.strip() for part in text.partition("="))
         if not (key and equals and value):
             raise InputError(f"{option} {text}: expected {form}")
+        if key in values:
+            raise InputError(f"{option} {text}: {key} has a value already: leave one")
         try:
             values[key] = parse_json(value)
         except ValueError:  # no JSON; too long a number; too deep a list

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 from snakewalk.config.synthesis import Along, Curve, SynthesisConfig, along_body, curve_at
 from snakewalk.controller.app.runs.walk_run import POINTS, WalkRun
 from snakewalk.controller.capture.mesh.bone_motion import BoneMotion, from_points
@@ -32,6 +33,8 @@ from snakewalk.controller.walk.synthesis import (
 )
 from snakewalk.controller.walk.tongue import HeightChain, Tongue, flicks
 
+FRAMES_MAX = 300_000
+"""That a motion may have room for: 240 s at 1000 Hz are fewer (ours)."""
 _ANIMAL = ("turn", "self-contact")
 """Tests of a shape that no robot needs to make."""
 
@@ -186,8 +189,18 @@ class SnakeSynthesis:
         return GroundStep(self.prepared.ground)
 
     def synthesise(self, frames: int | None = None) -> SynthesisedWalk:
-        """Synthesise a motion until the last target, or exactly so many frames."""
+        """Synthesise a motion until the last target, or exactly so many frames.
+
+        Raises:
+            InputError: the run's time limit leaves room for more than ``FRAMES_MAX``.
+
+        """
         run, how, robot = self.run, self.how, self.prepared.robot
+        if frames is None and run.time_limit_s * how.rate_hz > FRAMES_MAX:
+            raise InputError(
+                f"run {run.name}: time_limit_s: {run.time_limit_s:g} s at {how.rate_hz:g} Hz are "
+                f"over {FRAMES_MAX} frames, the most of a motion; shorten it"
+            )
         most = round(run.time_limit_s * how.rate_hz) if frames is None else frames
         targets = Targets(
             self.path,

@@ -145,7 +145,7 @@ def plan_sweep(
     seconds: float,
     keys: Mapping[str, Any] | None = None,
 ) -> Planned:
-    """Draw the points; ``keys`` as of ``prepare_gait``.
+    """Draw the points, once where a name stands twice; ``keys`` as of ``prepare_gait``.
 
     Raises:
         InputError: unknown gaits, robots or keys, or nothing that fits.
@@ -159,11 +159,11 @@ def plan_sweep(
         )
     bodies = [
         (with_keys_of("robot", load_robot(name), keys), robot_file(name))
-        for name in robots or ROBOTS
+        for name in dict.fromkeys(robots or ROBOTS)
     ]
     points: list[Point] = []
     left_out: list[str] = []
-    for name in gaits or GAITS:
+    for name in dict.fromkeys(gaits or GAITS):
         for body, file in bodies:
             try:
                 with_keys_of("world", load_world(GAITS[name].world), keys)

@@ -24,6 +24,7 @@ from snakewalk.controller.app.runs.factory import (
 from snakewalk.controller.app.runs.gait_run import GaitRun
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.app.studies.pool import each
+from snakewalk.controller.capture.readers.load import load_track
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
@@ -48,6 +49,7 @@ class Case:
     """Values of the run's, robot's and world's files that are replaced; ``_deg`` for ``_rad``."""
     compliance: bool | None = None
     """Whether joints yield to measured current."""
+    world: str | None = None
 
     @property
     def is_gait(self) -> bool:
@@ -134,17 +136,16 @@ def prepare_case(
 
 
 def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> WalkRun | GaitRun:
-    robot = {"robot": case.robot} if case.robot is not None else {}
-    options: dict[str, Any] = dict(changes) | robot
+    given = {"robot": case.robot, "world": case.world}
+    options: dict[str, Any] = dict(changes) | {k: v for k, v in given.items() if v is not None}
     seconds = options.pop("seconds", None)
     if not case.is_gait:
         options |= {"motion": case.motion, "seed": seed}
         return prepare_job(case.run, keys=dict(case.keys), **options)
-    world = options.get("world")
     return prepare_gait(
         case.run,
         robot=case.robot,
-        world=None if world is None else str(world),
+        world=case.world,
         seconds=float(str(seconds)) if seconds is not None else GAIT_SECONDS,
         seed=seed,
         keys=dict(case.keys),
@@ -251,9 +252,12 @@ def plan_trials(
     A case of which all seeds give the same run stands once.
 
     Raises:
-        InputError: a case cannot be prepared.
+        InputError: a case cannot be prepared, or the recording that its shapes come from not read.
 
     """
+    shaped = [case for case in cases if case.motion not in {"serpenoid", "gait"}]
+    for track in dict.fromkeys(prepare_case(case, 0, 0.0, changes).run.track for case in shaped):
+        load_track(track)
     fixed = {case: is_fixed(case, spread_m, changes) for case in cases}
     return [(case, seed) for seed in seeds for case in cases if seed == seeds[0] or not fixed[case]]
 
@@ -321,6 +325,8 @@ class CaseSummary:
     """``n of m`` runs whose body came to every waypoint, where its pose was estimated."""
     head_error_m: float | None = None
     """Of an estimated pose, mean over the runs."""
+    world: str = ""
+    """Where one was chosen."""
     rolled: int = 0
     """Runs in which the head link was over 90 degrees on its side at some time."""
 
@@ -363,6 +369,7 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
                 speed_sd_m_s=_deviation([t.speed_m_s for t in some], 4),
                 truly_complete=_truly_complete(some),
                 head_error_m=_mean([t.head_error_m for t in some], 3),
+                world=case.world or "",
                 rolled=sum(t.roll_max_deg > 90.0 for t in some),
             )
         )

@@ -45,7 +45,7 @@ class TrialsTable(CsvTable):
         """Append a finished trial."""
         case, measured = asdict(trial.case), asdict(trial)
         case["keys"] = " ".join(f"{key}={value}" for key, value in trial.case.keys)
-        case["robot"] = trial.case.robot or ""
+        case["robot"], case["world"] = trial.case.robot or "", trial.case.world or ""
         case["compliance"] = {None: "", True: "on", False: "off"}[trial.case.compliance]
         measured["start_m"] = " ".join(map(str, trial.start_m or ()))
         place = dict(zip(_PLACE, self._where(trial.case, trial.seed), strict=True))

@@ -1,8 +1,9 @@
 """viser behind a gate, and what every page has: a look, and the E-STOP always in sight."""
 
 import logging
+import socket
 from collections.abc import Callable
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from html import escape
 from io import StringIO
 
@@ -23,6 +24,11 @@ def open_page(host: str, port: int, insert: Insert | None = None) -> tuple[viser
         OSError: nothing can be served there, or not behind the gate.
 
     """
+    if not _is_here(host):  # viser would wait for ever
+        raise OSError(
+            f"{host} is no address of this machine, which has 127.0.0.1 (for itself) and 0.0.0.0 "
+            "(all of its addresses)"
+        )
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # each refusal is a trace
     gate = Gate(host, insert)
     with redirect_stdout(StringIO()):  # viser prints its address without the token
@@ -37,6 +43,19 @@ def open_page(host: str, port: int, insert: Insert | None = None) -> tuple[viser
     server.gui.set_panel_label("snakewalk")
     query = "" if gate.token is None else f"/?token={gate.token}"
     return server, f"http://{host}:{server.get_port()}{query}"
+
+
+def _is_here(host: str) -> bool:
+    """Whether this machine can serve at one of a host's addresses."""
+    try:
+        places = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    except (OSError, UnicodeError):  # no such host; a name with an empty or too long part
+        return False
+    for family, kind, number, _, place in places:
+        with suppress(OSError), socket.socket(family, kind, number) as line:
+            line.bind(place)
+            return True
+    return False
 
 
 def float_above(panel: viser.PanelHandle) -> None:

@@ -4,7 +4,7 @@ from contextlib import suppress
 
 import pytest
 
-from snakewalk.controller.app.progress import PathBar, TimeBar
+from snakewalk.controller.app.progress import PathBar, ProgressBar, TimeBar, show_progress
 from snakewalk.controller.runtime.drive import Progress
 
 
@@ -33,6 +33,19 @@ def test_the_bar_of_a_run_that_changes_its_gait_names_the_one_that_moves(
     shown = capsys.readouterr().err
     assert "wheel" in shown
     assert "rolling" not in shown
+
+
+def test_where_all_was_done_before_the_bar_is_full(capsys: pytest.CaptureFixture[str]) -> None:
+    assert list(show_progress([], "trials", 3, done=3, transient=False)) == []
+    assert "100%" in capsys.readouterr().err
+
+
+def test_a_name_is_shown_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    """Brackets and colons are no styles and no pictures."""
+    name = "a[/b]:100:[red].csv"
+    with ProgressBar(name, 1.0) as bar:
+        bar.update(1.0, note=name)
+    assert capsys.readouterr().err.count(name) == 2
 
 
 def _run(cycles: int, error: OSError | None) -> None:

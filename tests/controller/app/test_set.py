@@ -22,7 +22,7 @@ def call(*words: str) -> dict[str, object]:
     return json.loads(found.stdout)
 
 
-def test_values_are_json_or_text_and_the_last_of_a_key_counts() -> None:
+def test_values_are_json_or_text() -> None:
     given = [
         "a=1",
         "b = [[1, 0]]",
@@ -30,13 +30,12 @@ def test_values_are_json_or_text_and_the_last_of_a_key_counts() -> None:
         "d=words",
         "e=null",
         "f=x=y",
-        "a=2",
         "g=[1",
         "h=" + "9" * 5000,
     ]
     found = key_values("--set", given)
     assert found.pop("h") == "9" * 5000
-    expected = {"a": 2, "b": [[1, 0]], "c": True, "d": "words", "e": None, "f": "x=y", "g": "[1"}
+    expected = {"a": 1, "b": [[1, 0]], "c": True, "d": "words", "e": None, "f": "x=y", "g": "[1"}
     assert found == expected
 
 
@@ -44,6 +43,11 @@ def test_values_are_json_or_text_and_the_last_of_a_key_counts() -> None:
 def test_a_pair_has_a_key_and_a_value(text: str) -> None:
     with pytest.raises(InputError, match="expected KEY=VALUE"):
         key_values("--set", [text])
+
+
+def test_a_key_has_one_value() -> None:
+    with pytest.raises(InputError, match="--set b=1: b has a value already: leave one"):
+        key_values("--set", ["b=1", "a=1", "b=1"])
 
 
 def test_what_is_set_moves_the_body_stands_in_the_log_and_replays(

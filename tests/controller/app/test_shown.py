@@ -1,8 +1,11 @@
 """What commands print for a reader: no Python in it, and no line cut at 80 columns."""
 
+from collections.abc import Iterator
 from importlib.metadata import version
+from typing import Any
 
 import pytest
+import typer
 from pytest_mock import MockerFixture
 from typer.testing import CliRunner
 
@@ -19,6 +22,14 @@ def test_a_table_speaks_no_python(capsys: pytest.CaptureFixture[str]) -> None:
     assert [[one.strip() for one in line] for line in said] == [
         ["film", "-"], ["sure", "yes"], ["left", "out  -"], ["files", "a.obj, a.mtl"],
     ]  # fmt: skip
+
+
+def test_a_table_shows_names_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    """``:100:`` is no picture, and ``[red]`` no colour."""
+    show({"graph": "er:100:9", "file": "[red].csv"}, False)
+    shown = capsys.readouterr().out
+    assert "er:100:9" in shown
+    assert "[red].csv" in shown
 
 
 @pytest.mark.parametrize(
@@ -42,6 +53,7 @@ def test_wrong_input_is_said_plainly(words: list[str], said: str) -> None:
     ("words", "said"),
     [
         (["trials", "--seeds", "0"], "'--seeds'"),
+        (["list", "--log-level", "loud"], "'--log-level': 'loud' is not one of 'debug', 'info'"),
         (["run", "--bogus"], "No such option: --bogus"),
         (["gait", "show"], "Missing argument 'name'"),
         (["nosuch"], "No such command 'nosuch'"),
@@ -69,6 +81,32 @@ def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) 
         app(["--version"])
     assert end.value.code == 0
     assert capsys.readouterr().out == f"snakewalk {version('snakewalk')}\n"
+
+
+def _commands(group: Any, above: typer.Context | None, *path: str) -> Iterator[tuple[str, ...]]:
+    context = typer.Context(group, parent=above)
+    for name in group.list_commands(context):
+        found = group.get_command(context, name)
+        if hasattr(found, "list_commands"):
+            yield from _commands(found, context, *path, name)
+        else:
+            yield (*path, name)
+
+
+def test_help_at_80_columns_loses_no_letter_and_breaks_no_sentence(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, value in {"COLUMNS": "80", "TERM": "dumb", "NO_COLOR": "1"}.items():
+        monkeypatch.setenv(name, value)
+    commands = list(_commands(typer.main.get_command(app), None))
+    assert len(commands) > 50
+    shown = {}
+    for words in commands:
+        app([*words, "--help"], prog_name="snakewalk", standalone_mode=False)
+        shown[words] = capsys.readouterr().out
+    assert [words for words, text in shown.items() if "\N{HORIZONTAL ELLIPSIS}" in text] == []
+    assert [words for words, text in shown.items() if max(map(len, text.splitlines())) > 80] == []
+    assert "no chances. A run is the same for the same files" in shown[("trials",)]
 
 
 @pytest.mark.parametrize("columns", [80, 120])

@@ -250,6 +250,19 @@ def test_a_waypoint_passed_by_is_planned_to_again() -> None:
     assert abs(targets.aim_rad(body_at(2.7, 0.6), 0.5)) > np.pi / 2  # back
 
 
+def test_where_all_is_reached_no_path_is_planned_again() -> None:
+    def replan(points: np.ndarray, heading: float) -> SplinePath:
+        return SplinePath(points)  # of the head alone there is none
+
+    targets = Targets(SplinePath([(0, 0), (2, 0)]), np.array([[2.0, 0.0]]), 0.3, 0.5, 0.6, replan)
+    for x in (0.5, 1.0, 1.5, 2.0):
+        targets.observe(body_at(x, 0.0))
+    assert targets.index == targets.count
+    for x in (1.0, 2.0, 3.0):
+        assert targets.aim_rad(body_at(x, 0.0), 0.0) == pytest.approx(0.0, abs=1e-6)  # straight on
+    assert targets.missed == 0
+
+
 # -- the printed text ------------------------------------------------------------------------------
 
 

@@ -139,10 +139,14 @@ def synthesise(
             help="control point X,Y or X,Y,Z from the start, x along the head; give several"
         ),
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, help="at least so long, at random")] = 20.0,
+    seconds: Annotated[
+        float, typer.Option(min=0.1, max=3600.0, help="at least so long, at random")
+    ] = 20.0,
     seed: Annotated[int, typer.Option(min=0, help="of the random order")] = 0,
     radius: Annotated[float, typer.Option(min=0.01, help="of a control point, body lengths")] = 0.5,
-    limit: Annotated[float, typer.Option(min=1.0, help="seconds for all control points")] = 120.0,
+    limit: Annotated[
+        float, typer.Option(min=1.0, max=3600.0, help="seconds for all control points")
+    ] = 120.0,
     mirror: Annotated[
         bool, typer.Option("--mirror", help="use every segment mirrored too")
     ] = False,

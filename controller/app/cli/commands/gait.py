@@ -120,4 +120,4 @@ def parameters(given: list[str] | None) -> dict[str, Any]:
 
 
 def _needs(gait: "type[Gait]") -> list[str]:
-    return [name for name in ("yaw", "pitch", "wheels") if getattr(gait.needs, name)]
+    return [name for name in ("yaw", "pitch", "legs", "wheels") if getattr(gait.needs, name)]

@@ -52,7 +52,7 @@ def run_gait(
     set_: Set = None,
     then: Annotated[
         list[str] | None,
-        typer.Option(help="NAME@SECONDS [,PARAM=VALUE...]: change gait; may be given again"),
+        typer.Option(help="NAME@S[,PARAM=V]: change gait after S seconds; may be given again"),
     ] = None,
     by: Annotated[
         str,
@@ -84,7 +84,7 @@ def run_gait(
     film: Film = True,
     out: RunFolder = None,
     force: Force = False,
-    seed: Annotated[int, typer.Option(min=0, help="of every random choice")] = 0,
+    seed: Annotated[int, typer.Option(help="of every random choice")] = 0,
     as_json: Json = False,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""

@@ -40,7 +40,10 @@ def plan(
     repertoire: Annotated[
         Path | None, typer.Option(help="file of actions; default: repertoire-ROBOT-WORLD.npz")
     ] = None,
-    beam: Annotated[int, typer.Option(min=1, max=100_000, help="sequences kept a round")] = 400,
+    beam: Annotated[
+        int | None,
+        typer.Option(min=1, max=100_000, help="sequences kept a round; default: 400"),
+    ] = None,
     physics: Annotated[
         int, typer.Option(min=0, help="candidates to run on the physics, for the ratio")
     ] = 0,
@@ -58,12 +61,14 @@ def plan(
         if motion is not None or track is not None or seed is not None or set_:
             raise InputError("--with repertoire: takes no --motion, --track, --seed or --set")
         _plan_with_repertoire(
-            run, repertoire=repertoire, robot=robot, world=world, beam=beam, physics=physics,
+            run, repertoire=repertoire, robot=robot, world=world, beam=beam or 400, physics=physics,
             out=out, carry=carry, force=force, as_json=as_json,
         )  # fmt: skip
         return
-    if repertoire is not None or out is not None or carry or physics:
-        raise InputError("--repertoire, --out, --run and --physics belong to --with repertoire")
+    if repertoire is not None or beam is not None or out is not None or carry or physics:
+        raise InputError(
+            "--repertoire, --beam, --out, --run and --physics belong to --with repertoire"
+        )
     from snakewalk.controller.app.runs.factory import prepare_walk  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.terrain.summary import path_relief, path_warnings  # noqa: PLC0415
 

@@ -81,7 +81,9 @@ def run_policy(
     robot: Robot = None,
     world: World = None,
     set_: Set = None,
-    seconds: Annotated[float, typer.Option(min=1.0, help="then it comes to rest")] = 20.0,
+    seconds: Annotated[
+        float, typer.Option(min=1.0, max=3600.0, help="then it comes to rest")
+    ] = 20.0,
     port: RunPort = None,
     shadow: Shadow = False,
     view: View = False,
@@ -134,9 +136,11 @@ def learn_policy(
     out: Annotated[Path, typer.Option("--out", "-o", help="the policy (.toml)")],
     robot: GivenRobot = "yaw16",
     world: GivenWorld = "flat",
-    generations: Annotated[int, typer.Option(min=1)] = 24,
-    population: Annotated[int, typer.Option(min=4, help="candidates of a generation")] = 12,
-    steps: Annotated[int, typer.Option(min=50, help="of 20 ms, in an episode")] = 250,
+    generations: Annotated[int, typer.Option(min=1, max=100_000)] = 24,
+    population: Annotated[
+        int, typer.Option(min=4, max=10_000, help="candidates of a generation")
+    ] = 12,
+    steps: Annotated[int, typer.Option(min=50, max=100_000, help="of 20 ms, in an episode")] = 250,
     seed: Annotated[int, typer.Option(min=0, help="of candidates and starts")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
     force: Force = False,
@@ -182,7 +186,7 @@ def policy_trials(
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a row")] = 10,
     first_seed: FirstSeed = 0,
-    seconds: Annotated[float, typer.Option(min=5.0, help="of each run")] = 12.0,
+    seconds: Annotated[float, typer.Option(min=5.0, max=3600.0, help="of each run")] = 12.0,
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
     as_json: Json = False,
 ) -> None:
@@ -193,6 +197,7 @@ def policy_trials(
     from snakewalk.controller.app.studies import policy_trials as study  # noqa: PLC0415
 
     rows = [(motion, ground) for ground in world or ["flat"] for motion in motions]
+    rows = list(dict.fromkeys(rows))  # what is given twice is run once
     planned = [
         study.PolicyTrial(motion, ground, seed, seconds)
         for motion, ground in rows

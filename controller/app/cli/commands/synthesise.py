@@ -58,7 +58,8 @@ def synthesise(
     ] = None,
     set_: Set = None,
     frames: Annotated[
-        int | None, typer.Option(min=2, help="exactly so many; default: to the last waypoint")
+        int | None,
+        typer.Option(min=2, max=100_000, help="exactly so many; default: to the last waypoint"),
     ] = None,
     film: Annotated[bool, typer.Option("--film", help="NAME.mp4: the skin on the ground")] = False,
     glb: Annotated[bool, typer.Option("--glb", help="NAME.glb: the skin as animated glTF")] = False,

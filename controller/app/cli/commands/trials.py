@@ -1,4 +1,4 @@
-"""``snakewalk trials``: runs over seeds, motions, robots and steepnesses."""
+"""``snakewalk trials``: runs over seeds, motions, robots, worlds and steepnesses."""
 
 import json
 from contextlib import nullcontext
@@ -19,7 +19,6 @@ from snakewalk.controller.app.cli.options import (
     Force,
     Json,
     TrackFile,
-    World,
     console,
 )
 from snakewalk.controller.app.messages import LOGGER
@@ -28,6 +27,7 @@ from snakewalk.controller.app.result_files import check_picture, refuse_to_overw
 _HEADS = {
     "run": "run",
     "robot": "robot",
+    "world": "world",
     "motion": "motion",
     "compliance": "com-\npliance",
     "relief": "relief",
@@ -49,7 +49,7 @@ _HEADS = {
     "why": "why",
 }
 """Columns of the table: the units stand under the names, so that the table stays narrow."""
-_TEXT = {"run", "robot", "motion", "compliance", "why"}
+_TEXT = {"run", "robot", "world", "motion", "compliance", "why"}
 
 
 def trials(
@@ -84,7 +84,7 @@ def trials(
         list[str] | None,
         typer.Option(
             help="values that a key of the run, robot or world takes, e.g. "
-            "world.ground.slope_deg=5,10,15; given again: every combination",
+            "run.cycle_hz=25,50; given again: every combination",
             metavar="KEY=V1,V2",
         ),
     ] = None,
@@ -92,8 +92,13 @@ def trials(
         list[str] | None,
         typer.Option(help="on, off: joints yield to current; may be given again"),
     ] = None,
-    seconds: Annotated[float, typer.Option(min=5.0, help="of a gait")] = 20.0,
-    world: World = None,
+    seconds: Annotated[float | None, typer.Option(min=5.0, help="of a gait; default: 20")] = None,
+    world: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="may be given again; default: the run's", autocompletion=completion.WORLDS
+        ),
+    ] = None,
     track: TrackFile = None,
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
     out: Annotated[
@@ -125,20 +130,27 @@ def trials(
     motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
     overs = [study.parse_over(text) for text in over or ()]
     keys, axes = [key for key, _ in overs], [values for _, values in overs]
+    _check_keys(keys)
     for word in compliance or ():
         if word not in {"on", "off"}:
             raise InputError(f"--compliance {word}: expected on or off")
     moved_by = {run: ["gait"] if moves_by_gait(run) else motions for run in runs or [DEFAULT_RUN]}
     cases = [
-        study.Case(run, m, r, k, tuple(zip(keys, values, strict=True)), c)
+        study.Case(run, m, r, k, tuple(zip(keys, values, strict=True)), c, w)
         for run in runs or [DEFAULT_RUN]
         for r in (robot if robot else (None,))
+        for w in (world if world else (None,))
         for k in (relief if relief else (1.0,))
         for m in moved_by[run]
         for c in ([word == "on" for word in compliance] if compliance else (None,))
         for values in product(*axes)
     ]
-    changes = {"world": world, "track": track, "seconds": seconds}
+    cases = list(dict.fromkeys(cases))  # what is given twice is run once
+    if track is not None and all(case.motion in {"gait", "serpenoid"} for case in cases):
+        raise InputError(f"--track {track}: is of walks, and none is tried")
+    if seconds is not None and not any(case.is_gait for case in cases):
+        raise InputError(f"--seconds {seconds:g}: is of gaits; a run has run.time_limit_s (--over)")
+    changes = {"track": track, "seconds": seconds}
     seen = range(first_seed, first_seed + seeds)
     planned = study.plan_trials(cases, seen, start_spread, changes)  # refuses bad input first
     table = None
@@ -170,6 +182,18 @@ def trials(
         _print(rows, [key for key, values in overs if len(values) > 1])
     if all(trial.cause == "refused" for trial in found):
         raise InputError(f"no run was possible: {study.reasons(found)}")
+
+
+def _check_keys(keys: list[str]) -> None:
+    """Refuse a key that stands twice: its last value would replace the others.
+
+    Raises:
+        InputError: one does.
+
+    """
+    for place, key in enumerate(keys):
+        if key in keys[:place]:
+            raise InputError(f"--over {key}: given twice; put its values in one: {key}=V1,V2")
 
 
 def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:

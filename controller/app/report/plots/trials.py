@@ -23,7 +23,7 @@ _CAUSES = 3
 def draw_trials(rows: Sequence[CaseSummary], path: Path) -> None:
     """Draw a map over the first two of what differs between the cases; a panel for all the rest.
 
-    Keys come first, then relief, robot, motion and run.
+    Keys come first, then relief, world, robot, motion and run.
     """
     cells = [_place(row) for row in rows]
     names = [name for name in cells[0] if len({cell[name] for cell in cells}) > 1]
@@ -65,8 +65,8 @@ def draw_trials(rows: Sequence[CaseSummary], path: Path) -> None:
 
 def _place(row: CaseSummary) -> dict[str, str]:
     keys = {key: str(value) for key, value in row.keys.items()}
-    own = {"relief": f"{row.relief:g}", "robot": row.robot, "motion": row.motion, "run": row.run}
-    return keys | own
+    own = {"relief": f"{row.relief:g}", "world": row.world, "robot": row.robot}
+    return keys | own | {"motion": row.motion, "run": row.run}
 
 
 def _label(names: list[str]) -> str:

@@ -47,6 +47,12 @@ def test_a_cell_a_case(monkeypatch: pytest.MonkeyPatch) -> None:
     assert worst.get_xy() == pytest.approx((1.52, 0.52))  # the last slope and friction
 
 
+def test_worlds_are_an_axis(monkeypatch: pytest.MonkeyPatch) -> None:
+    cases = [Case("flat-square", "walk", world=world) for world in ("flat", "ramp-10")]
+    (axes,) = figure_of(monkeypatch, cases, []).axes
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["flat", "ramp-10"]
+
+
 @pytest.mark.parametrize("relief", [(1.0,), (1.0, 2.0)])
 def test_one_axis_or_none_is_drawn_as_well(
     monkeypatch: pytest.MonkeyPatch, relief: tuple[float, ...]

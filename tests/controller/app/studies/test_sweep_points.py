@@ -49,6 +49,11 @@ def test_replaced_values_go_with_each_point_into_its_run() -> None:
         plan_sweep(None, None, 1, seed=0, seconds=4.0, keys={"run.gait.name": "rolling"})
 
 
+def test_what_is_named_twice_is_drawn_once() -> None:
+    twice = plan_sweep(["rolling"] * 2, ["alternating16"] * 2, 2, seed=0, seconds=4.0)
+    assert len(twice.points) == 2
+
+
 def test_a_robot_of_ones_own_is_loaded_again_in_another_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -144,6 +144,37 @@ def test_keys_replace_values_of_the_three_files() -> None:
     assert found.world.friction.across == plain.world.friction.across
 
 
+def test_each_world_is_a_row(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    work_in_this_process(monkeypatch)
+    run, out = tmp_path / "near.toml", tmp_path / "t.csv"
+    run.write_text('name = "near"\nwaypoints_m = [[0.4, 0.0]]\ntime_limit_s = 0.2\n')
+    worlds = ["flat-friction-3", "flat", "flat-friction-3"]  # what is given twice is run once
+    command(
+        [str(run), "rolling"], world=worlds, seeds=1, motion=["serpenoid"], seconds=5.0,
+        workers=1, out=out, as_json=True,
+    )  # fmt: skip
+    found = json.loads(capsys.readouterr().out)
+    assert [(row["run"], row["world"], row["runs"]) for row in found["table"]] == [
+        (name, world, 1) for name in (str(run), "rolling") for world in worlds[:2]
+    ]
+    slick, usual = (trial["speed_m_s"] for trial in found["trials"][2:])
+    assert slick != usual
+    assert [line.split(",")[6] for line in out.read_text().splitlines()] == [
+        "world",
+        *worlds[:2] * 2,
+    ]
+
+
+def test_the_world_of_a_case_is_that_of_its_run() -> None:
+    for run, motion in (("flat-slalom", "walk"), ("rolling", "gait")):
+        cases = [Case(run, motion, world=world) for world in ("flat-friction-3", None)]
+        found = [prepare_case(case, 3, 0.0, {}).world.name for case in cases]
+        assert found[0] == "flat-friction-3" != found[1]
+
+
 def test_keys_replace_values_of_a_gait_s_files() -> None:
     """The digest tells the rows of a kept table apart."""
     cases = [Case("rolling", "gait", keys=(("world.friction.across", v),)) for v in (0.3, 0.6)]

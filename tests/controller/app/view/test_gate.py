@@ -57,6 +57,12 @@ def served() -> Iterator[tuple[int, str]]:
     server.stop()
 
 
+@pytest.mark.parametrize("host", ["192.0.2.1", "[::1", 70 * "x", "a..b"])
+def test_a_host_that_is_not_here_is_refused(host: str) -> None:
+    with pytest.raises(OSError, match="is no address of this machine, which has"):
+        open_page(host, 0)
+
+
 @pytest.mark.parametrize("path", ["/", "/index.html"])
 def test_the_server_has_the_gate_in_front_of_files_and_sockets(
     served: tuple[int, str], path: str

@@ -7,9 +7,11 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.app.cli.options import Json, console
+from snakewalk.controller.app.cli.options import Force, Json, console
 from snakewalk.controller.app.messages import LOGGER
+from snakewalk.controller.app.result_files import refuse_to_overwrite
 
 
 def replay(
@@ -21,9 +23,14 @@ def replay(
         float, typer.Option(min=0.0, help="of the head, where its pose was measured")
     ] = 0.002,
     out: Annotated[Path | None, typer.Option(help="keep the replay's log here")] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Send a log's commands to simulated servos again; exit code 1 where the answers differ."""
+    if out is not None and out.resolve() == log.resolve():
+        raise InputError(f"{out}: is the log itself; give another name")
+    refuse_to_overwrite([out], force)
+
     from snakewalk.controller.app.progress import ProgressBar  # noqa: PLC0415
     from snakewalk.controller.app.studies import replay as replaying  # noqa: PLC0415  heavy
     from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
