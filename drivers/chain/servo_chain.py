@@ -317,7 +317,10 @@ class ServoChain:
                 text += "; on the other ports torque is off"
             raise PortError(f"{text}; {names}: not confirmed" if names else text) from faults[0]
         if names:
-            raise BusError(f"{names}: torque off is not confirmed")
+            raise BusError(
+                f"{names}: torque off is not confirmed; if a joint still holds, switch the servo "
+                "power off"
+            )
 
     def _joints_on(self, part: DynamixelBus) -> list[int]:
         """Joints whose servos are on one of the ports."""
