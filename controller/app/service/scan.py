@@ -26,8 +26,8 @@ _NAMED = 3
 _MOST = 12
 """Broadcast pings at one rate, at most (ours)."""
 _AGAIN = 2
-"""How often silent rates that are likely, or noisy, are asked again on a bad line, or where nobody
-has answered at any rate (ours)."""
+"""How often silent rates that are likely are asked again on a bad line, or where nobody answers;
+the noisy ones where nobody answers (ours)."""
 _TRIES = 6
 """Of a ping or a read on a bad line (ours)."""
 
@@ -130,9 +130,11 @@ def scan(
             if port.setBaudRate(baud):
                 replies[baud], lost = _answers(port, noise)
                 lossy |= lost
-        again = [baud for baud in asked if baud in (*_LIKELY, before, *noise)]
         bad = lossy or bool(noise)
-        for baud in again * _AGAIN if bad or not any(replies.values()) else ():
+        silent = not any(replies.values())
+        likely = {*_LIKELY, before, *(noise if silent else ())}
+        again = [baud for baud in asked if baud in likely]
+        for baud in again * _AGAIN if bad or silent else ():
             if not replies.get(baud) and port.setBaudRate(baud):
                 on_progress(f"{baud} baud again")
                 replies[baud], lost = _answers(port, noise)
