@@ -344,6 +344,12 @@ KINDS = [
         "fail",
     ),
     Kind(
+        "IDs exchanged since the last run",
+        lambda line: line.bank["Velocity I Gain"].put(range(4), [1, 3, 2, 4]),
+        "joint order",
+        "in the last run servo 2 was joint 3 (ID 3), servo 3 was joint 2 (ID 2)",
+    ),
+    Kind(
         "alarms that do not shut down",
         set_register("Shutdown", 0),
         "shutdown",

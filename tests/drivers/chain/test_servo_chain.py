@@ -490,3 +490,24 @@ def test_a_servo_that_falls_silent_is_no_bad_line(chain: ServoChain, line: Recor
     for _ in range(50):
         chain.read()
     assert not [event for event in events if "got lost" in event]
+
+
+def test_ids_that_are_exchanged_between_two_runs_are_told_at_the_start(
+    chain: ServoChain, line: Recorder
+) -> None:
+    chain.enable()
+    chain.disable()
+    line.bank["ID"][[1, 2]] = line.bank["ID"][[2, 1]]
+    line.refresh_ids()
+    events: list[str] = []
+    chain.on_event = events.append
+    chain.enable()
+    assert [event for event in events if "exchanged" in event] == [
+        f"joint {a} (ID {a}): its servo was joint {b} (ID {b}) in the run before: have IDs been "
+        "exchanged since?"
+        for a, b in ((2, 3), (3, 2))
+    ]
+    chain.disable()
+    events.clear()
+    chain.enable()
+    assert not [event for event in events if "exchanged" in event]
