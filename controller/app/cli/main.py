@@ -38,7 +38,8 @@ def main() -> None:
         app(prog_name="snakewalk")
     except InputError as error:
         *first, last = error.faults
-        _end(2, *first, _with_notes(last, error))
+        began = bool(getattr(error, "__notes__", []))  # of a run, whose port has vanished
+        _end(1 if began else 2, *first, _with_notes(last, error))
     except DriverError as error:
         _end(1, _with_notes(str(error), error))
     except ModuleNotFoundError as error:

@@ -18,7 +18,7 @@ from snakewalk.controller.metrics.summary import summary
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.drivers.chain.servo_chain import ServoChain
-from snakewalk.drivers.errors import BusError
+from snakewalk.drivers.errors import BusError, DriverError, PortError
 
 
 def after(cycles: int, stop: Callable[[], None]) -> Callable[[Progress], None]:
@@ -55,16 +55,18 @@ def test_an_interrupted_run_says_what_became_of_torque_and_log(
     assert summary(record).outcome == "interrupted"
 
 
+@pytest.mark.parametrize("kind", [BusError, PortError])
 def test_a_torque_off_that_is_not_confirmed_says_what_tripped_and_where_the_log_is(
+    kind: type[DriverError],
     tmp_path: Path,
     mocker: MockerFixture,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """It said neither: the reason stood in a log of which nobody was told."""
+    """It said neither; and 2, of a port that is gone, means that nothing has moved."""
     pytest.importorskip("mujoco")
     job, reasons = prepare_gait("lateral-undulation", seconds=2.0), [None] * 50
-    mocker.patch.object(ServoChain, "disable", side_effect=BusError("joint 3 is not confirmed"))
+    mocker.patch.object(ServoChain, "disable", side_effect=kind("joint 3 is not confirmed"))
 
     def run_into_a_trip() -> None:
         execute(job, tmp_path, stop_requested=lambda: reasons.pop() if reasons else "a hand")
