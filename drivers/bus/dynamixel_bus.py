@@ -6,7 +6,8 @@ Defects of dynamixel-sdk 4.1.0 that are avoided here:
   status packet with an error and without data for success, and the CRC of a short packet for data.
   So registers are read and written by our own strict codec; the SDK pings and reboots only.
 - An exception in the port leaves the SDK's port busy for ever: it is freed again.
-- A broadcast ping waits 0.8 s for 252 servos: ``find`` pings the expected ones.
+- A broadcast ping waits 0.8 s for 252 servos: ``find`` pings the expected ones. The SDK's spins
+  meanwhile, and does not tell of what came damaged: ``drivers.bus.probe`` has ours.
 
 The control cycle does not go through the SDK: see ``drivers.bus.control_cycle``.
 """
@@ -20,7 +21,7 @@ import dynamixel_sdk as sdk
 from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.line_reservation import LineReservation
 from snakewalk.drivers.bus.pending_replies import PendingReplies
-from snakewalk.drivers.bus.probe import Probe, probe
+from snakewalk.drivers.bus.probe import Probe, broadcast_ping, probe
 from snakewalk.drivers.bus.register_io import check_accepted, read_register, write_register
 from snakewalk.drivers.errors import BusError, ControlTableError, NoAnswerError, ServoError
 from snakewalk.drivers.port.byte_port import BytePort, reopen
@@ -139,10 +140,14 @@ class DynamixelBus:
 
     def scan(self) -> dict[int, PingReply]:
         """All servos at the port's baud rate, by a broadcast ping; takes most of a second."""
-        replies, _ = self._guarded(lambda: self._sdk.broadcastPing(self.port))
         return {
-            servo_id: PingReply(servo_id, number, firmware, False)
-            for servo_id, (number, firmware) in sorted(replies.items())
+            reply.servo_id: PingReply(
+                reply.servo_id,
+                int.from_bytes(reply.params[:2], "little"),
+                reply.params[2],
+                bool(reply.error & ALERT),
+            )
+            for reply in broadcast_ping(self.port).replies
         }
 
     def probe(self, servo_id: int, block: tuple[str, str] | None = None) -> Probe:

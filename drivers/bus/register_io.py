@@ -119,7 +119,11 @@ def _exchange(
         missing = max(1, expected - reader.pending)  # stuffing or noise made it longer
     if copies:
         line.note_copies(answered=False)
-    raise NoAnswerError(f"servo {packet.servo_id}: {what}: no answer at {port.getBaudRate()} baud")
+    at = f"at {port.getBaudRate()} baud"
+    found = f"no answer {at}"
+    if reader.dropped_bytes or reader.pending:
+        found = f"damaged bytes {at}: noise on the line, or two servos with this ID"
+    raise NoAnswerError(f"servo {packet.servo_id}: {what}: {found}")
 
 
 def _is_other(reply: StatusPacket, data_bytes: int, pending: PendingReplies) -> bool:

@@ -1,6 +1,7 @@
 """The chain of servos as a joint link: radians to raw goals, raw blocks to a ``JointState``."""
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -44,7 +45,7 @@ SLOW_EVERY = 16
 checked as often, in other cycles."""
 _SLOW_S = 1.0
 """Age from which voltages and temperatures are read in every cycle until they come (ours)."""
-_OFF_ROUNDS = 3
+_OFF_ROUNDS = 8
 """Group reads in which the servos may confirm that their torque is off (ours)."""
 _OFF_S = 1.0
 """How long servos that do not are asked one by one, at most, s (ours)."""
@@ -52,6 +53,9 @@ _PORT_PATIENCE_S, _REOPEN_S = 2.0, 0.1
 """How long torque off waits for a port that is gone, and between the tries to open it (ours)."""
 _FIRST_READS = 5
 """Tries to get one complete reply at the start (ours)."""
+_LOSS_READS, _LOSSES = 100, 4
+"""So many losses within so many reads show a bad line (ours): a servo that falls silent, or a
+computer that stands still for a while, is one loss."""
 
 
 class ServoChain:
@@ -85,8 +89,8 @@ class ServoChain:
         self.inspection: Inspection | None = None
         """The servos as found by the last ``enable``."""
         self.on_event: Callable[[str], None] = lambda line: None
-        """Gets a line on each setting that another program has left in a servo, and when fast reads
-        are given up."""
+        """Gets a line on each setting that another program has left in a servo, when fast reads are
+        given up, and when replies get lost again and again."""
         self.on_state: Callable[[JointState], None] = lambda state: None
         """Gets each state that was read."""
         self._bus = bus
@@ -106,6 +110,7 @@ class ServoChain:
         self._prepare_reads(fast=True)
         self._imu = None if robot.imu is None else ImuReader(bus, robot.imu)
         self._reads = 0
+        self._losses = _Losses()
         self._armed = False
         self._sent_at_s = -np.inf
         self._goal_rad = np.full(robot.joint_count, np.nan)
@@ -317,7 +322,10 @@ class ServoChain:
                 text += "; on the other ports torque is off"
             raise PortError(f"{text}; {names}: not confirmed" if names else text) from faults[0]
         if names:
-            raise BusError(f"{names}: torque off is not confirmed")
+            raise BusError(
+                f"{names}: torque off is not confirmed; if a joint still holds, switch the servo "
+                "power off"
+            )
 
     def _joints_on(self, part: DynamixelBus) -> list[int]:
         """Joints whose servos are on one of the ports."""
@@ -382,6 +390,9 @@ class ServoChain:
         reply = self._cycle.read()
         if self._fast_reads and not self._cycle.fast:
             self._report_plain_reads()
+        losses = self._losses.update(whole=bool(reply.valid.all()))
+        if losses is not None:
+            self.on_event(losses)
         measured_at_s = self._take(reply)
         place = self._reads % SLOW_EVERY
         self._reads += 1
@@ -649,3 +660,29 @@ class RegisterCheck:
             if got != expected:
                 found[joint] = got
         return found
+
+
+class _Losses:
+    """Replies that are lost again and again: the line is bad, not a servo."""
+
+    def __init__(self) -> None:
+        self._began: deque[int] = deque()  # numbers of reads, each the first of a loss
+        self._reads = 0
+        self._whole, self._shown = True, False
+
+    def update(self, *, whole: bool) -> str | None:
+        """Count a read; a line for the user, the first time that there are many losses."""
+        self._reads += 1
+        if self._whole and not whole:
+            self._began.append(self._reads)
+        self._whole = whole
+        while self._began and self._began[0] <= self._reads - _LOSS_READS:
+            self._began.popleft()
+        if self._shown or len(self._began) < _LOSSES:
+            return None
+        self._shown = True
+        span = self._reads - self._began[0] + 1
+        return (
+            f"replies got lost {_LOSSES} times within {span} reads: noise, a loose plug, another "
+            "program on the line, or a computer that is too busy; see snakewalk doctor"
+        )

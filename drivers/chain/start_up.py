@@ -289,6 +289,12 @@ def _configure_joint(
         on_event(f"{name}: PWM Limit is {pwm_limit} of {PWM_FULL}: weak and slow")
     if values["Drive Mode"] & REVERSE:
         on_event(f"{name}: Drive Mode is reverse: it turns the other way round")
+    before = found.get(IDENTITY, 0)
+    if identity_fault(robot, joint, before) is not None:
+        on_event(
+            f"{name}: its servo was {robot.joint_name(before - 1)} in the run before: have IDs "
+            "been exchanged since?"
+        )
     offset = values["Homing Offset"]
     if offset:
         angle = offset * abs(units.rad_per_position[joint])

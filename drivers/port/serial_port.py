@@ -103,7 +103,10 @@ class SerialPort(LinePort):
                 remaining_s = max(0.0, deadline_s - self._clock.now_s())
                 if not self._readable.poll(remaining_s * 1e3):
                     break
-                more = os.read(fd, count - len(got))
+                try:
+                    more = os.read(fd, count - len(got))
+                except BlockingIOError:
+                    continue  # another program reads here, too, and was quicker
                 if not more:
                     raise OSError(errno.EIO, "ready to be read, but empty")
                 got += more

@@ -188,8 +188,7 @@ class Recovery(Generic[C]):
                 if joint is not None and any(f.cause is FaultCause.ALARM for f in found.faults):
                     give_up_s = -math.inf
             except PortError as error:
-                last = str(error)
-                self._try_reopen()
+                last = self._try_reopen() or str(error)
             except DriverError as error:
                 last = str(error)
             why = stopped()
@@ -198,8 +197,10 @@ class Recovery(Generic[C]):
                 return None
             self._clock.sleep_until_s(self._clock.now_s() + _RETRY_S)
 
-    def _try_reopen(self) -> None:
+    def _try_reopen(self) -> str | None:
+        """Open what is gone; why it cannot be, which ``patience_s`` waits for to change."""
         try:
             self._chain.reopen()
-        except PortError:
-            return  # not yet back; patience_s limits the wait
+        except PortError as error:
+            return str(error)
+        return None

@@ -63,6 +63,7 @@ class SafeLink:
         """Of the last command."""
         self.recoveries = 0
         """Interruptions and overloads that were recovered from."""
+        self._tripped_by: str | None = None
         self._link = link
         self._recovery = recovery
         self._limits = limits
@@ -101,6 +102,8 @@ class SafeLink:
                 self.disable()
         except DriverError as fault:
             if error is None:
+                if self._tripped_by is not None:
+                    fault.add_note(f"tripped by: {self._tripped_by}")
                 raise
             error.add_note(f"torque off failed: {fault}")
         finally:
@@ -226,7 +229,7 @@ class SafeLink:
         """
         if not operator.strip():
             raise ValueError("a reset needs the name of the operator")
-        self.tripped = None
+        self.tripped = self._tripped_by = None
         self._stop_requested = None
 
     def _overloaded(self, state: JointState, memory: SafetyMemory) -> int | None:
@@ -284,7 +287,7 @@ class SafeLink:
     def _trip(self, reason: str) -> None:
         """Latch; the first reason stays."""
         if self.tripped is None:
-            self.tripped = reason
+            self.tripped = self._tripped_by = reason
         try:
             self.disable()
         except DriverError as fault:

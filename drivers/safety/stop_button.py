@@ -94,7 +94,8 @@ class StopButton:
         trace: TracebackType | None,
     ) -> None:
         notes = getattr(error, "__notes__", [])
-        self.end("; ".join(notes) or (str(error) if error is not None else ""))
+        told = [str(error)] if isinstance(error, Exception) else []  # else a signal, or the exit
+        self.end("; ".join([*told, *notes]) or (str(error) if error is not None else ""))
 
     def pressed(self) -> str | None:
         """Why it was pressed, for ``SafeLink(stop_requested=...)``; None while it was not."""

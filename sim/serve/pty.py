@@ -172,8 +172,8 @@ class PtyServer:
         link = self._link
         if link is None:
             return
-        if link.is_symlink() and not link.exists():
-            link.unlink()  # left by a server that was killed
+        if link.is_symlink() and (not link.exists() or os.readlink(link) == self.path):
+            link.unlink()  # left by a server that was killed, whose device's name may be ours now
         try:
             link.symlink_to(self.path)
         except FileExistsError:

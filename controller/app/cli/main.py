@@ -37,9 +37,11 @@ def main() -> None:
         _tell_of_pipes()
         app(prog_name="snakewalk")
     except InputError as error:
-        _end(2, *error.faults)
+        *first, last = error.faults
+        began = bool(getattr(error, "__notes__", []))  # of a run, whose port has vanished
+        _end(1 if began else 2, *first, _with_notes(last, error))
     except DriverError as error:
-        _end(1, str(error))
+        _end(1, _with_notes(str(error), error))
     except ModuleNotFoundError as error:
         needed = missing_extra(error)
         if needed is None:
@@ -48,13 +50,13 @@ def main() -> None:
     except OSError as error:
         place = f"{Path(str(error.filename))}: " if error.filename else ""
         notes = getattr(error, "__notes__", [])  # of a run: what became of torque and log
-        _end(1 if notes else 2, "; ".join([f"{place}{error.strerror or error}", *notes]))
+        _end(1 if notes else 2, _with_notes(f"{place}{error.strerror or error}", error))
     except KeyboardInterrupt:
         _end(_INTERRUPTED, "interrupted")
     except SystemExit as stop:
         if isinstance(stop.code, int) and stop.code > _BY_SIGNAL and stop.code != _INTERRUPTED:
             name = signal.Signals(stop.code - _BY_SIGNAL).name
-            _print_line("; ".join([f"ended by {name}", *getattr(stop, "__notes__", [])]))
+            _print_line(_with_notes(f"ended by {name}", stop))
         raise
 
 
@@ -99,6 +101,11 @@ def _tell_of_pipe(event: str, details: tuple[object, ...]) -> None:
         return
     to = "reads from" if flags & os.O_WRONLY else "writes to"
     _print_line(f"{path}: a named pipe: waits for a program that {to} it; ^C ends")
+
+
+def _with_notes(text: str, error: BaseException) -> str:
+    """What ended the program, and what a run says of torque and log."""
+    return "; ".join([text, *getattr(error, "__notes__", [])])
 
 
 def _end(code: int, *lines: str) -> None:

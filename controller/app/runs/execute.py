@@ -38,6 +38,7 @@ from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
 from snakewalk.controller.walk.twin_rollout import TwinRollout, UsesTwin
 from snakewalk.drivers.clock import Clock
+from snakewalk.drivers.errors import DriverError
 from snakewalk.drivers.priority import raised_priority
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
@@ -227,9 +228,14 @@ def _may_try(prepared: PreparedRun) -> bool:
 
 @contextmanager
 def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
-    """Note what became of torque and log when a signal or a full disk ends a run."""
+    """Note what became of torque and log when a signal, a full disk or a dead port ends a run."""
     try:
         yield  # the link is closed when an error comes out of it
+    except DriverError as fault:  # says itself what it knows of torque
+        if link.tripped is not None:
+            log.event(clock.now_s(), "interrupt", str(fault), "warning")
+            fault.add_note(f"log: {log.path}; its page: snakewalk report {log.path}")
+        raise
     except (KeyboardInterrupt, SystemExit, OSError) as stop:
         failed = getattr(stop, "__notes__", [])
         torque = "torque is off" if link.was_enabled else "torque was not switched on"

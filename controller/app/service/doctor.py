@@ -14,7 +14,7 @@ from snakewalk.controller.app.service.scan import scan
 from snakewalk.controller.app.service.supply_check import supply_under_load
 from snakewalk.drivers.bus.budget import robot_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.bus.probe import overhear
+from snakewalk.drivers.bus.probe import Probe, overhear
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import FAST_READ_FIRMWARE, ServoReport, inspect
@@ -22,10 +22,12 @@ from snakewalk.drivers.errors import BusError, FaultCause, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.port.network_port import NetworkPort
 from snakewalk.drivers.port.serial_port import SerialPort
-from snakewalk.drivers.protocol.registers import ServoUnits
+from snakewalk.drivers.protocol.registers import BAUDS, ServoUnits
 
 _MEASURED = ("Realtime Tick", "Present Temperature")
 """Registers that differ between two servos, however alike they are."""
+_NOISE_TRIES = 10
+"""How often a request is made on a noisy line (ours)."""
 
 
 def examine(
@@ -54,22 +56,26 @@ def examine(
     findings = [adapter.latency_timer(latency_timer_ms, port.name)]
     on_progress("who else talks")
     port.drain_until_quiet(latency_s)  # what an earlier program has asked for
-    findings.append(line_checks.second_master(overhear(port, line_checks.OVERHEAR_S)))
-    on_progress("who answers")
+    overheard = overhear(port, line_checks.OVERHEAR_S)
+    findings.append(line_checks.second_master(overheard))
     expected, baud = robot.servo_ids, port.getBaudRate()
     imu = robot.imu
     if on_it is not None:
         expected = tuple(each for each in expected if each in on_it)
         imu = imu if imu is not None and imu.id in on_it else None
-    answering = list(bus.find(expected))
+    on_progress("who answers")
+    pinged = bus.find(expected)
     on_progress("duplicate IDs")
     pings = [bus.probe(i) for i in expected]
-    reads = [bus.probe(i, _MEASURED) for i in answering]
-    shared = [p.servo_id for p in (*pings, *reads) if p.doubled or p.damaged == p.requests]
-    found = sorted({*answering, *shared})
+    found = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
+    reads = [bus.probe(i, _MEASURED) for i in found]
+    noise = line_checks.noise(pings, reads, overheard)
+    if noise is not None:
+        bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s, tries=_NOISE_TRIES)
     missing = [i for i in expected if i not in found]
     elsewhere = _at_other_bauds(port, missing, on_progress) if missing else {}
-    findings += servos.presence(expected, found, elsewhere, baud, port.name)
+    here = servos.presence(expected, found, elsewhere, baud, port.name)
+    findings += here if noise is None else [*here, noise]
     on_progress("who else is there")
     known = (*expected, *(() if imu is None else (imu.id,)))
     findings += [f for f in [servos.unexpected_ids(known, list(bus.scan()))] if f is not None]
@@ -78,15 +84,11 @@ def examine(
     if not found:
         return findings
     if findings[1].grade != "fail":  # else their replies are taken for a second servo's
-        findings.append(servos.duplicates(pings, reads))
-    late_s = [late for probe in pings for late in probe.late_s]
-    findings += [f for f in [line_checks.response(late_s, latency_s)] if f is not None]
-    silent = [p.servo_id for p in reads if not p.answered and p.servo_id not in shared]
-    unread = [servo_id for servo_id in silent if not _replies_to_reads(bus, servo_id)]
-    findings += [f for f in [servos.silent_to_reads(unread)] if f is not None]
+        findings.append(servos.duplicates(pings, reads, noisy=noise is not None))
+    findings += line_checks.response([late for p in pings for late in p.late_s], latency_s)
     on_progress("registers")
-    readable = [i for i in answering if i not in unread and i not in shared]
-    reports = _reports(bus, robot, readable, findings) if readable else ()
+    readable = _readable(bus, pings, reads, noise, findings)
+    reports = _reports(bus, robot, readable, findings, noise) if readable else ()
     if reports:
         findings += [
             servos.firmware(reports),
@@ -95,7 +97,7 @@ def examine(
             servos.torque(reports),
             servos.supply(reports, *safety.voltage_limits_v(robot.servo)),
             servos.heat(reports, safety.temperature_limit_c),
-            *_settings(bus, robot, reports),
+            *_settings(bus, robot, reports, noise),
         ]
         on_progress("group reads")
         fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
@@ -167,6 +169,25 @@ def examine_segments(
     return findings
 
 
+def _readable(
+    bus: DynamixelBus,
+    pings: Sequence[Probe],
+    reads: Sequence[Probe],
+    noise: Finding | None,
+    findings: list[Finding],
+) -> list[int]:
+    """Who replies to reads, alone under its ID; adds a finding of those who do not reply."""
+    probes = (*pings, *reads)
+    shared = {p.servo_id for p in probes if p.doubled}
+    if noise is None:
+        shared |= {p.servo_id for p in probes if p.damaged == p.requests}
+    alone = [p for p in reads if p.servo_id not in shared]
+    silent = [p.servo_id for p in alone if not p.answered and not p.damaged]
+    unread = [servo_id for servo_id in silent if not _replies_to_reads(bus, servo_id)]
+    findings += [f for f in [servos.silent_to_reads(unread)] if f is not None]
+    return [p.servo_id for p in alone if p.servo_id not in unread]
+
+
 def _replies_to_reads(bus: DynamixelBus, servo_id: int) -> bool:
     try:
         bus.read(servo_id, "Firmware Version")
@@ -178,12 +199,16 @@ def _replies_to_reads(bus: DynamixelBus, servo_id: int) -> bool:
 
 
 def _reports(
-    bus: DynamixelBus, robot: RobotConfig, servo_ids: Sequence[int], findings: list[Finding]
+    bus: DynamixelBus,
+    robot: RobotConfig,
+    servo_ids: Sequence[int],
+    findings: list[Finding],
+    noise: Finding | None,
 ) -> Sequence[ServoReport]:
     try:
         inspection = inspect(bus, robot, servo_ids)
     except BusError as error:
-        findings.append(Finding("registers", "fail", str(error), "run it again; then the cables"))
+        findings.append(_unreadable(error, noise))
         return ()
     wrong = [str(f) for f in inspection.faults if f.cause is FaultCause.OTHER_MODEL]
     findings.append(
@@ -193,18 +218,24 @@ def _reports(
 
 
 def _settings(
-    bus: DynamixelBus, robot: RobotConfig, reports: Sequence[ServoReport]
+    bus: DynamixelBus, robot: RobotConfig, reports: Sequence[ServoReport], noise: Finding | None
 ) -> list[Finding]:
     try:
         registers = [read_registers(bus, robot, report.servo_id) for report in reports]
     except BusError as error:
-        return [Finding("registers", "fail", str(error), "run it again; then the cables")]
+        return [_unreadable(error, noise)]
     scales = [ServoUnits.of(bus.table_of(servo_id)) for servo_id in robot.servo_ids]
     return register_findings(registers, robot, JointUnits.of(robot, scales))
+
+
+def _unreadable(error: BusError, noise: Finding | None) -> Finding:
+    remedy = "run it again; then the cables" if noise is None else "the noise first"
+    return Finding("registers", "fail", str(error), remedy)
 
 
 def _at_other_bauds(
     port: BytePort, missing: Sequence[int], on_progress: Callable[[str], None]
 ) -> dict[int, int]:
-    answering = scan(port, on_progress=on_progress)
-    return {s.servo_id: s.baud for s in answering if s.servo_id in missing}
+    others = [baud for baud in BAUDS if baud != port.getBaudRate()]
+    answering = scan(port, others, on_progress=on_progress)
+    return {s.servo_id: s.baud for s in answering.servos if s.servo_id in missing}

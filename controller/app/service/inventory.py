@@ -52,7 +52,10 @@ def take_inventory(
     before = port.getBaudRate()
     entries = []
     try:
-        for found in scan(port, bauds, on_progress):
+        report = scan(port, bauds, on_progress)
+        if report.bad_line is not None:
+            on_progress(report.bad_line)
+        for found in report.servos:
             port.setBaudRate(found.baud)
             entries.append(InventoryEntry(found, _state(port, latency_s, found)))
     finally:

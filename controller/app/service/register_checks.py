@@ -14,7 +14,14 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.app.service.finding import Finding, Grade, shown_subject
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
-from snakewalk.drivers.chain.start_up import ALL_REPLY, ChainSetting, chain_settings, pose_faults
+from snakewalk.drivers.chain.start_up import (
+    ALL_REPLY,
+    IDENTITY,
+    ChainSetting,
+    chain_settings,
+    identity_fault,
+    pose_faults,
+)
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.registers import (
     CURRENT_POSITION_MODE,
@@ -37,7 +44,7 @@ _PROFILE = ("Profile Acceleration", "Profile Velocity")
 _READ = (
     *("Status Return Level", "Secondary(Shadow) ID", "Homing Offset", "Drive Mode"),
     *("Operating Mode", "Startup Configuration", "Shutdown", "PWM Limit", "Current Limit"),
-    *("Goal PWM", *_GAINS, *_PROFILE, "Bus Watchdog", "Present Position"),
+    *("Goal PWM", *_GAINS, *_PROFILE, IDENTITY, "Bus Watchdog", "Present Position"),
 )
 _BY_A_RUN = "a run sets it; other programs are affected"
 
@@ -88,6 +95,7 @@ class _Checks:
         """Findings in the order of their weight; None where all is well."""
         return [
             self._pose(),
+            self._exchanged(),
             self._secondary(),
             self._current_limit(),
             self._bad(
@@ -203,6 +211,19 @@ class _Checks:
             found = "; ".join(fault.partition(": bend")[0] for fault in faults)
             return Finding("pose", "fail", found, faults[0].partition("limit of ")[2])
         return Finding("pose", "ok", "every joint stands within its limits")
+
+    def _exchanged(self) -> Finding | None:
+        """Servos that were other joints in the last run, as far as they have had power since."""
+        robot = self._robot
+        others = [
+            f"servo {servo.servo_id} was {robot.joint_name(servo.values[IDENTITY] - 1)}"
+            for servo in self._servos
+            if identity_fault(robot, servo.joint, servo.values.get(IDENTITY, 0)) is not None
+        ]
+        if not others:
+            return None
+        remedy = "have IDs been exchanged since? snakewalk bus set; else a run sets it"
+        return Finding("joint order", "warn", f"in the last run {', '.join(others)}", remedy)
 
     def _secondary(self) -> Finding | None:
         shadows = [

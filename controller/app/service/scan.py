@@ -1,23 +1,35 @@
 """Servos on a bus at every baud rate, and the choice of the serial port."""
 
-from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 from serial.tools import list_ports
 
 from snakewalk.config.robot import ImuConfig
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.probe import broadcast_ping
 from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.errors import BusError, ControlTableError, PortError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.port.port_map import is_port_map
 from snakewalk.drivers.protocol.control_table import model_numbers
 from snakewalk.drivers.protocol.imu_table import imu_model
+from snakewalk.drivers.protocol.packet import StatusPacket
 from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, SECONDARY_ID_LIMIT
 
 _LOOKS = 3
 _LIKELY = (1_000_000, FACTORY_BAUD)
+_SAME = {"sound": 1, "noisy": 2, "lossy": 5}
+"""So many broadcast pings in a row bring nobody new before a line is left (ours)."""
+_NAMED = 3
+"""So many baud rates at most are named of noise."""
+_MOST = 12
+"""Broadcast pings at one rate, at most (ours)."""
+_AGAIN = 2
+"""How often silent rates that are likely are asked again on a bad line, or where nobody answers;
+the noisy ones where nobody answers (ours)."""
+_TRIES = 6
+"""Of a ping or a read on a bad line (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +79,41 @@ def check_bauds(bauds: Sequence[int]) -> None:
         raise ControlTableError(unknown)
 
 
+@dataclass(frozen=True, slots=True)
+class ScanReport:
+    """Who answers on a line, and how good the line is."""
+
+    servos: tuple[ScanResult, ...]
+    """By ID."""
+    noise_bytes: Mapping[int, int]
+    """Baud rate to the bytes that belong to no packet, where there were any."""
+    lossy: bool
+    """Whether somebody who answered once did not answer each time."""
+
+    @property
+    def bad_line(self) -> str | None:
+        """What is wrong with the line, in words; None: nothing that was seen."""
+        if self.noise_bytes:
+            shown = ", ".join(f"{count} at {baud} baud" for baud, count in self.noise_bytes.items())
+            if len(self.noise_bytes) > _NAMED:
+                shown = f"{sum(self.noise_bytes.values())} at {len(self.noise_bytes)} baud rates"
+            found = f"bytes came damaged ({shown}): noise on the line, or two servos with one ID"
+        elif self.lossy:
+            found = "not every servo answered each time: packets get lost"
+        else:
+            return None
+        return f"{found}; there may be more servos than these"
+
+
 def scan(
     port: BytePort,
     bauds: Sequence[int] = (),
     on_progress: Callable[[str], None] = lambda step: None,
-) -> list[ScanResult]:
+) -> ScanReport:
     """Ask at each baud rate, the likely ones first; leaves the port at the one it had.
+
+    Where somebody answers, or bytes come damaged, all are asked again until nobody new answers: on
+    a bad line requests and replies get lost.
 
     Raises:
         PortError: the port vanished.
@@ -80,54 +121,119 @@ def scan(
     """
     before = port.getBaudRate()
     asked = tuple(bauds or sorted(BAUDS, key=lambda rate: (rate not in _LIKELY, rate)))
-    results: list[ScanResult] = []
+    replies: dict[int, dict[int, StatusPacket]] = {}
+    noise: dict[int, int] = {}
+    lossy = False
     try:
         for baud in asked:
             on_progress(f"{baud} baud")
             if port.setBaudRate(baud):
-                results += _at(port, baud)
+                replies[baud], lost = _answers(port, noise)
+                lossy |= lost
+        bad = lossy or bool(noise)
+        silent = not any(replies.values())
+        likely = {*_LIKELY, before, *(noise if silent else ())}
+        again = [baud for baud in asked if baud in likely]
+        for baud in again * _AGAIN if bad or silent else ():
+            if not replies.get(baud) and port.setBaudRate(baud):
+                on_progress(f"{baud} baud again")
+                replies[baud], lost = _answers(port, noise)
+                lossy |= lost or bool(replies[baud])  # it was silent before
+        _tell_once(port, replies, before, on_progress)
+        results = []
+        for baud, servos in replies.items():
+            if servos and port.setBaudRate(baud):
+                tries = _TRIES if bad else None
+                results += [_result(port, baud, reply, tries) for reply in servos.values()]
     finally:
         port.setBaudRate(before)
-    if len(asked) > 1:
-        results = _told_once(results, before, len(asked))
-    return sorted(results, key=lambda servo: (servo.servo_id, servo.baud))
+    results.sort(key=lambda servo: (servo.servo_id, servo.baud))
+    return ScanReport(tuple(results), noise, lossy)
 
 
-def _told_once(results: Sequence[ScanResult], baud: int, rates: int) -> list[ScanResult]:
-    """Results without the repetitions of a line that has no baud rate.
+def _answers(port: BytePort, noise: dict[int, int]) -> tuple[dict[int, StatusPacket], bool]:
+    """Who answers at the port's baud rate, and whether packets got lost.
 
-    Behind some pseudo-terminals a servo answers at every rate; it is told at ``baud`` then.
+    Adds to ``noise`` what came damaged.
     """
-    answers = Counter(servo.servo_id for servo in results)
-    return [s for s in results if answers[s.servo_id] < rates or s.baud == baud]
+    baud = port.getBaudRate()
+    replies: dict[int, StatusPacket] = {}
+    state, same = "sound", 0
+    for turn in range(_MOST):
+        answer = broadcast_ping(port)
+        new = [reply for reply in answer.replies if reply.servo_id not in replies]
+        replies |= {reply.servo_id: reply for reply in new}
+        same = 0 if new else same + 1
+        if answer.noise_bytes:
+            noise[baud] = noise.get(baud, 0) + answer.noise_bytes
+            state = "noisy" if state == "sound" and replies else state
+        if turn and (new or len(answer.replies) < len(replies)):
+            state = "lossy"
+        if same >= _SAME[state] and turn:
+            break
+        if not replies and baud not in _LIKELY:
+            break
+    return replies, state == "lossy"
 
 
-def _at(port: BytePort, baud: int) -> list[ScanResult]:
-    names = model_numbers()
-    results = []
-    for servo in DynamixelBus(port).scan().values():
-        model = names.get(servo.model_number) or _other(port, servo)
-        shadow = _secondary_id(port, servo.servo_id, model)
-        results.append(ScanResult(servo.servo_id, model, servo.firmware, baud, shadow))
-    return results
+def _tell_once(
+    port: BytePort,
+    replies: Mapping[int, dict[int, StatusPacket]],
+    before: int,
+    on_progress: Callable[[str], None],
+) -> None:
+    """Take repetitions of a servo out that answers at every rate, as on a line that has none.
+
+    Behind some pseudo-terminals and serial servers no baud rate counts; the servo is told at
+    ``before`` then, or at the first rate where that was not asked. On a bad line not every request
+    is answered: a servo that is found at two rates is pinged at all others. Two servos with one ID,
+    at two rates, are told at both.
+    """
+    for servo_id in sorted({each for found in replies.values() for each in found}):
+        at = [baud for baud, found in replies.items() if servo_id in found]
+        if len(at) < 2:
+            continue
+        on_progress(f"servo {servo_id} answers at {len(at)} baud rates")
+        others = [baud for baud in BAUDS if baud not in at]
+        answering = sum(_pings_back(port, servo_id, baud) for baud in others)
+        if len(at) + answering > len(BAUDS) / 2:
+            kept = before if before in replies else at[0]
+            reply = replies[at[0]][servo_id]
+            for baud in at:
+                del replies[baud][servo_id]
+            replies[kept][servo_id] = reply
 
 
-def _other(port: BytePort, device: PingReply) -> str:
+def _pings_back(port: BytePort, servo_id: int, baud: int) -> bool:
+    if not port.setBaudRate(baud):
+        return False
+    return bool(DynamixelBus(port, tries=_TRIES).find([servo_id]))
+
+
+def _result(port: BytePort, baud: int, reply: StatusPacket, tries: int | None) -> ScanResult:
+    number, firmware = int.from_bytes(reply.params[:2], "little"), reply.params[2]
+    model = model_numbers().get(number) or _other(port, reply.servo_id, number)
+    shadow = _secondary_id(port, reply.servo_id, model, tries)
+    return ScanResult(reply.servo_id, model, firmware, baud, shadow)
+
+
+def _other(port: BytePort, device_id: int, number: int) -> str:
     """Name of a device that the SDK does not know."""
-    published = imu_model(device.model_number)
+    published = imu_model(number)
     if published is not None:
         return published
     # whose number is not published: known by what only it shows
-    guess = ImuConfig(model="imu_to_dxl", id=device.servo_id)
+    guess = ImuConfig(model="imu_to_dxl", id=device_id)
     reader = ImuReader(DynamixelBus(port), guess)
     shown = any(reader.read(lambda line: None) is not None for _ in range(_LOOKS))
-    return f"{'imu_to_dxl?, ' if shown else ''}number {device.model_number}"
+    return f"{'imu_to_dxl?, ' if shown else ''}number {number}"
 
 
-def _secondary_id(port: BytePort, servo_id: int, model: str) -> int | None:
+def _secondary_id(port: BytePort, servo_id: int, model: str, tries: int | None) -> int | None:
     """Secondary(Shadow) ID(12) of a servo; None if it has none, or does not say."""
     try:
-        shadow = DynamixelBus(port, model).read(servo_id, "Secondary(Shadow) ID")
+        bus = DynamixelBus(port, model) if tries is None else DynamixelBus(port, model, tries=tries)
+        shadow = bus.read(servo_id, "Secondary(Shadow) ID")
     except (BusError, ControlTableError):
         return None
     return shadow if shadow <= SECONDARY_ID_LIMIT else None

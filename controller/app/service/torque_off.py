@@ -53,7 +53,7 @@ def torque_off(
                 port.clock.sleep_until_s(port.clock.now_s() + wire_s + held_s)
         for rate in rates:
             on_progress(f"torque off is sent; who answers at {rate} baud?")
-            found = scan(port, [rate])
+            found = scan(port, [rate]).servos
             if found:
                 port.setBaudRate(rate)
                 failed = [

@@ -79,6 +79,11 @@ def every(count: int, hurt: Callable[[bytes], list[bytes]]) -> Plant:
     return plant
 
 
+def burst(raw: bytes) -> bytes:
+    """Four bytes of noise over a reply."""
+    return raw[:6] + b"\x5a\x00\xf3\x81" + raw[10:]
+
+
 def fifth_has_id(servo_id: int, **differs: int) -> Plant:
     """A fifth servo with the ID of another one."""
 
@@ -240,7 +245,7 @@ KINDS = [
         "a bad line",
         every(9, lambda raw: [raw[:-1] + bytes((raw[-1] ^ 1,))]),
         "line",
-        "of 200 group reads incomplete",
+        " group reads incomplete",
         "fail",
     ),
     Kind(
@@ -248,6 +253,13 @@ KINDS = [
         others(b"\x00\xff"),
         "second master",
         "bytes came that nobody asked for",
+    ),
+    Kind(
+        "noise in every reply",
+        every(1, lambda raw: [burst(raw)]),
+        "noise",
+        "damaged bytes after 40 of 40 requests, of servos 1 to 4: noise on the line",
+        "fail",
     ),
     Kind(
         "a second master: its requests",
@@ -330,6 +342,12 @@ KINDS = [
         "secondary ID",
         "servo 3 obeys ID 2 as well",
         "fail",
+    ),
+    Kind(
+        "IDs exchanged since the last run",
+        lambda line: line.bank["Velocity I Gain"].put(range(4), [1, 3, 2, 4]),
+        "joint order",
+        "in the last run servo 2 was joint 3 (ID 3), servo 3 was joint 2 (ID 2)",
     ),
     Kind(
         "alarms that do not shut down",
@@ -474,7 +492,7 @@ def test_scan_tells_a_secondary_id() -> None:
     line = TestLine()
     line.bank["Secondary(Shadow) ID"][2] = 2
     line.setBaudRate(1_000_000)
-    found = {servo.servo_id: servo.secondary_id for servo in scan(line, (1_000_000,))}
+    found = {servo.servo_id: servo.secondary_id for servo in scan(line, (1_000_000,)).servos}
     assert found == {1: None, 2: None, 3: 2, 4: None}
 
 
@@ -483,5 +501,5 @@ def test_a_line_without_a_baud_rate_is_told_once() -> None:
         def _on_baud_change(self, baud: int) -> None:
             super()._on_baud_change(1_000_000)
 
-    results = scan(NoBaud())
-    assert results == [ScanResult(k, "XM430-W350", 48, 1_000_000) for k in range(1, 5)]
+    results = scan(NoBaud()).servos
+    assert list(results) == [ScanResult(k, "XM430-W350", 48, 1_000_000) for k in range(1, 5)]

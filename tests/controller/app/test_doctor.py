@@ -182,12 +182,12 @@ def test_permission(tmp_path: object, mocker: MockerFixture) -> None:
 def test_scan_goes_through_the_baud_rates_and_leaves_the_port_as_it_was(line: Recorder) -> None:
     line.bank["Baud Rate"][:] = [1, 3, 6, 3]
     steps: list[str] = []
-    assert scan(line, on_progress=steps.append) == [
+    assert scan(line, on_progress=steps.append).servos == (
         ScanResult(1, "XM430-W350", 48, 57_600),
         ScanResult(2, "XM430-W350", 48, 1_000_000),
         ScanResult(3, "XM430-W350", 48, 4_000_000),
         ScanResult(4, "XM430-W350", 48, 1_000_000),
-    ]
+    )
     assert steps[:2] == ["57600 baud", "1000000 baud"]
     assert len(steps) == 8
     assert line.getBaudRate() == 1_000_000
@@ -262,5 +262,5 @@ def test_scan_names_both_imus() -> None:
     """One by its published number, the other by what only it shows, with a question mark."""
     g40 = ImuConfig(model="FFW-G40-IMU", id=9, gyro_range_dps=500.0, acceleration_range_g=4.0)
     for imu, name in ((g40, "FFW-G40-IMU"), (DUCK, "imu_to_dxl?, number 0")):
-        found = {s.servo_id: s.model for s in scan(an_imu(imu, np.eye(3)), (1_000_000,))}
+        found = {s.servo_id: s.model for s in scan(an_imu(imu, np.eye(3)), (1_000_000,)).servos}
         assert found == {**dict.fromkeys(ROBOT.servo_ids, "XM430-W350"), imu.id: name}

@@ -17,6 +17,8 @@ from snakewalk.controller.app.runs.factory import prepare_gait
 from snakewalk.controller.metrics.summary import summary
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.errors import BusError, DriverError, PortError
 
 
 def after(cycles: int, stop: Callable[[], None]) -> Callable[[Progress], None]:
@@ -51,6 +53,38 @@ def test_an_interrupted_run_says_what_became_of_torque_and_log(
     assert record.complete
     assert record.events[-1].text == "torque is off"
     assert summary(record).outcome == "interrupted"
+
+
+@pytest.mark.parametrize("kind", [BusError, PortError])
+def test_a_torque_off_that_is_not_confirmed_says_what_tripped_and_where_the_log_is(
+    kind: type[DriverError],
+    tmp_path: Path,
+    mocker: MockerFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """It said neither; and 2, of a port that is gone, means that nothing has moved."""
+    pytest.importorskip("mujoco")
+    job, reasons = prepare_gait("lateral-undulation", seconds=2.0), [None] * 50
+    mocker.patch.object(ServoChain, "disable", side_effect=kind("joint 3 is not confirmed"))
+
+    def run_into_a_trip() -> None:
+        execute(job, tmp_path, stop_requested=lambda: reasons.pop() if reasons else "a hand")
+
+    mocker.patch(
+        "snakewalk.controller.app.cli.main._check_words",
+        side_effect=lambda words: run_into_a_trip(),
+    )
+    monkeypatch.setattr("sys.argv", ["snakewalk", "list"])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 1
+    log = tmp_path / "log.mcap"
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"snakewalk: joint 3 is not confirmed; tripped by: a hand; log: {log}; its page: "
+        f"snakewalk report {log}"
+    )
+    assert read_log(log).events[-1].text == "joint 3 is not confirmed"
 
 
 def test_a_run_that_is_over_is_whole_when_its_summary_is_interrupted(

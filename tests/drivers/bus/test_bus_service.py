@@ -72,6 +72,13 @@ def test_a_header_in_the_data_is_stuffed_when_sent() -> None:
     assert b"\xff\xff\xfd\xfd\x00" in bus.port.written[0]  # type: ignore[attr-defined]
 
 
+def test_damage_is_not_told_as_silence() -> None:
+    reply = bytearray(encode_status(StatusPacket(1, 0, b"\x20\x03")))
+    reply[9] ^= 1
+    with pytest.raises(NoAnswerError, match=r"Position P Gain: damaged bytes at .*: noise on the"):
+        DynamixelBus(one_servo(bytes(reply), [])).read(1, "Position P Gain")
+
+
 def test_refusals_name_servo_register_and_reason(bus: DynamixelBus) -> None:
     bus.write(1, "Torque Enable", 1)
     with pytest.raises(ServoError, match="servo 1: write Operating Mode: refused: access") as info:

@@ -180,7 +180,7 @@ def far_end() -> Iterator[Callable[[str], FarEnd]]:
 def test_servos_answer_over_a_network(far_end: Callable[[str], FarEnd], kind: str) -> None:
     far = far_end(kind)
     with ServedPort(far) as port:
-        assert [(each.servo_id, each.model) for each in scan(port, [BAUD])] == [
+        assert [(each.servo_id, each.model) for each in scan(port, [BAUD]).servos] == [
             (1, "XL330-M288"),
             (2, "XL330-M288"),
             (3, "XL330-M288"),

@@ -1,5 +1,6 @@
 """The serial port on a pseudo terminal; the other end is the test."""
 
+import errno
 import fcntl
 import os
 import struct
@@ -42,6 +43,24 @@ def test_a_deadline_returns_what_came(pair: tuple[int, SerialPort]) -> None:
     assert port.read_until(4, now + 0.01) == b"ab"
     assert port.clock.now_s() >= now + 0.01
     assert port.read_until(4, now) == b""
+
+
+def test_bytes_that_another_program_was_quicker_to_read_do_not_end_the_port(
+    pair: tuple[int, SerialPort], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was told as a port that is gone, and a run did not wait for torque off to be confirmed."""
+    master, port = pair
+    os.write(master, b"abcd")
+    read, taken = os.read, iter([b"ab"])
+
+    def beaten(descriptor: int, count: int) -> bytes:
+        for mine in taken:  # the other program's read, between our poll and ours
+            assert read(descriptor, 2) == mine
+            raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+        return read(descriptor, count)
+
+    monkeypatch.setattr(os, "read", beaten)
+    assert port.read_until(2, port.clock.now_s() + 5.0) == b"cd"
 
 
 def test_draining_and_clearing_throw_away(pair: tuple[int, SerialPort]) -> None:

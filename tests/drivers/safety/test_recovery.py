@@ -288,6 +288,7 @@ def test_a_port_that_stays_away_is_given_up(rig: Rig) -> None:
     rig.line.pull(1e6)
     with pytest.raises(SafetyTrippedError, match=r"torque off failed: plug: no such port"):
         rig.link.read()
+    assert rig.events[-1] == "given up: plug: no such port"  # not "is closed"
     assert rig.line.clock.now_s() - start_s == pytest.approx(12.0, abs=0.3)
     rig.line.settle()
     assert (rig.line.bank["Bus Watchdog"] == 0xFF).all()  # they stopped by themselves

@@ -195,6 +195,22 @@ def test_a_torque_off_that_fails_does_not_hide_the_first_fault(
         crash(None)
 
 
+def test_a_torque_off_that_fails_after_a_trip_says_what_had_tripped(
+    link: SafeLink, joints: Joints
+) -> None:
+    joints.disable_fault = BusError("servo 3: torque off is not confirmed")
+
+    def tripped() -> None:
+        with link:
+            link.enable()
+            link.request_stop("a hand")
+            link.read()
+
+    with pytest.raises(BusError, match="not confirmed") as info:
+        tripped()
+    assert info.value.__notes__ == ["tripped by: a hand"]
+
+
 @pytest.mark.parametrize(
     ("number", "raised"),
     [

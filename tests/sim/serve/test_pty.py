@@ -158,3 +158,16 @@ def test_a_second_server_never_takes_the_firsts_link(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is there already, and is no link"):
         PtyServer(a_line(), SimClock(), link=link)
     assert link.read_text() == "mine"
+
+
+def test_the_link_of_a_killed_server_is_taken_where_its_device_is_ours_now(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The system gives the lowest free number: the new device has the old one's name."""
+    link = tmp_path / "tty"
+    ends = os.openpty()
+    link.symlink_to(os.ttyname(ends[1]))
+    monkeypatch.setattr(os, "openpty", lambda: ends)
+    with PtyServer(a_line(), SimClock(), link=link) as server:
+        assert os.readlink(link) == server.path
+    assert not link.is_symlink()

@@ -23,6 +23,7 @@ def scan(
 
     scanning.check_bauds(baud or ())
     found = []
+    noise: dict[str, dict[int, int]] = {}
     with (
         open_lines(port, baud[0] if baud else 1_000_000) as lines,
         stderr_console().status("") as status,
@@ -32,12 +33,17 @@ def scan(
             def show_step(step: str, name: str = line.name) -> None:
                 status.update(f"{name}: {step}")
 
-            found += [(line.name, each) for each in scanning.scan(line, baud or (), show_step)]
+            report = scanning.scan(line, baud or (), show_step)
+            found += [(line.name, each) for each in report.servos]
+            if report.bad_line is not None:
+                LOGGER.warning("%s: %s", line.name, report.bad_line)
+            if report.noise_bytes:
+                noise[line.name] = dict(report.noise_bytes)
     for note in lines.misplaced((name, servo.servo_id) for name, servo in found):
         LOGGER.warning("%s", note)
     if as_json:
         servos = [servo.to_dict() | {"port": name} for name, servo in found]
-        print(json.dumps({"port": lines.port, "servos": servos}))
+        print(json.dumps({"port": lines.port, "servos": servos, "noise_bytes": noise}))
     elif found:
         heads = ("ID", "model", "firmware", "baud")
         table = Table(*heads, *(["port"] if lines.several else []), box=None)
@@ -51,6 +57,8 @@ def scan(
                     f"servo {servo.servo_id} obeys ID {servo.secondary_id} as well: its "
                     "Secondary ID(12); a run sets it to 255"
                 )
+    elif noise:
+        console.print(f"{lines.port}: no reply came whole: cables, plugs, termination, ground?")
     else:
         console.print(
             f"{lines.port}: nobody answers at any baud rate: power? cable? adapter's switch?"
