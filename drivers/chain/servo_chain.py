@@ -385,11 +385,13 @@ class ServoChain:
         measured_at_s = self._take(reply)
         place = self._reads % SLOW_EVERY
         self._reads += 1
+        has_time = bool(reply.valid.all())
         if place == 0 or measured_at_s - self._readings.slow_at_s() > _SLOW_S:
+            has_time = False
             reply = self._slow.read()
             self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
             self._readings.update_slow(reply, self._sent_at_s)
-        self._check_liveness()
+        self._check_liveness(has_time=has_time)
         imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
         if imu is not None:
@@ -397,26 +399,30 @@ class ServoChain:
         self.on_state(state)
         return state
 
-    def _take(self, reply: GroupReadReply) -> float:
-        """Take in a group read of the state; when it was measured, s."""
+    def _take(self, reply: GroupReadReply, *, again: bool = False) -> float:
+        """Take in a group read of the state, or one more in this cycle; when it was measured, s."""
         measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
-        for joint in self._readings.update(reply, measured_at_s):
+        for joint in self._readings.update(reply, measured_at_s, again=again):
             self._read_alarm(int(joint))
         return measured_at_s
 
-    def _check_liveness(self) -> None:
+    def _check_liveness(self, *, has_time: bool) -> None:
         """Check torque, watchdogs, settings; where a servo tells an alarm, that is the reason.
 
         An alarm that switches a servo off may come between the group read and the check.
+
+        Args:
+            has_time: the state is all that was read in this cycle, and all servos replied.
+
         """
         if not self._armed or self._liveness is None or self._readings.alert:
             return
         try:
-            asked = self._liveness.check(self._reads - 1)
+            asked = self._liveness.check(self._reads - 1, has_time=has_time)
             if asked is not None:
                 self._sent_at_s = self._clock.now_s() - asked.since_sent_s
         except BusError:
-            self._take(self._cycle.read())
+            self._take(self._cycle.read(), again=True)
             if not self._readings.alert:
                 raise
 
@@ -478,7 +484,8 @@ class ServoChain:
         """
         expected = dict(enumerate(values))
         check = RegisterCheck.of(self._bus, self.robot, name, expected, fast=False)
-        for joint, got in check.differing(ask_again=self._bus).items():
+        differing, _ = check.compare(ask_again=self._bus)
+        for joint, got in differing.items():
             raise BusError(
                 f"{self.robot.joint_name(joint)}: {name} is {got} after {expected[joint]} was "
                 "written to all"
@@ -504,7 +511,8 @@ class ServoChain:
 class LivenessCheck:
     """Whether torque is still on, the watchdogs are armed, and no setting was lost.
 
-    One group read of one register at a time; servos that do not reply are not judged.
+    One group read of one register at a time. Servos that do not reply are not judged; the check is
+    made again in the next cycle that has time for it.
     """
 
     def __init__(
@@ -542,12 +550,15 @@ class LivenessCheck:
         (self._identity,) = kept([IDENTITY])
         self._settings = kept(RAM_SETTINGS)
         self._shaping = kept(SHAPING_SETTINGS)
+        self._missed: list[RegisterCheck] = []
+        """Not all servos replied to these; the oldest first."""
 
-    def check(self, cycle: int) -> GroupCycle | None:
+    def check(self, cycle: int, *, has_time: bool) -> GroupCycle | None:
         """Make the check whose turn it is in a cycle; the group read, if it asked all servos.
 
         In a round of ``SLOW_EVERY`` cycles: torque, watchdog, identity, one of the settings, and
-        two of those that shape the motion.
+        two of those that shape the motion. In between, where the cycle ``has_time``, one to which
+        not all servos have replied.
 
         Raises:
             BusError: a servo is not as it was set.
@@ -567,13 +578,19 @@ class LivenessCheck:
         elif place in (3, SLOW_EVERY - 5):
             turn = 2 * rounds + (place > SLOW_EVERY // 2)
             check = self._shaping[turn % len(self._shaping)]
+        if check is None and has_time and self._missed:
+            check = self._missed[0]
         if check is None:
             return None
         self._judge(check)
         return check.cycle if len(check.ids) == self._robot.joint_count else None
 
     def _judge(self, check: "RegisterCheck") -> None:
-        differing = check.differing()
+        differing, is_complete = check.compare()
+        if check in self._missed:
+            self._missed.remove(check)
+        if not is_complete:
+            self._missed.append(check)
         if not differing:
             return
         joint, value = next(iter(differing.items()))
@@ -593,7 +610,7 @@ class LivenessCheck:
         raise BusError(f"{', '.join(map(self._robot.joint_name, differing))}: {what}")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RegisterCheck:
     """Group read of one register, and what it must return."""
 
@@ -618,8 +635,8 @@ class RegisterCheck:
         cycle = bus.block(ids, name, name, fast=fast)
         return cls(bus.table_of(ids[0]).register(name), cycle, ids, dict(expected))
 
-    def differing(self, ask_again: ChainBus | None = None) -> dict[int, int]:
-        """Read the register; the values that are not as expected, by joint.
+    def compare(self, ask_again: ChainBus | None = None) -> tuple[dict[int, int], bool]:
+        """Read the register; the values that are not as expected, by joint, and if all are known.
 
         Args:
             ask_again: asks those that are not in the reply one by one; without it they are not
@@ -643,4 +660,4 @@ class RegisterCheck:
                 continue
             if got != expected:
                 found[joint] = got
-        return found
+        return found, ask_again is not None or bool(reply.valid.all())

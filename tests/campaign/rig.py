@@ -96,9 +96,9 @@ class ChangeWatch:
         chain.on_event = self.lines.append
         check = chain._check_liveness
 
-        def watched() -> None:
+        def watched(*, has_time: bool) -> None:
             self._pending |= self._changed()
-            check()
+            check(has_time=has_time)
 
         chain._check_liveness = watched  # type: ignore[method-assign]
 

@@ -143,3 +143,22 @@ def test_a_hold_where_the_joints_were_just_read_is_not_too_fast() -> None:
     tally = run_scenario(("drop", "clash"), 3, 240)
     assert tally.brought_back
     assert tally.complaints == []
+
+
+@pytest.mark.parametrize(
+    ("kinds", "seed"),
+    [(("duplicate", "profile"), 5001), (("corrupt", "feed-forward"), 5001)],
+)
+def test_a_change_is_noticed_though_the_check_of_it_was_lost(
+    kinds: tuple[str, str], seed: int
+) -> None:
+    tally = run_scenario(kinds, seed, 240)
+    assert tally.noticed
+    assert tally.complaints == []
+
+
+def test_what_was_read_before_an_alarm_in_the_same_cycle_is_of_this_cycle() -> None:
+    """The servo was silent when the state was read once more for the alarm."""
+    tally = run_scenario(("mute", "shock"), 5000, 240)
+    assert tally.trips
+    assert tally.complaints == []

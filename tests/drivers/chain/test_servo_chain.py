@@ -8,12 +8,14 @@ import pytest
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.drivers.bus.budget import chain_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.bus.group_read import GroupReadReply
+from snakewalk.drivers.chain.servo_chain import SLOW_EVERY, ServoChain
 from snakewalk.drivers.chain.start_up import inspect
 from snakewalk.drivers.errors import BudgetError, BusError, ChainError, PortError
 from snakewalk.drivers.protocol.control_table import load_control_table
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
+from snakewalk.drivers.protocol.registers import Alarm
 from snakewalk.drivers.types import JointCommand
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
@@ -283,6 +285,64 @@ def test_the_slow_round_comes_every_sixteenth_read(line: Recorder, chain: ServoC
     assert len(slow) == 4
     assert state.voltage_v == pytest.approx(np.full(4, 12.0), abs=0.11)
     assert np.isfinite(state.temperature_c).all()
+
+
+@pytest.mark.parametrize("lost", [1, 2])
+def test_a_check_whose_reply_is_lost_is_made_again_in_the_next_cycle_with_time(
+    chain: ServoChain, line: Recorder, lost: int
+) -> None:
+    """It was made again in its next turn, 48 cycles later."""
+    chain.enable()
+    while chain._reads % SLOW_EVERY != 3:  # the turn of the first register that shapes the motion
+        chain.read()
+    assert chain._liveness is not None
+    check = chain._liveness._shaping[0]
+    line.bank[check.register.name][1] = 77
+    read, remaining = check.cycle.read, [None] * lost
+
+    def lose() -> GroupReadReply:
+        reply = read()
+        if not remaining:
+            return reply
+        remaining.pop()
+        return reply._replace(valid=np.zeros(4, np.bool_))
+
+    check.cycle.read = lose  # type: ignore[method-assign]
+    for _ in range(lost):
+        chain.read()
+    if lost == 2:
+        chain.read()  # the turn of another register
+    with pytest.raises(BusError, match="Position I Gain is 77, not"):
+        chain.read()
+
+
+def test_what_was_read_in_a_cycle_counts_though_a_second_read_in_it_fails(
+    chain: ServoChain, line: Recorder
+) -> None:
+    """An alarm is read for at once; a servo that was silent then had a new value, not valid."""
+    chain.enable()
+    while chain._reads % SLOW_EVERY != SLOW_EVERY // 3:
+        chain.read()
+    line.firmware.plant.position_rad[:] += 0.05
+    line.clock.advance(0.02)
+    read, once = chain._cycle.read, [True]
+
+    def read_then_trouble() -> GroupReadReply:
+        reply = read()
+        if once:
+            once.clear()
+            line.firmware.protection.detect(np.array([0]), Alarm.ELECTRICAL_SHOCK)
+            line.firmware.apply_registers()
+            line.mute(np.array([3]), True)
+            line.refresh_ids()
+        return reply
+
+    chain._cycle.read = read_then_trouble  # type: ignore[method-assign]
+    state = chain.read()
+    assert state.hardware_error[0]
+    assert state.valid.all()
+    assert state.position_rad[3] > START[3] + 0.02
+    assert state.age_s[3] > state.age_s[1]
 
 
 def test_states_are_snapshots(chain: ServoChain, line: Recorder) -> None:
