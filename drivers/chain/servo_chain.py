@@ -47,7 +47,8 @@ _SLOW_S = 1.0
 _OFF_ROUNDS = 3
 """Group reads in which the servos may confirm that their torque is off (ours)."""
 _OFF_S = 1.0
-"""How long servos that do not are asked one by one, at most, s (ours)."""
+"""How long servos that do not are asked one by one, round after round, s (ours): longer than a line
+may be disturbed before the state is stale and for some tenths of a second after it."""
 _PORT_PATIENCE_S, _REOPEN_S = 2.0, 0.1
 """How long torque off waits for a port that is gone, and between the tries to open it (ours)."""
 _FIRST_READS = 5
@@ -279,8 +280,9 @@ class ServoChain:
     def disable(self) -> None:
         """Torque off, then the watchdog, on every servo, also where others fail.
 
-        Servos that do not confirm it in a group read are asked once more, for a limited time. Where
-        one of several ports is gone, the servos on the others are off before it is waited for.
+        Servos that do not confirm it in a group read are asked one by one, again and again for a
+        limited time: their watchdogs may be disarmed. Where one of several ports is gone, the
+        servos on the others are off before it is waited for.
 
         Raises:
             BusError: servos that did not confirm; their watchdog stays armed and stops them.
@@ -354,20 +356,25 @@ class ServoChain:
                 break
             bus.sync_write(self._ids_of(joints), "Torque Enable", 0)
         give_up_s = self._clock.now_s() + _OFF_S
-        silent = []
-        for joint in joints:  # those behind a silent servo stay silent in a group read
-            try:
-                if self._clock.now_s() >= give_up_s:
-                    raise BusError("no time left")
-                bus.write(ids[joint], "Torque Enable", 0, tries=1)
-            except BusError:
-                silent.append(joint)
+        silent = joints  # those behind a silent servo stay silent in a group read
+        while silent and self._clock.now_s() < give_up_s:
+            silent = [joint for joint in silent if not self._is_off(bus, ids[joint], give_up_s)]
         confirmed = self._ids_of(joint for joint in on_it if joint not in silent)
         if confirmed:
             bus.sync_write(confirmed, "Bus Watchdog", 0)
             # the port may be closed right behind it: a reply shows that the packet has arrived
             bus.block(confirmed, "Bus Watchdog", "Bus Watchdog", fast=False).read()
         return silent
+
+    def _is_off(self, bus: DynamixelBus, servo_id: int, give_up_s: float) -> bool:
+        """Ask a servo alone to switch its torque off; whether it confirms that, in time."""
+        if self._clock.now_s() >= give_up_s:
+            return False
+        try:
+            bus.write(servo_id, "Torque Enable", 0, tries=1)
+        except BusError:
+            return False
+        return True
 
     def read(self) -> JointState:
         """Read all joints once; voltages and temperatures in every 16th call and when overdue.

@@ -162,3 +162,19 @@ def test_what_was_read_before_an_alarm_in_the_same_cycle_is_of_this_cycle() -> N
     tally = run_scenario(("mute", "shock"), 5000, 240)
     assert tally.trips
     assert tally.complaints == []
+
+
+@pytest.mark.parametrize(
+    ("kinds", "seed"),
+    [
+        (("drop", "watchdog"), 3002),
+        (("corrupt", "watchdog"), 5000),
+        (("truncate", "watchdog"), 1008),
+    ],
+)
+def test_a_trip_ends_safe_though_the_line_is_dead_and_the_watchdogs_are_disarmed(
+    kinds: tuple[str, str], seed: int
+) -> None:
+    tally = run_scenario(kinds, seed, 240)
+    assert tally.trips
+    assert tally.complaints == []
