@@ -24,6 +24,7 @@ from snakewalk.drivers.chain.start_up import (
     Inspection,
     check_pose,
     configure,
+    identity,
     identity_fault,
     inspect,
     let_reply,
@@ -53,6 +54,11 @@ _PORT_PATIENCE_S, _REOPEN_S = 2.0, 0.1
 """How long torque off waits for a port that is gone, and between the tries to open it (ours)."""
 _FIRST_READS = 5
 """Tries to get one complete reply at the start (ours)."""
+_HOLD_READS = 2
+"""Reads in which the servos may tell where they are before they hold (ours)."""
+STILL_RAD = 0.1
+"""A joint that is read farther from where it was just set to hold is not the one that holds
+(ours)."""
 
 
 class ServoChain:
@@ -176,10 +182,10 @@ class ServoChain:
     def resume(self, found: Recheck) -> JointState:
         """Go on after an interruption: torque that is on stays on, nothing moves.
 
-        A joint that is read elsewhere than ``found`` it is not gone on with: two servos with one
-        ID reply in turn, and the goal of the one would be where the other stands. Servos that lost
-        their torque or their settings (rebooted) are set up again. The others get their watchdog
-        cleared and, right behind it, goal = present.
+        A joint that is elsewhere than ``found``, or whose servo does not tell that it is this
+        joint's, is not gone on with: two servos with one ID reply in turn. Servos that lost their
+        torque or their settings (rebooted) are set up again. The others get their watchdog cleared
+        and, right behind it, goal = present.
 
         Raises:
             ChainError: ``found`` forbids it.
@@ -194,14 +200,14 @@ class ServoChain:
         return self._begin(found.position_rad)
 
     def _begin(self, found_rad: Floats | None = None) -> JointState:
-        """Read the first state, hold it and arm the watchdogs; torque is off if that fails."""
+        """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
         self._reads = 0
-        state = self._first_state()
-        check_pose(self.robot, state.position_rad)
+        check_pose(self.robot, self._first_state().position_rad)
         try:
-            if found_rad is not None:
-                self._check_stillness(state.position_rad, found_rad)
-            return self._hold_and_arm(state)
+            here_rad = self._own_positions(_FIRST_READS, ask_again=True)
+            before_rad = here_rad if found_rad is None else found_rad
+            self._check_stillness(here_rad, before_rad, MOVED_RAD)
+            return self._hold_and_arm(here_rad)
         except BaseException:
             self.disable()
             raise
@@ -225,46 +231,79 @@ class ServoChain:
         """
         self._bus.reopen()
 
-    def _check_stillness(self, position_rad: Floats, found_rad: Floats) -> None:
-        """Compare where the joints are read with where they have just been found.
+    def _own_positions(self, reads: int, *, ask_again: bool = False) -> Floats:
+        """(J,) where each joint is, by a reply that also tells which joint's its servo is.
 
-        Raises:
-            ChainError: a joint is elsewhere, though its servo should hold.
-
-        """
-        moved_rad = position_rad - found_rad
-        joint = int(np.argmax(np.abs(moved_rad)))
-        if not abs(moved_rad[joint]) <= MOVED_RAD:
-            raise ChainError(
-                [
-                    f"{self.robot.joint_name(joint)}: read {moved_rad[joint]:+.2f} rad from where "
-                    "it was found just before: two servos with one ID, or moved by hand"
-                ]
-            )
-
-    def hold(self, believed_rad: Floats) -> None:
-        """Set the goals to the positions that were last read.
-
-        A joint that was read far from where it is believed to be keeps its goal: two servos have
-        one ID, or IDs were exchanged.
+        So no joint is given the place of another whose servo has the same ID, or its ID.
 
         Args:
-            believed_rad: (J,) where the joints were when their readings could last be believed.
+            reads: how often all are asked; NaN for a joint whose servo has not told it.
+            ask_again: ask those alone: one may refuse to be read across registers that it lacks.
+
+        Raises:
+            BusError: a servo that is asked alone does not reply.
+            PortError: the port is gone.
+
+        """
+        here_rad = np.full(self.joint_count, np.nan)
+        for _ in range(reads):
+            reply = self._identified.read()
+            for joint in np.flatnonzero(reply.valid & np.isnan(here_rad)).tolist():
+                row = reply.data[joint].tobytes()
+                if self._identity.decode(row) == identity(joint):
+                    raw = self._position.decode(row[-self._position.size :])
+                    here_rad[joint] = self._units.position_rad(joint, raw)
+            if not np.isnan(here_rad).any():
+                break
+        names = self._identity.name, self._position.name
+        for joint in np.flatnonzero(np.isnan(here_rad)).tolist() if ask_again else ():
+            values = self._bus.read_each(self.robot.servo_ids[joint], names)
+            if values[IDENTITY] == identity(joint):
+                here_rad[joint] = self._units.position_rad(joint, values[self._position.name])
+        return here_rad
+
+    def _check_stillness(self, position_rad: Floats, found_rad: Floats, most_rad: float) -> None:
+        """Compare where the joints are with where they have just been found.
+
+        Raises:
+            ChainError: a joint is elsewhere, or it is not known where, though it should hold.
+
+        """
+        moved_rad = np.abs(position_rad - found_rad)
+        if np.nanmax(moved_rad, initial=0.0) <= most_rad and not np.isnan(moved_rad).any():
+            return
+        joint = int(np.argmax(np.where(np.isnan(moved_rad), np.inf, moved_rad)))
+        name = self.robot.joint_name(joint)
+        if np.isnan(moved_rad[joint]):
+            text = (
+                f"{name}: its servo does not tell that it is this joint's: two servos with one ID?"
+            )
+        else:
+            text = (
+                f"{name}: read {position_rad[joint] - found_rad[joint]:+.2f} rad from where it was "
+                "found just before: two servos with one ID, or moved by hand"
+            )
+        raise ChainError([text])
+
+    def hold(self) -> None:
+        """Set the goals to where the joints are.
+
+        A joint whose servo does not tell both in one reply, where it is and that it is this
+        joint's, keeps its goal: it does not reply, or two servos have one ID, or IDs were
+        exchanged.
 
         Raises:
             PortError: the port is gone.
 
         """
-        here_rad = self._readings.state(self._clock.now_s()).position_rad
-        if np.isfinite(here_rad).all():
-            believed = np.abs(here_rad - believed_rad) <= MOVED_RAD
-            self._send_goals(np.where(believed, here_rad, self._goal_rad))
+        here_rad = self._own_positions(_HOLD_READS)
+        self._send_goals(np.where(np.isfinite(here_rad), here_rad, self._goal_rad))
 
-    def _hold_and_arm(self, state: JointState) -> JointState:
-        """Goal = present, torque on, watchdog armed; every step read back."""
+    def _hold_and_arm(self, here_rad: Floats) -> JointState:
+        """Goal = present, torque on, watchdog armed; every step read back; the state then."""
         bus, ids = self._bus, self.robot.servo_ids
         bus.sync_write(ids, "Bus Watchdog", 0)  # goals follow at once, else an old goal counts
-        goals = self._send_goals(state.position_rad)
+        goals = self._send_goals(here_rad)
         self._expect("Goal Position", goals.tolist())
         bus.sync_write(ids, "Torque Enable", 1)
         self._expect("Torque Enable", [1] * len(ids))
@@ -275,7 +314,9 @@ class ServoChain:
             bus, self.robot, self._configured, ticks, fast=self._fast_reads
         )
         self._armed = True
-        return self.read()
+        state = self.read()
+        self._check_stillness(state.position_rad, here_rad, STILL_RAD)
+        return state
 
     def disable(self) -> None:
         """Torque off, then the watchdog, on every servo, also where others fail.
@@ -455,6 +496,10 @@ class ServoChain:
         bus, ids = self._bus, self.robot.servo_ids
         self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
+        table = bus.table_of(ids[0])
+        self._identity = table.register(IDENTITY)
+        self._position = table.register(table.state_names[-1])
+        self._identified: GroupCycle = bus.block(ids, IDENTITY, self._position.name, fast=False)
         self._fast_reads = fast
 
     def _budget(self, *, fast: bool) -> WireBudget:
