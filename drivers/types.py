@@ -60,7 +60,7 @@ class JointState(NamedTuple):
     """(J,) since position, velocity and current were last measured, at most: counted from the end
     of the request, as a servo measures between it and its reply."""
     valid: Bools
-    """(J,) whether this cycle's read succeeded."""
+    """(J,) whether a read of this cycle succeeded."""
     slow_age_s: Floats
     """(J,) the same for temperature and voltage; infinite until first read."""
     imu: ImuState | None = None

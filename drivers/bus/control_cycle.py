@@ -295,8 +295,9 @@ class ControlCycle:
             raw = self._with_surplus(request, raw, deadline_s)
         reply = request.parse(raw)
         while len(raw) >= request.reply_bytes and not reply.complete:
-            more = request.missing_bytes(raw)  # stuffed bytes come on top
-            got = self._port.read_until(more, deadline_s + self._wire_s(more)) if more else b""
+            more = request.missing_bytes(raw)  # stuffed bytes, or an older reply, come on top
+            surplus = len(raw) + more - expected
+            got = self._port.read_until(more, deadline_s + self._wire_s(surplus)) if more else b""
             if not got:
                 break
             raw += got
@@ -343,7 +344,7 @@ class ControlCycle:
         self.counters.timeouts += timed_out
         self.counters.unclean += not timed_out
         self._clean_in_a_row = 0
-        self._failed_in_a_row += 1
+        self._failed_in_a_row = 0 if reply.complete else self._failed_in_a_row + 1
         if self.fast and self._failed_in_a_row >= FAST_FAILURES:
             self.fast = False
             self.counters.fast_given_up += 1

@@ -99,9 +99,13 @@ class GroupReadRequest:
         return GroupReadReply(data, (error & _RESULT) == 0, error, everyone, clean=True, whole=True)
 
     def missing_bytes(self, raw: bytes) -> int:
-        """How many bytes more would complete plain replies that stuffing made longer; 0 if none."""
+        """How many bytes more would complete the replies; 0 if none would.
+
+        Stuffing made plain ones longer, or an older reply is in front.
+        """
         if self.fast:
-            return 0
+            start = raw.rfind(self._fast_head)
+            return HEAD if start < 0 else max(0, start + self.reply_bytes - len(raw))
         reader = PacketParser()
         missing = len(self.ids) - len(self._in_turn(reader.feed(raw))[0])
         return max(1, missing * self.frame_bytes - reader.pending) if missing else 0

@@ -190,8 +190,13 @@ class Readings:
         """When the oldest temperature and voltage were measured; before the first, -inf."""
         self._flags = self._frozen_flags()
 
-    def update(self, reply: GroupReadReply, measured_at_s: float) -> Sequence[int]:
-        """Take new state blocks; returns the joints whose alarm (register 70) must be read."""
+    def update(
+        self, reply: GroupReadReply, measured_at_s: float, *, again: bool = False
+    ) -> Sequence[int]:
+        """Take new state blocks; returns the joints whose alarm (register 70) must be read.
+
+        Where it is read ``again`` in a cycle, what came the first time is of this cycle as well.
+        """
         ok = reply.valid
         trouble = np.count_nonzero(reply.error) or self._alarmed
         if not trouble and np.count_nonzero(ok) == len(ok):  # the regular case
@@ -201,7 +206,7 @@ class Readings:
                 self._valid = ok
                 self._flags = self._frozen_flags()
             return ()
-        self._valid = ok
+        self._valid = ok | self._valid if again else ok
         motion = np.empty_like(self._motion)
         self._decoder.decode(reply.data, motion)
         self._motion[:, ok] = motion[:, ok]

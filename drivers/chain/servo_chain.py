@@ -25,6 +25,7 @@ from snakewalk.drivers.chain.start_up import (
     Inspection,
     check_pose,
     configure,
+    identity,
     identity_fault,
     inspect,
     let_reply,
@@ -48,7 +49,8 @@ _SLOW_S = 1.0
 _OFF_ROUNDS = 8
 """Group reads in which the servos may confirm that their torque is off (ours)."""
 _OFF_S = 1.0
-"""How long servos that do not are asked one by one, at most, s (ours)."""
+"""How long servos that do not are asked one by one, round after round, s (ours): longer than a line
+may be disturbed before the state is stale and for some tenths of a second after it."""
 _PORT_PATIENCE_S, _REOPEN_S = 2.0, 0.1
 """How long torque off waits for a port that is gone, and between the tries to open it (ours)."""
 _FIRST_READS = 5
@@ -56,6 +58,11 @@ _FIRST_READS = 5
 _LOSS_READS, _LOSSES = 100, 4
 """So many losses within so many reads show a bad line (ours): a servo that falls silent, or a
 computer that stands still for a while, is one loss."""
+_HOLD_READS = 2
+"""Reads in which the servos may tell where they are before they hold (ours)."""
+STILL_RAD = 0.1
+"""A joint that is read farther from where it was just set to hold is not the one that holds
+(ours)."""
 
 
 class ServoChain:
@@ -180,10 +187,10 @@ class ServoChain:
     def resume(self, found: Recheck) -> JointState:
         """Go on after an interruption: torque that is on stays on, nothing moves.
 
-        A joint that is read elsewhere than ``found`` it is not gone on with: two servos with one
-        ID reply in turn, and the goal of the one would be where the other stands. Servos that lost
-        their torque or their settings (rebooted) are set up again. The others get their watchdog
-        cleared and, right behind it, goal = present.
+        A joint that is elsewhere than ``found``, or whose servo does not tell that it is this
+        joint's, is not gone on with: two servos with one ID reply in turn. Servos that lost their
+        torque or their settings (rebooted) are set up again. The others get their watchdog cleared
+        and, right behind it, goal = present.
 
         Raises:
             ChainError: ``found`` forbids it.
@@ -198,14 +205,14 @@ class ServoChain:
         return self._begin(found.position_rad)
 
     def _begin(self, found_rad: Floats | None = None) -> JointState:
-        """Read the first state, hold it and arm the watchdogs; torque is off if that fails."""
+        """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
         self._reads = 0
-        state = self._first_state()
-        check_pose(self.robot, state.position_rad)
+        check_pose(self.robot, self._first_state().position_rad)
         try:
-            if found_rad is not None:
-                self._check_stillness(state.position_rad, found_rad)
-            return self._hold_and_arm(state)
+            here_rad = self._own_positions(_FIRST_READS, ask_again=True)
+            before_rad = here_rad if found_rad is None else found_rad
+            self._check_stillness(here_rad, before_rad, MOVED_RAD)
+            return self._hold_and_arm(here_rad)
         except BaseException:
             self.disable()
             raise
@@ -229,46 +236,79 @@ class ServoChain:
         """
         self._bus.reopen()
 
-    def _check_stillness(self, position_rad: Floats, found_rad: Floats) -> None:
-        """Compare where the joints are read with where they have just been found.
+    def _own_positions(self, reads: int, *, ask_again: bool = False) -> Floats:
+        """(J,) where each joint is, by a reply that also tells which joint's its servo is.
 
-        Raises:
-            ChainError: a joint is elsewhere, though its servo should hold.
-
-        """
-        moved_rad = position_rad - found_rad
-        joint = int(np.argmax(np.abs(moved_rad)))
-        if not abs(moved_rad[joint]) <= MOVED_RAD:
-            raise ChainError(
-                [
-                    f"{self.robot.joint_name(joint)}: read {moved_rad[joint]:+.2f} rad from where "
-                    "it was found just before: two servos with one ID, or moved by hand"
-                ]
-            )
-
-    def hold(self, believed_rad: Floats) -> None:
-        """Set the goals to the positions that were last read.
-
-        A joint that was read far from where it is believed to be keeps its goal: two servos have
-        one ID, or IDs were exchanged.
+        So no joint is given the place of another whose servo has the same ID, or its ID.
 
         Args:
-            believed_rad: (J,) where the joints were when their readings could last be believed.
+            reads: how often all are asked; NaN for a joint whose servo has not told it.
+            ask_again: ask those alone: one may refuse to be read across registers that it lacks.
+
+        Raises:
+            BusError: a servo that is asked alone does not reply.
+            PortError: the port is gone.
+
+        """
+        here_rad = np.full(self.joint_count, np.nan)
+        for _ in range(reads):
+            reply = self._identified.read()
+            for joint in np.flatnonzero(reply.valid & np.isnan(here_rad)).tolist():
+                row = reply.data[joint].tobytes()
+                if self._identity.decode(row) == identity(joint):
+                    raw = self._position.decode(row[-self._position.size :])
+                    here_rad[joint] = self._units.position_rad(joint, raw)
+            if not np.isnan(here_rad).any():
+                break
+        names = self._identity.name, self._position.name
+        for joint in np.flatnonzero(np.isnan(here_rad)).tolist() if ask_again else ():
+            values = self._bus.read_each(self.robot.servo_ids[joint], names)
+            if values[IDENTITY] == identity(joint):
+                here_rad[joint] = self._units.position_rad(joint, values[self._position.name])
+        return here_rad
+
+    def _check_stillness(self, position_rad: Floats, found_rad: Floats, most_rad: float) -> None:
+        """Compare where the joints are with where they have just been found.
+
+        Raises:
+            ChainError: a joint is elsewhere, or it is not known where, though it should hold.
+
+        """
+        moved_rad = np.abs(position_rad - found_rad)
+        if np.nanmax(moved_rad, initial=0.0) <= most_rad and not np.isnan(moved_rad).any():
+            return
+        joint = int(np.argmax(np.where(np.isnan(moved_rad), np.inf, moved_rad)))
+        name = self.robot.joint_name(joint)
+        if np.isnan(moved_rad[joint]):
+            text = (
+                f"{name}: its servo does not tell that it is this joint's: two servos with one ID?"
+            )
+        else:
+            text = (
+                f"{name}: read {position_rad[joint] - found_rad[joint]:+.2f} rad from where it was "
+                "found just before: two servos with one ID, or moved by hand"
+            )
+        raise ChainError([text])
+
+    def hold(self) -> None:
+        """Set the goals to where the joints are.
+
+        A joint whose servo does not tell both in one reply, where it is and that it is this
+        joint's, keeps its goal: it does not reply, or two servos have one ID, or IDs were
+        exchanged.
 
         Raises:
             PortError: the port is gone.
 
         """
-        here_rad = self._readings.state(self._clock.now_s()).position_rad
-        if np.isfinite(here_rad).all():
-            believed = np.abs(here_rad - believed_rad) <= MOVED_RAD
-            self._send_goals(np.where(believed, here_rad, self._goal_rad))
+        here_rad = self._own_positions(_HOLD_READS)
+        self._send_goals(np.where(np.isfinite(here_rad), here_rad, self._goal_rad))
 
-    def _hold_and_arm(self, state: JointState) -> JointState:
-        """Goal = present, torque on, watchdog armed; every step read back."""
+    def _hold_and_arm(self, here_rad: Floats) -> JointState:
+        """Goal = present, torque on, watchdog armed; every step read back; the state then."""
         bus, ids = self._bus, self.robot.servo_ids
         bus.sync_write(ids, "Bus Watchdog", 0)  # goals follow at once, else an old goal counts
-        goals = self._send_goals(state.position_rad)
+        goals = self._send_goals(here_rad)
         self._expect("Goal Position", goals.tolist())
         bus.sync_write(ids, "Torque Enable", 1)
         self._expect("Torque Enable", [1] * len(ids))
@@ -279,13 +319,16 @@ class ServoChain:
             bus, self.robot, self._configured, ticks, fast=self._fast_reads
         )
         self._armed = True
-        return self.read()
+        state = self.read()
+        self._check_stillness(state.position_rad, here_rad, STILL_RAD)
+        return state
 
     def disable(self) -> None:
         """Torque off, then the watchdog, on every servo, also where others fail.
 
-        Servos that do not confirm it in a group read are asked once more, for a limited time. Where
-        one of several ports is gone, the servos on the others are off before it is waited for.
+        Servos that do not confirm it in a group read are asked one by one, again and again for a
+        limited time: their watchdogs may be disarmed. Where one of several ports is gone, the
+        servos on the others are off before it is waited for.
 
         Raises:
             BusError: servos that did not confirm; their watchdog stays armed and stops them.
@@ -362,20 +405,25 @@ class ServoChain:
                 break
             bus.sync_write(self._ids_of(joints), "Torque Enable", 0)
         give_up_s = self._clock.now_s() + _OFF_S
-        silent = []
-        for joint in joints:  # those behind a silent servo stay silent in a group read
-            try:
-                if self._clock.now_s() >= give_up_s:
-                    raise BusError("no time left")
-                bus.write(ids[joint], "Torque Enable", 0, tries=1)
-            except BusError:
-                silent.append(joint)
+        silent = joints  # those behind a silent servo stay silent in a group read
+        while silent and self._clock.now_s() < give_up_s:
+            silent = [joint for joint in silent if not self._is_off(bus, ids[joint], give_up_s)]
         confirmed = self._ids_of(joint for joint in on_it if joint not in silent)
         if confirmed:
             bus.sync_write(confirmed, "Bus Watchdog", 0)
             # the port may be closed right behind it: a reply shows that the packet has arrived
             bus.block(confirmed, "Bus Watchdog", "Bus Watchdog", fast=False).read()
         return silent
+
+    def _is_off(self, bus: DynamixelBus, servo_id: int, give_up_s: float) -> bool:
+        """Ask a servo alone to switch its torque off; whether it confirms that, in time."""
+        if self._clock.now_s() >= give_up_s:
+            return False
+        try:
+            bus.write(servo_id, "Torque Enable", 0, tries=1)
+        except BusError:
+            return False
+        return True
 
     def read(self) -> JointState:
         """Read all joints once; voltages and temperatures in every 16th call and when overdue.
@@ -396,11 +444,13 @@ class ServoChain:
         measured_at_s = self._take(reply)
         place = self._reads % SLOW_EVERY
         self._reads += 1
+        has_time = bool(reply.valid.all())
         if place == 0 or measured_at_s - self._readings.slow_at_s > _SLOW_S:
+            has_time = False
             reply = self._slow.read()
             self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
             self._readings.update_slow(reply, self._sent_at_s)
-        self._check_liveness()
+        self._check_liveness(has_time=has_time)
         imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
         if imu is not None:
@@ -408,26 +458,30 @@ class ServoChain:
         self.on_state(state)
         return state
 
-    def _take(self, reply: GroupReadReply) -> float:
-        """Take in a group read of the state; when it was measured, s."""
+    def _take(self, reply: GroupReadReply, *, again: bool = False) -> float:
+        """Take in a group read of the state, or one more in this cycle; when it was measured, s."""
         measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
-        for joint in self._readings.update(reply, measured_at_s):
+        for joint in self._readings.update(reply, measured_at_s, again=again):
             self._read_alarm(int(joint))
         return measured_at_s
 
-    def _check_liveness(self) -> None:
+    def _check_liveness(self, *, has_time: bool) -> None:
         """Check torque, watchdogs, settings; where a servo tells an alarm, that is the reason.
 
         An alarm that switches a servo off may come between the group read and the check.
+
+        Args:
+            has_time: the state is all that was read in this cycle, and all servos replied.
+
         """
         if not self._armed or self._liveness is None or self._readings.alert:
             return
         try:
-            asked = self._liveness.check(self._reads - 1)
+            asked = self._liveness.check(self._reads - 1, has_time=has_time)
             if asked is not None:
                 self._sent_at_s = self._clock.now_s() - asked.since_sent_s
         except BusError:
-            self._take(self._cycle.read())
+            self._take(self._cycle.read(), again=True)
             if not self._readings.alert:
                 raise
 
@@ -453,6 +507,10 @@ class ServoChain:
         bus, ids = self._bus, self.robot.servo_ids
         self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
+        table = bus.table_of(ids[0])
+        self._identity = table.register(IDENTITY)
+        self._position = table.register(table.state_names[-1])
+        self._identified: GroupCycle = bus.block(ids, IDENTITY, self._position.name, fast=False)
         self._fast_reads = fast
 
     def _budget(self, *, fast: bool) -> WireBudget:
@@ -489,7 +547,8 @@ class ServoChain:
         """
         expected = dict(enumerate(values))
         check = RegisterCheck.of(self._bus, self.robot, name, expected, fast=False)
-        for joint, got in check.differing(ask_again=self._bus).items():
+        differing, _ = check.compare(ask_again=self._bus)
+        for joint, got in differing.items():
             raise BusError(
                 f"{self.robot.joint_name(joint)}: {name} is {got} after {expected[joint]} was "
                 "written to all"
@@ -515,7 +574,8 @@ class ServoChain:
 class LivenessCheck:
     """Whether torque is still on, the watchdogs are armed, and no setting was lost.
 
-    One group read of one register at a time; servos that do not reply are not judged.
+    One group read of one register at a time. Servos that do not reply are not judged; the check is
+    made again in the next cycle that has time for it.
     """
 
     def __init__(
@@ -553,12 +613,15 @@ class LivenessCheck:
         (self._identity,) = kept([IDENTITY])
         self._settings = kept(RAM_SETTINGS)
         self._shaping = kept(SHAPING_SETTINGS)
+        self._missed: list[RegisterCheck] = []
+        """Not all servos replied to these; the oldest first."""
 
-    def check(self, cycle: int) -> GroupCycle | None:
+    def check(self, cycle: int, *, has_time: bool) -> GroupCycle | None:
         """Make the check whose turn it is in a cycle; the group read, if it asked all servos.
 
         In a round of ``SLOW_EVERY`` cycles: torque, watchdog, identity, one of the settings, and
-        two of those that shape the motion.
+        two of those that shape the motion. In between, where the cycle ``has_time``, one to which
+        not all servos have replied.
 
         Raises:
             BusError: a servo is not as it was set.
@@ -578,13 +641,19 @@ class LivenessCheck:
         elif place in (3, SLOW_EVERY - 5):
             turn = 2 * rounds + (place > SLOW_EVERY // 2)
             check = self._shaping[turn % len(self._shaping)]
+        if check is None and has_time and self._missed:
+            check = self._missed[0]
         if check is None:
             return None
         self._judge(check)
         return check.cycle if len(check.ids) == self._robot.joint_count else None
 
     def _judge(self, check: "RegisterCheck") -> None:
-        differing = check.differing()
+        differing, is_complete = check.compare()
+        if check in self._missed:
+            self._missed.remove(check)
+        if not is_complete:
+            self._missed.append(check)
         if not differing:
             return
         joint, value = next(iter(differing.items()))
@@ -604,7 +673,7 @@ class LivenessCheck:
         raise BusError(f"{', '.join(map(self._robot.joint_name, differing))}: {what}")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RegisterCheck:
     """Group read of one register, and what it must return."""
 
@@ -632,8 +701,8 @@ class RegisterCheck:
         register, values = bus.table_of(ids[0]).register(name), list(expected.values())
         return cls(register, cycle, ids, dict(expected), values)
 
-    def differing(self, ask_again: ChainBus | None = None) -> dict[int, int]:
-        """Read the register; the values that are not as expected, by joint.
+    def compare(self, ask_again: ChainBus | None = None) -> tuple[dict[int, int], bool]:
+        """Read the register; the values that are not as expected, by joint, and if all are known.
 
         Args:
             ask_again: asks those that are not in the reply one by one; without it they are not
@@ -647,8 +716,8 @@ class RegisterCheck:
         reply, register = self.cycle.read(), self.register
         kind = f"<{'i' if register.signed else 'u'}{register.size}"
         values = np.ascontiguousarray(reply.data).view(kind)[:, 0]
-        if reply.complete and values.tolist() == self.values:  # the usual case
-            return {}
+        if values.tolist() == self.values and reply.valid.all():  # the usual case
+            return {}, True
         found = {}
         for place, (joint, expected) in enumerate(self.expected.items()):
             if reply.valid[place]:
@@ -659,7 +728,7 @@ class RegisterCheck:
                 continue
             if got != expected:
                 found[joint] = got
-        return found
+        return found, ask_again is not None or bool(reply.valid.all())
 
 
 class _Losses:

@@ -45,8 +45,8 @@ class RecoverableLink(Protocol[C]):
         """Open the port again; raises ``PortError`` while it is not there."""
         ...
 
-    def hold(self, believed_rad: Floats) -> None:
-        """Set the goals to the positions that were last read, where these can be believed."""
+    def hold(self) -> None:
+        """Set the goals to where the joints are, as far as that is known."""
         ...
 
     def reboot(self, joint: int) -> None:
@@ -176,7 +176,7 @@ class Recovery(Generic[C]):
         while True:
             try:
                 if not held:
-                    self._chain.hold(believed_rad)
+                    self._chain.hold()
                     held = True
                 if to_reboot is not None:
                     self._chain.reboot(to_reboot)

@@ -4,6 +4,7 @@ import math
 import signal
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from types import FrameType, TracebackType
 from typing import Any
@@ -28,6 +29,9 @@ from snakewalk.drivers.types import JointCommand, JointState
 
 RESTART_S = 2.0
 """After a servo's reboot the goals' rate grows for so long until it is the limit again (ours)."""
+_OFF_TRIES = 3
+"""Reads after a trip that ask again for a torque off that was not confirmed (ours): each may take
+as long as the trip's own did."""
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 """SIGQUIT is Ctrl-\\. SIGTSTP is Ctrl-Z: a program that is stopped cannot switch torque off, and
 the watchdogs would leave the servos holding with torque on."""
@@ -38,10 +42,11 @@ class SafeLink:
 
     On a veto, on an error of the link below, on ``request_stop``, or when ``stop_requested``
     (called at each read and write) returns a reason, it latches: torque goes off, ``tripped`` says
-    why, ``write`` raises; ``read`` goes on, for the log. Only ``reset`` by an operator and a new
-    ``enable`` let it move again. Inside the context SIGTERM, SIGINT, SIGHUP,
-    SIGQUIT and SIGTSTP unwind the program through the exit, but for SIGHUP where it is ignored, as
-    under nohup; if it is killed, the servos' bus watchdog stops them.
+    why, ``write`` raises; ``read`` goes on, for the log, and asks a few times more for a torque off
+    that was not confirmed. Only ``reset`` by an operator and a new ``enable`` let it move again.
+    Inside the context SIGTERM, SIGINT, SIGHUP, SIGQUIT and SIGTSTP unwind the program through the
+    exit, but for SIGHUP where it is ignored, as under nohup; if it is killed, the servos' bus
+    watchdog stops them.
 
     With a ``recovery`` it does not latch at once when the line or a servo goes away: the chain
     holds, and goes on from where it stands if the policy of the recovery allows it; the same with a
@@ -77,6 +82,7 @@ class SafeLink:
         self._stop_requested: str | None = None
         self._asked_to_stop = stop_requested
         self._touched = False
+        self._off_tries = 0
         self._restarted_at_s = -math.inf
         self._handlers: dict[signal.Signals, object] = {}
 
@@ -143,6 +149,7 @@ class SafeLink:
         """Torque off; safe to call at any time, more than once."""
         self._memory = None
         self._link.disable()
+        self._off_tries = 0
 
     def read(self) -> JointState:
         """Read all joints; latches if the state is a reason to, and returns it all the same.
@@ -151,6 +158,8 @@ class SafeLink:
             SafetyTrippedError: the link below failed just now, and was not brought back.
 
         """
+        if self._off_tries > 0:
+            self._switch_off_again()
         try:
             state = self._link.read()
         except DriverError as fault:
@@ -292,6 +301,14 @@ class SafeLink:
             self.disable()
         except DriverError as fault:
             self.tripped += f" (torque off failed: {fault})"
+            self._off_tries = _OFF_TRIES
+
+    def _switch_off_again(self) -> None:
+        """Ask for the torque off that the trip could not confirm."""
+        self._off_tries -= 1
+        with suppress(DriverError):  # the trip has told it
+            self.disable()
+            self._on_event("torque off is confirmed now")
 
     def _stop(self) -> str | None:
         """Why somebody has asked for a stop; None where nobody has."""

@@ -5,6 +5,7 @@ The witness stamps every reading: during cycle k the servo of row j reports a cu
 on the wire, so a goal beyond a limit is seen where it counts.
 """
 
+from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -34,6 +35,8 @@ PATIENCE_S = 1.0
 JOINTS = ROBOT.joint_count
 TICK_RAD = 2 * np.pi / 4096
 HELD_RAD = 0.02
+HOLD_S = 0.05
+"""From where its joints are read to where the goals that hold them are on the line, s, at most."""
 NOTICED_CYCLES = 4 * SLOW_EVERY
 """A register is compared every third round at the latest; one more for an answer that is lost."""
 _STAMPS = 60
@@ -48,7 +51,7 @@ class Witness:
     """Goals on the wire beyond a joint limit, or farther ahead of the joint than allowed and not on
     their way back to it."""
     too_fast: int = 0
-    """Goals on the wire that move faster than allowed, unless to where the joint is."""
+    """Goals on the wire that move faster than allowed, unless to where the joint is or just was."""
     old: int = 0
     """Values taken for new that are of another cycle."""
     foreign: int = 0
@@ -96,9 +99,9 @@ class ChangeWatch:
         chain.on_event = self.lines.append
         check = chain._check_liveness
 
-        def watched() -> None:
+        def watched(*, has_time: bool) -> None:
             self._pending |= self._changed()
-            check()
+            check(has_time=has_time)
 
         chain._check_liveness = watched  # type: ignore[method-assign]
 
@@ -187,8 +190,8 @@ class Rig:
         self._low, self._high = self._raw_limits()
         self._cycle = 0
         self._seen: JointState | None = None
-        self._newest_rad = np.full(JOINTS, np.nan)
-        self.chain.on_state = self._take_newest
+        self._was_rad: deque[tuple[float, np.ndarray]] = deque()
+        """When, and where the servos of the joints were then."""
         self._sent: np.ndarray | None = None
         self._sent_at_s = 0.0
         self._steady = False
@@ -254,10 +257,15 @@ class Rig:
             )
             self._sin("not_held", ~ok & ~held)
 
-    def _take_newest(self, state: JointState) -> None:
-        self._newest_rad = state.position_rad
+    def _here_rad(self) -> np.ndarray:
+        """(J,) where the servo of each joint is."""
+        rows = rows_by_id(self.line.bank)
+        return self.line.firmware.plant.position_rad[slice(None) if rows is None else rows].copy()
 
     def _overhear(self, time_s: float, from_host: bool, data: bytes) -> None:
+        self._was_rad.append((time_s, self._here_rad()))
+        while self._was_rad[0][0] < time_s - HOLD_S:
+            self._was_rad.popleft()
         if not from_host:
             return
         for packet in PacketParser().feed(data):
@@ -272,8 +280,7 @@ class Rig:
     def _check_goals(self, time_s: float, raw: np.ndarray) -> None:
         goal = self._units.position_rad(raw)
         self._sin("beyond_limit", (raw < self._low) | (raw > self._high))
-        rows = rows_by_id(self.line.bank)
-        here = self.line.firmware.plant.position_rad[slice(None) if rows is None else rows]
+        here = self._here_rad()
         known = here if self._seen is None else self._seen.position_rad
         ahead = np.minimum(np.abs(goal - known), np.abs(goal - here))
         last = self._sent
@@ -284,10 +291,9 @@ class Rig:
         if last is not None and self._steady:
             dt_s = min(time_s - self._sent_at_s, self.limits.stale_limit_s) + 2e-3
             fast = np.abs(goal - last) > self.limits.goal_rate_rad_s * dt_s + TICK_RAD
-            # a chain that was interrupted holds: its goals are where its joints are, or were read
-            # in this very cycle
-            where = (known, here, self._newest_rad)
-            held = np.fmin.reduce([np.abs(goal - each) for each in where]) < HELD_RAD
+            # a chain that was interrupted holds: its goals are where its joints are, or just were
+            where = [rad for _, rad in self._was_rad]
+            held = np.minimum.reduce([np.abs(goal - each) for each in where]) < HELD_RAD
             self._sin("too_fast", fast & ~held)
         self._sent, self._sent_at_s = goal, time_s
 

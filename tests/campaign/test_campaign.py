@@ -138,8 +138,55 @@ def test_a_joint_whose_id_two_servos_have_is_not_sent_to_where_the_other_stands(
     assert run_scenario(kinds, 3001, 240).complaints == []
 
 
-def test_a_hold_where_the_joints_were_just_read_is_not_too_fast() -> None:
-    """The witness compared with the readings of the cycle before, from which fast joints go on."""
-    tally = run_scenario(("drop", "clash"), 3, 240)
+@pytest.mark.parametrize(
+    ("other", "seed"), [("overload", 3001), ("overload", 1013), ("feed-forward", 1003)]
+)
+def test_a_reading_of_another_servo_that_could_be_the_joints_own_is_no_goal_of_a_hold(
+    other: str, seed: int
+) -> None:
+    """Two servos of one ID stood within 0.3 rad of each other."""
+    tally = run_scenario(("clash", other), seed, 240)
+    assert tally.brought_back + tally.trips
+    assert tally.complaints == []
+
+
+def test_a_hold_where_the_joints_just_were_is_not_too_fast() -> None:
+    """Between the read and the hold the line is drained: fast joints go on for 10 ms."""
+    tally = run_scenario(("mute", "shock"), 5001, 240)
     assert tally.brought_back
+    assert tally.complaints == []
+
+
+@pytest.mark.parametrize(
+    ("kinds", "seed"),
+    [(("duplicate", "profile"), 5001), (("corrupt", "feed-forward"), 5001)],
+)
+def test_a_change_is_noticed_though_the_check_of_it_was_lost(
+    kinds: tuple[str, str], seed: int
+) -> None:
+    tally = run_scenario(kinds, seed, 240)
+    assert tally.noticed
+    assert tally.complaints == []
+
+
+def test_what_was_read_before_an_alarm_in_the_same_cycle_is_of_this_cycle() -> None:
+    """The servo was silent when the state was read once more for the alarm."""
+    tally = run_scenario(("mute", "shock"), 5000, 240)
+    assert tally.trips
+    assert tally.complaints == []
+
+
+@pytest.mark.parametrize(
+    ("kinds", "seed"),
+    [
+        (("drop", "watchdog"), 3002),
+        (("corrupt", "watchdog"), 5000),
+        (("truncate", "watchdog"), 1008),
+    ],
+)
+def test_a_trip_ends_safe_though_the_line_is_dead_and_the_watchdogs_are_disarmed(
+    kinds: tuple[str, str], seed: int
+) -> None:
+    tally = run_scenario(kinds, seed, 240)
+    assert tally.trips
     assert tally.complaints == []

@@ -43,6 +43,19 @@ def test_no_read_takes_the_copy_of_the_one_before(fast: bool, latency_s: float) 
     assert read > 60  # half of them: what is behind a copy is often lost
 
 
+def test_a_fast_read_finds_its_reply_behind_a_longer_copy() -> None:
+    """A check of a register was lost in every cycle in which the state came twice."""
+    line, bus = twice_on_the_line(0.001)
+    state, check = bus.cycle(IDS), bus.block(IDS, "Profile Velocity", "Profile Velocity")
+    line.bank["Profile Velocity"][:] = (5, 6, 7, 8)
+    for _ in range(5):
+        state.read()
+        reply = check.read()
+        assert reply.valid.all()
+        assert reply.data[:, 0].tolist() == [5, 6, 7, 8]
+        line.clock.advance(0.02)
+
+
 def test_no_register_is_taken_for_another() -> None:
     _, bus = twice_on_the_line(0.001)
     for value in (5, 77, 1023):

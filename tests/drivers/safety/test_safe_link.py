@@ -211,6 +211,44 @@ def test_a_torque_off_that_fails_after_a_trip_says_what_had_tripped(
     assert info.value.__notes__ == ["tripped by: a hand"]
 
 
+def test_a_torque_off_that_a_trip_could_not_confirm_is_asked_for_again(
+    joints: Joints, clock: SimClock
+) -> None:
+    """Another program may have disarmed the watchdogs: nothing else would end the torque."""
+    events: list[str] = []
+    link = SafeLink(joints, LIMITS, clock, on_event=events.append)
+    link.enable()
+    joints.disable_fault = BusError("servo 3: torque off is not confirmed")
+    link.request_stop("stop button")
+    link.read()
+    tripped = link.tripped
+    assert tripped == "stop button (torque off failed: servo 3: torque off is not confirmed)"
+    link.read()
+    assert events == []
+    joints.disable_fault, joints.torque = None, True
+    link.read()
+    assert not joints.torque
+    assert events == ["torque off is confirmed now"]
+    joints.torque = True
+    link.read()
+    assert joints.torque  # confirmed: not asked for any more
+    assert link.tripped == tripped
+
+
+def test_a_torque_off_that_nobody_confirms_does_not_hold_up_the_log_for_ever(
+    link: SafeLink, joints: Joints
+) -> None:
+    link.enable()
+    joints.disable_fault = BusError("servo 3: torque off is not confirmed")
+    link.request_stop("stop button")
+    asked = []
+    for _ in range(6):
+        joints.torque = True
+        link.read()
+        asked.append(not joints.torque)
+    assert asked == [True, True, True, True, False, False]
+
+
 @pytest.mark.parametrize(
     ("number", "raised"),
     [
