@@ -101,6 +101,11 @@ class WalkConfig(Strict):
         description="in simulation, on slopes over 8 degrees: pieces of a decision that a second "
         "simulated body tries where the best one fails there; 0: none",
     )
+    finds_friction: bool = Field(
+        True,
+        description="rollouts and tries reckon with the friction that the motion so far tells of, "
+        "where the file's is out; false: always with the file's",
+    )
     pitch: PitchConfig = PitchConfig()
     fallback: bool = Field(
         True, description="a serpenoid from the second miss of a waypoint on until it is reached"

@@ -201,13 +201,12 @@ class Rollout:
         self._links = self._table, retarget.edges, retarget.group_of_link
         self.segment_m = robot.length_m / points
         """Length of a segment."""
-        self._body = np.array(
-            [
-                friction.along,
-                friction.across,
-                robot.joint_speed_limit_rad_s,
-            ]
-        )
+        self._speed_limit_rad_s = robot.joint_speed_limit_rad_s
+        self.use_friction(friction)
+
+    def use_friction(self, friction: FrictionConfig) -> None:
+        """Roll out with this friction; what has begun goes on with that of before."""
+        self._body = np.array([friction.along, friction.across, self._speed_limit_rad_s])
 
     def change_ground(self, ground: HeightField) -> None:
         """Roll out on another ground from now on."""

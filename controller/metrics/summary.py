@@ -30,6 +30,19 @@ _KEYS = {"paths_replanned": "paths_laid_again"}
 
 
 @dataclass(frozen=True, slots=True)
+class SummarizedFriction:
+    """Friction under the body: that of the world's file, and what the run found."""
+
+    along_file: float
+    across_file: float
+    along: float
+    across: float
+    along_95: tuple[float, float]
+    """Interval of 95 %."""
+    across_95: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class RunSummary:
     """A run in numbers, SI units, six digits; None where the log cannot tell."""
 
@@ -118,6 +131,8 @@ class RunSummary:
     decisions_without_candidates: int
     state_library: dict[str, int]
     """Counts of recorded, random and refused states."""
+    friction_found: SummarizedFriction | None
+    """What the run found at last; None where it did not look for it."""
 
     def to_dict(self) -> dict[str, Any]:
         """Keys and values of ``summary.json``."""
@@ -197,6 +212,25 @@ def summary(record: RunRecord) -> RunSummary:
         states_visited=int(walk.visited.max(initial=0)),
         decisions_without_candidates=int(np.count_nonzero(walk.candidates == 0)),
         state_library=dict(header.plan.states or {}),
+        friction_found=_friction(record),
+    )
+
+
+def _friction(record: RunRecord) -> SummarizedFriction | None:
+    found, file = record.friction, record.header.world.friction
+    if not len(found.time_s):
+        return None
+
+    def last(values: Floats) -> float:
+        return float(f"{values[-1]:.3g}")
+
+    return SummarizedFriction(
+        file.along,
+        file.across,
+        last(found.along),
+        last(found.across),
+        (last(found.along_95[:, 0]), last(found.along_95[:, 1])),
+        (last(found.across_95[:, 0]), last(found.across_95[:, 1])),
     )
 
 

@@ -1,6 +1,6 @@
 """A run as its log tells it: one table a topic, rows in order of time, NaN where nothing is known.
 
-T, S, H, P, W count the rows of a topic; J joints, L links.
+T, S, H, P, W, F count the rows of a topic; J joints, L links.
 """
 
 from collections.abc import Mapping
@@ -210,6 +210,22 @@ class WalkTable:
 
 
 @dataclass(frozen=True, slots=True)
+class FrictionTable:
+    """Friction under the body, as the run found it."""
+
+    time_s: Floats
+    """(F,)"""
+    along: Floats
+    """(F,)"""
+    across: Floats
+    """(F,)"""
+    along_95: Floats
+    """(F, 2) interval of 95 %."""
+    across_95: Floats
+    """(F, 2)"""
+
+
+@dataclass(frozen=True, slots=True)
 class QposTable:
     """Generalised positions of the simulation."""
 
@@ -238,6 +254,7 @@ class RunRecord:
     slow: SlowTable
     pose: PoseTable
     walk: WalkTable
+    friction: FrictionTable
     qpos: QposTable
     shadow: ShadowTable
     imu: ImuTable

@@ -103,6 +103,13 @@ TOPICS: Final[dict[str, Json]] = {
         "candidates": _of("integer", "states within the heading tolerance"),
         "eta_q": _maybe("quasi-static gain of the state"),
     },
+    "/friction": {
+        "time_s": _TIME,
+        "along": _of("number", "friction along the body, forward, as found so far"),
+        "across": _of("number", "across it"),
+        "along_95": _list("(2,) interval of 95 %"),
+        "across_95": _list("(2,)"),
+    },
     "/event": {
         "time_s": _TIME,
         "level": {"enum": ["info", "warning", "error"]},

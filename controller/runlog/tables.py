@@ -15,6 +15,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.runlog.record import (
     CycleTable,
     Event,
+    FrictionTable,
     Header,
     ImuTable,
     InitialPose,
@@ -58,6 +59,7 @@ def record_of(
         slow=_slow(rows.get("/slow", ()), joints),
         pose=_pose(rows.get("/pose", ()), header.robot.link_count),
         walk=_walk(rows.get("/walk", ())),
+        friction=_friction(rows.get("/friction", ())),
         qpos=_qpos(rows.get("/qpos", ())),
         shadow=_shadow(rows.get("/shadow", ()), joints),
         imu=_imu(rows.get("/imu", ())),
@@ -192,6 +194,16 @@ def _walk(rows: Sequence[Row]) -> WalkTable:
         ramp_rad=_floats(rows, "ramp_rad"),
         candidates=_ints(rows, "candidates"),
         eta_q=_floats(rows, "eta_q"),
+    )
+
+
+def _friction(rows: Sequence[Row]) -> FrictionTable:
+    return FrictionTable(
+        time_s=_floats(rows, "time_s"),
+        along=_floats(rows, "along"),
+        across=_floats(rows, "across"),
+        along_95=_floats(rows, "along_95", 2),
+        across_95=_floats(rows, "across_95", 2),
     )
 
 

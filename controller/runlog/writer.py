@@ -16,7 +16,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import digest
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.config.world import WorldConfig
+from snakewalk.config.world import FrictionConfig, WorldConfig
 from snakewalk.controller.runlog.encode import (
     encode,
     exact,
@@ -248,6 +248,23 @@ class RunLog:
             "eta_q": number(eta_q),
         }
         self._add("/walk", time_s, row)
+
+    def friction(
+        self,
+        time_s: float,
+        friction: FrictionConfig,
+        along_95: tuple[float, float],
+        across_95: tuple[float, float],
+    ) -> None:
+        """Friction that was found under the body, and its intervals of 95 %."""
+        row = {
+            "time_s": time_s,
+            "along": number(friction.along),
+            "across": number(friction.across),
+            "along_95": floats(along_95),
+            "across_95": floats(across_95),
+        }
+        self._add("/friction", time_s, row)
 
     def event(self, time_s: float, kind: str, text: str, level: Level = "info") -> None:
         """Log something that happened; above ``info`` it is on the disk when this returns."""

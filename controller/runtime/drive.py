@@ -19,6 +19,7 @@ from snakewalk.controller.motion.source import MotionSource, StartsAnywhere
 from snakewalk.controller.runlog.record import MotorEnergy
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.derating import Derating
+from snakewalk.controller.runtime.friction_monitor import FrictionMonitor
 from snakewalk.controller.runtime.loop import Tick, ticks
 from snakewalk.controller.runtime.roll_monitor import RollMonitor
 from snakewalk.controller.runtime.slip_monitor import SlipMonitor
@@ -138,6 +139,7 @@ class Drive:
         wire_busy_s: Callable[[], float] = lambda: float("nan"),
         energy: Callable[[], MotorEnergy] = MotorEnergy,
         observer: CycleObserver | None = None,
+        friction: FrictionMonitor | None = None,
         on_progress: OnProgress = lambda progress: None,
         on_event: OnEvent = lambda kind, text: None,
     ) -> None:
@@ -150,6 +152,7 @@ class Drive:
         self._gain = gain
         self._slip_monitor = SlipMonitor(robot.length_m, gain, run.safety.advance_fraction)
         self._roll_monitor = RollMonitor()
+        self._friction_monitor = friction
         self._derating = Derating(run.safety, robot, self._on_derating)
         self._compliance = None if run.compliance is None else Compliance(run.compliance, robot)
         self._on_progress, self._on_event = on_progress, on_event
@@ -199,6 +202,7 @@ class Drive:
                 self._displacement_m = (
                     view.advance_since_m(self._last) if self._last is not None else 0.0
                 )
+                self._find_friction(view)
                 if self._run.waypoints_m:  # gaits may roll as they please
                     self._tell_roll(view)
                 if clock.now_s() < walk_s:
@@ -233,6 +237,20 @@ class Drive:
             self._waypoints,
             self._derating.least,
         )
+
+    def _find_friction(self, view: BodyView) -> None:
+        sent, monitor = self._link.last_verdict, self._friction_monitor
+        if monitor is None or sent is None:
+            return
+        found = monitor.update(view, sent.goal_rad)
+        if found is None:
+            return
+        now_s = self._clock.now_s()
+        self._log.friction(now_s, found.friction, found.along_95, found.across_95)
+        text = monitor.event_text()
+        if text is not None:
+            self._log.event(now_s, "friction", text)
+            self._on_event("friction", text)
 
     def _tell_roll(self, view: BodyView) -> None:
         text = self._roll_monitor.update(view, self._clock.now_s())

@@ -14,6 +14,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.roll_compensation import RollCompensation
@@ -89,6 +90,15 @@ class TriesPieces(Protocol):
     """A ``ShapeChooser`` that tries pieces where it is given the means."""
 
     try_piece: Callable[[PathPose, Floats], Rolled] | None
+
+
+@runtime_checkable
+class UsesFriction(Protocol):
+    """A motion, or a ``ShapeChooser``, that reckons with friction."""
+
+    def use_friction(self, friction: FrictionConfig) -> None:
+        """Reckon with this friction from now on."""
+        ...
 
 
 class Pilot(OnCourse):
@@ -262,6 +272,13 @@ class Pilot(OnCourse):
         if isinstance(self._chooser, TriesPieces):
             self._twin = twin
             self._chooser.try_piece = self._try_piece
+
+    def use_friction(self, friction: FrictionConfig) -> None:
+        """Reckon with this friction from now on: the chooser, and the twin."""
+        if isinstance(self._chooser, UsesFriction):
+            self._chooser.use_friction(friction)
+        if self._twin is not None:
+            self._twin.friction = friction
 
     def _try_piece(self, pose: PathPose, piece_rad: Floats) -> Rolled:
         """What becomes of the body on a piece (n,) that would be appended to the track."""

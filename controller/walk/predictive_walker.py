@@ -15,6 +15,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Indices
 from snakewalk.config.run import WalkConfig
+from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.mechanics.rollout import Rolled
 from snakewalk.controller.motion.path_progress import Decision
@@ -135,6 +136,10 @@ class PredictiveWalker:
     def think_anew(self) -> None:
         """Go on with another state."""
         self._thinking, self._until = None, self._at
+
+    def use_friction(self, friction: FrictionConfig) -> None:
+        """Roll out with this friction from now on."""
+        self.steering.use_friction(friction)
 
     def fall_back(self, lost: bool) -> None:
         """Set whether to go on as a serpenoid: at the very last, steered the same way."""

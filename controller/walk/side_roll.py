@@ -17,6 +17,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.gaits.rolling import Rolling, RollingParameters
 from snakewalk.controller.kinematics.links import BodyView
@@ -229,6 +230,10 @@ class SideRolls(OnCourse):
     def use_twin(self, twin: TwinRollout) -> None:
         """Let the walk try pieces of track on a twin of the robot."""
         self._pilot.use_twin(twin)
+
+    def use_friction(self, friction: FrictionConfig) -> None:
+        """Let the walk reckon with this friction from now on."""
+        self._pilot.use_friction(friction)
 
     def begin(self, view: BodyView) -> Floats:
         """(J,) where the walk begins."""

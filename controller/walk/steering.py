@@ -10,6 +10,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.mechanics.rollout import (
     ALONG,
@@ -133,6 +134,10 @@ class Steering:
         """Whether a body here, or a length on along its path, lies on a slope of 8 degrees."""
         points_m = pose.path.points_m[pose.path_at : pose.path_at + _AHEAD_POINTS : 6]
         return self._rollout.steepest(points_m + pose.centre_m - points_m[0]) > _STEEP
+
+    def use_friction(self, friction: FrictionConfig) -> None:
+        """Roll out with this friction, from the next decision on; what is left is drift."""
+        self._rollout.use_friction(friction)
 
     def forget(self) -> None:
         """Leave out what came before: the body has moved otherwise than by its track."""

@@ -9,6 +9,7 @@ from typing import Protocol, runtime_checkable
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world, chain_angles_rad
 from snakewalk.controller.mechanics.rollout import Followed, Rolled
 from snakewalk.controller.walk.steering import PathPose
@@ -28,6 +29,10 @@ class Twin(Protocol):
         """Put it where the robot is, moving as the robot did since ``dt_s`` ago."""
         ...
 
+    def use_friction(self, friction: FrictionConfig) -> None:
+        """Lay it on ground with this friction."""
+        ...
+
     def step(self, goal_rad: Floats, dt_s: float) -> tuple[BodyPose, Floats]:
         """Hold goals (J,) for ``dt_s``; returns the head's pose and the joints (J,) then."""
         ...
@@ -45,9 +50,13 @@ class UsesTwin(Protocol):
 class TwinRollout:
     """Rolls out motions of one robot on its twin."""
 
-    def __init__(self, robot: RobotConfig, make_twin: Callable[[], Twin]) -> None:
+    def __init__(
+        self, robot: RobotConfig, make_twin: Callable[[], Twin], friction: FrictionConfig
+    ) -> None:
+        """``make_twin`` is asked before each rollout, and may return the same one."""
         self._robot, self._make_twin = robot, make_twin
-        self._twin: Twin | None = None
+        self.friction = friction
+        """Of the ground that the twin is laid on."""
         self._seen: list[BodyView] = []
         self._dt_s = 0.0
 
@@ -71,20 +80,21 @@ class TwinRollout:
             move: takes the length of a cycle and the body; returns goals (J,).
 
         """
-        if self._twin is None:
-            self._twin = self._make_twin()
-        (before, before_rad), (now, now_rad) = self._state(0), self._state(-1)
-        self._twin.begin(before, now, before_rad, now_rad, self._dt_s)
+        twin, robot = self._make_twin(), self._robot
+        twin.use_friction(self.friction)
+        before, before_rad = seen_state(robot, self._seen[0])
+        now, now_rad = seen_state(robot, self._seen[-1])
+        twin.begin(before, now, before_rad, now_rad, self._dt_s)
         followed, time_s, view = Followed(pose.path, pose.path_at), 0.0, self._seen[-1]
         while time_s < _LONGEST_S and not is_over():
-            now, now_rad = self._twin.step(move(self._dt_s, view), self._dt_s)
-            view = body_in_world(self._robot, now, now_rad)
+            now, now_rad = twin.step(move(self._dt_s, view), self._dt_s)
+            view = body_in_world(robot, now, now_rad)
             time_s += self._dt_s
             followed.note(view.centre_m[:2], self._dt_s)
         return followed.rolled(view.headings_rad, view.link_m[:, :2] - view.centre_m[:2])
 
-    def _state(self, which: int) -> tuple[BodyPose, Floats]:
-        """Head's pose and joints (J,) of a body seen."""
-        view = self._seen[which]
-        pose = BodyPose(0.0, view.link_m[0], view.rotation[0])
-        return pose, chain_angles_rad(self._robot, view)
+
+def seen_state(robot: RobotConfig, view: BodyView) -> tuple[BodyPose, Floats]:
+    """Head's pose and joints (J,) of a body seen."""
+    pose = BodyPose(0.0, view.link_m[0], view.rotation[0])
+    return pose, chain_angles_rad(robot, view)

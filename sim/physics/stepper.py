@@ -491,4 +491,5 @@ class CompiledSteps:
             joints = m.model.dof_frictionloss, m.data.qfrc_bias, m.data.qfrc_constraint
             arrays = (*self._arrays, *motors, *links, *joints)
             self._addresses = np.array([each.ctypes.data for each in arrays], dtype=np.int64)
+        self._constants[:3] = self._m.mu  # it may have changed
         run_steps(steps, self._where, self._addresses, self._sizes, self._constants)

@@ -10,7 +10,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import WorldConfig
+from snakewalk.config.world import FrictionConfig, WorldConfig
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.plant import FLOOR_STEP_S, MujocoPlant
 from snakewalk.sim.servo.motor import MotorColumns, make_drive, motors_of, p_gain_per_rad
@@ -43,6 +43,10 @@ class PlantTwin:
 
         """
         self._plant.set_state(_qpos(before, before_rad), _qpos(now, now_rad), dt_s)
+
+    def use_friction(self, friction: FrictionConfig) -> None:
+        """Lay it on ground with this friction."""
+        self._plant.mechanics.mu = friction.along, friction.across, friction.backward
 
     def step(self, goal_rad: Floats, dt_s: float) -> tuple[BodyPose, Floats]:
         """Hold goals (J,) for ``dt_s``; returns the head's pose and the joints (J,) then.

@@ -147,6 +147,12 @@ def _tiles(n: RunSummary) -> list[str]:
         _tile("Missed deadlines", missed, wire),
         _tile("Safety", _count(n.clamps, "clamp"), f"{vetoes}, {_count(n.alarms, 'alarm')}"),
     ]  # fmt: skip
+    found = n.friction_found
+    if found is not None:
+        tiles.append(
+            _tile("Friction found", f"{found.along:.2f} along, {found.across:.2f} across",
+                  f"world's file: {found.along_file:g}, {found.across_file:g}")
+        )  # fmt: skip
     if n.waypoints == 0:  # a gait has no path, and its shape need not go along the body
         return [_tile("Travelled", f"{_fmt(n.travelled_m, 2)} m", took), *tiles[5:]]
     return tiles

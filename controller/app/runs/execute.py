@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -11,10 +12,12 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import DeviationConfig, RunConfig
+from snakewalk.config.world import FlatGround, WaterGround
 from snakewalk.controller.app.messages import LOGGER
 from snakewalk.controller.app.report.artifacts import write_summary
 from snakewalk.controller.app.result_files import LOG, clear_run, refuse_another_run
 from snakewalk.controller.app.runs.backend import (
+    Backend,
     is_split,
     metal,
     on_ports,
@@ -34,8 +37,15 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import InitialPose, RunRecord, Winding
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outcome
+from snakewalk.controller.runtime.friction_monitor import (
+    FrictionMonitor,
+    OnPaper,
+    OnTwin,
+    SlideModel,
+)
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
+from snakewalk.controller.walk.pilot import UsesFriction
 from snakewalk.controller.walk.twin_rollout import TwinRollout, UsesTwin
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError
@@ -162,8 +172,7 @@ def execute(
             map_provider(prepared, backend, pose.measure, folder, log_event) as mapped,
         ):
             source = prepared.make_source(log_event)
-            if backend.twin is not None and _may_try(prepared) and isinstance(source, UsesTwin):
-                source.use_twin(TwinRollout(robot, backend.twin))
+            friction = _second_body(prepared, source, backend)
             if waypoint_commands is not None:
                 source = _live(prepared, source, waypoint_commands, log_event)
             link = SafeLink(
@@ -187,6 +196,7 @@ def execute(
                 wire_busy_s=backend.wire_busy_s,
                 energy=backend.energy,
                 observer=beside,
+                friction=friction,
                 on_progress=on_progress,
                 on_event=on_event,
             )
@@ -219,11 +229,34 @@ def _live(
     return LiveCourse(cast(MotionOnCourse, source), commands, prepared.check_waypoint, on_event)
 
 
-def _may_try(prepared: PreparedRun) -> bool:
-    """Whether a second body stands where the first does, on ground that is known, a bare snake."""
-    run, robot = prepared.run, prepared.robot
-    known = prepared.ground is not None and run.mapping is None
-    return known and run.pose_is_true and not robot.limb_joints
+def _second_body(
+    prepared: PreparedRun, source: MotionSource, backend: Backend
+) -> FrictionMonitor | None:
+    """Let a bare snake that walks ground that is known use a second body, where there is one.
+
+    Returns:
+        What finds the friction under a walk: on that body; without one, on a level floor, on paper.
+        None where the pose tells nothing of it: by the joints or an IMU it takes friction as known.
+
+    """
+    run, world, robot = prepared.run, prepared.world, prepared.robot
+    if run.mapping is not None or robot.limb_joints:
+        return None
+    twin = cache(backend.twin) if backend.twin is not None and run.pose_is_true else None
+    if twin is not None and prepared.ground is not None and isinstance(source, UsesTwin):
+        source.use_twin(TwinRollout(robot, twin, world.friction))
+    finds = run.motion == "walk" and run.walk.finds_friction and isinstance(source, UsesFriction)
+    measured = run.pose == "camera" or (run.pose_is_true and backend.pose is not None)
+    if not finds or not measured or isinstance(world.ground, WaterGround):
+        return None
+    if twin is not None:
+        model: SlideModel = OnTwin(robot, twin)
+    elif isinstance(world.ground, FlatGround) and world.obstacle is None:
+        model = OnPaper()
+    else:
+        return None
+    use = cast(UsesFriction, source).use_friction
+    return FrictionMonitor(world.friction, model, 1.0 / run.cycle_hz, use)
 
 
 @contextmanager

@@ -230,3 +230,14 @@ def test_a_link_that_weighs_nothing_does_not_slow_the_others() -> None:
     ]
     assert gone[0] > gone[1] - 0.02
     assert gone[2] < 0.8 * gone[1]  # an anchor
+
+
+def test_with_another_friction_it_rolls_out_as_one_that_was_made_with_it() -> None:
+    slick = FrictionConfig(along=0.2, across=0.4)
+    changed = rollout(plane(0.1, 0.05))
+    before = roll(changed, sine(102, 60)[None])
+    changed.use_friction(slick)
+    after = roll(changed, sine(102, 60)[None])
+    made = roll(rollout(plane(0.1, 0.05), slick), sine(102, 60)[None])
+    np.testing.assert_array_equal(after.centre_m, made.centre_m)
+    assert np.hypot(*(after.centre_m - before.centre_m)[0]) > 0.01

@@ -8,6 +8,7 @@ import pytest
 
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_run, load_world
+from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.runlog.record import MotorEnergy, PlanSummary, Winding
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.types import JointState
@@ -81,6 +82,7 @@ def write_log(path: Path, cycles: int) -> Path:
                     candidates=3,
                 )
                 log.qpos(t, np.arange(23) + 0.5)
+        log.friction(1.0, FrictionConfig(along=0.13, across=0.56), (0.11, 0.15), (0.5, 0.6))
         log.path_replanned(1.0, [[0.0, 1.0], [2.0, 2.0]])
     return path
 

@@ -49,6 +49,9 @@ def test_every_table_comes_back(
     assert record.pose.rotation.shape == (120, 3, 3)
     assert np.isnan(record.pose.speed_m_s).all()
     assert record.walk.state.tolist() == [0, 40, 80]
+    assert (record.friction.along.tolist(), record.friction.across.tolist()) == ([0.13], [0.56])
+    assert record.friction.along_95.tolist() == [[0.11, 0.15]]
+    assert record.friction.across_95.tolist() == [[0.5, 0.6]]
     assert record.qpos.qpos.shape == (3, 23)
     assert [e.kind for e in record.events] == ["start"]
     assert [t for t, _ in record.paths] == [0.0, 1.0]

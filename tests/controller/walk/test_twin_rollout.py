@@ -3,6 +3,7 @@
 import numpy as np
 
 from snakewalk.config.loader import load_robot
+from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.mechanics.rollout import PathTable
 from snakewalk.controller.walk.steering import PathPose
@@ -34,6 +35,9 @@ class Glider:
         self.velocity_m_s = (now.head_in_world_m - before.head_in_world_m) / dt_s
         self.begun_rad = now_rad
 
+    def use_friction(self, friction: FrictionConfig) -> None:
+        self.friction = friction
+
     def step(self, goal_rad: np.ndarray, dt_s: float) -> tuple[BodyPose, np.ndarray]:
         self.head_m = self.head_m + self.velocity_m_s * dt_s
         return BodyPose(0.0, self.head_m, np.eye(3)), goal_rad
@@ -51,7 +55,7 @@ def rolled_m(rollout: TwinRollout, cycles: int) -> float:
 
 def test_it_begins_where_the_body_is_with_its_speed_and_joints() -> None:
     glider = Glider()
-    rollout = TwinRollout(ROBOT, lambda: glider)
+    rollout = TwinRollout(ROBOT, lambda: glider, FrictionConfig())
     centre_m = -body(0.0).centre_m[0] + 0.2  # here the centre is at the path's twentieth point
     rollout.observe(body(centre_m - 0.01, 0.1), DT_S)
     rollout.observe(body(centre_m), DT_S)
@@ -61,23 +65,26 @@ def test_it_begins_where_the_body_is_with_its_speed_and_joints() -> None:
 
 def test_after_forgetting_a_body_is_at_rest() -> None:
     """It has moved meanwhile otherwise, for longer than a cycle: that is no speed."""
-    rollout = TwinRollout(ROBOT, Glider)
+    rollout = TwinRollout(ROBOT, Glider, FrictionConfig())
     rollout.observe(body(-3.0), DT_S)
     rollout.forget()
     rollout.observe(body(0.0), DT_S)
     assert abs(rolled_m(rollout, 40)) < 0.25
 
 
-def test_a_twin_is_made_when_it_is_needed_and_once() -> None:
-    made: list[Glider] = []
+def test_each_rollout_lays_the_twin_on_the_friction_of_the_moment() -> None:
+    glider = Glider()
+    asked: list[Glider] = []
 
     def make() -> Glider:
-        made.append(Glider())
-        return made[-1]
+        asked.append(glider)
+        return glider
 
-    rollout = TwinRollout(ROBOT, make)
+    rollout = TwinRollout(ROBOT, make, FrictionConfig())
     rollout.observe(body(0.0), DT_S)
-    assert not made
-    rolled_m(rollout, 2)
-    rolled_m(rollout, 2)
-    assert len(made) == 1
+    assert not asked  # a twin is made when it is first needed
+    for along in (0.1, 0.2):
+        rollout.friction = FrictionConfig(along=along)
+        glider.friction = FrictionConfig(along=0.5)  # another has used it meanwhile
+        rolled_m(rollout, 2)
+        assert glider.friction.along == along

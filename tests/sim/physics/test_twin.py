@@ -3,6 +3,7 @@
 import numpy as np
 
 from snakewalk.config.loader import load_robot, load_world
+from snakewalk.config.world import FrictionConfig
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.physics.twin import PlantTwin
@@ -43,3 +44,19 @@ def test_it_foretells_a_body_that_moves() -> None:
         drive.goal_rad[:] = wave(k * DT_S)
         plant.advance((k + 1) * DT_S, drive)
     assert len(foretold) == 3
+
+
+def test_on_another_friction_it_slides_as_one_that_was_made_for_it() -> None:
+    slick = FrictionConfig(along=0.15, across=0.3)
+    changed = PlantTwin(ROBOT, WORLD, None)
+    made = PlantTwin(ROBOT, WORLD.model_copy(update={"friction": slick}), None)
+    pose = BodyPose(0.0, np.array([0.0, 0.0, ROBOT.body_radius_m]), np.eye(3))
+
+    def moved(twin: PlantTwin) -> np.ndarray:
+        twin.begin(pose, pose, wave(0.0), wave(0.0), DT_S)
+        return [twin.step(wave(k * DT_S), DT_S)[0].head_in_world_m for k in range(40)][-1]
+
+    before = moved(changed)
+    changed.use_friction(slick)
+    np.testing.assert_array_equal(moved(changed), moved(made))
+    assert np.hypot(*(moved(changed) - before)[:2]) > 0.005

@@ -1,0 +1,177 @@
+"""Friction filter: the friction under a body, found from where it slid.
+
+An extended Kalman filter on the logarithms of the friction along and across. It begins at the
+world's file and returns to it while nothing is measured. Each span of motion is foretold under
+three hypotheses by whatever model there is; where the body really went moves the estimate.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.world import FrictionConfig
+
+_PRIOR = 0.4
+"""Standard deviation of the logarithm about the file's (ours): half to twice it in 95 %."""
+_MEMORY_S = 40.0
+"""In which the estimate returns to the file by a factor of e (ours)."""
+_STRAY = 0.1
+"""By which the friction of one span may differ from that of the ground (ours): no span alone tells
+it better, however much the body slid."""
+_STEP = 0.1
+"""Of the logarithms, between the hypotheses (ours)."""
+_MOST = 0.3
+"""By which a span moves an estimate at most (ours)."""
+_BOUND = math.log(4.0)
+_DOUBT, _TRUST = 9.21, 1.39
+"""Squared distance of the file from the estimate, in standard deviations, from which on the file is
+out, and below which it holds again: 99 % and 50 % of chi square with two degrees of freedom."""
+_NORMAL_95 = 1.96
+_ROOT = math.sqrt(0.5)
+
+
+class _Square(NamedTuple):
+    """A symmetric matrix of two rows: sums have one order, so bits are the same everywhere."""
+
+    uu: float
+    uv: float
+    vv: float
+
+    @property
+    def inverse(self) -> "_Square":
+        """Of a positive definite one."""
+        whole = self.uu * self.vv - self.uv * self.uv
+        return _Square(self.vv / whole, -self.uv / whole, self.uu / whole)
+
+    def plus(self, other: "_Square", times: float = 1.0) -> "_Square":
+        """With ``times`` another added."""
+        return _Square(*(a + times * b for a, b in zip(self, other, strict=True)))
+
+    def times(self, u: float, v: float) -> tuple[float, float]:
+        """Product with a vector."""
+        return self.uu * u + self.uv * v, self.uv * u + self.vv * v
+
+    def about(self, u: float, v: float) -> float:
+        """Quadratic form of a vector."""
+        a, b = self.times(u, v)
+        return u * a + v * b
+
+
+@dataclass(frozen=True, slots=True)
+class FoundFriction:
+    """What was found so far."""
+
+    friction: FrictionConfig
+    """Best estimate."""
+    along_95: tuple[float, float]
+    """Interval of 95 %."""
+    across_95: tuple[float, float]
+    differs: bool
+    """Whether the file's friction is out."""
+
+
+class FrictionFilter:
+    """Estimates the friction along and across a body.
+
+    Its axes are u, both logarithms greater, which moves nothing on a level floor and has to tell
+    nothing there, and v, along against across.
+    """
+
+    def __init__(self, file: FrictionConfig, sigma: Sequence[float]) -> None:
+        """Begin at the file's friction.
+
+        Args:
+            file: of the world.
+            sigma: three standard deviations of what a model foretells, in the unit of ``update``.
+
+        """
+        self._file = file
+        self._weights = [1.0 / each**2 for each in sigma]
+        self._prior = _Square(_PRIOR**2, 0.0, _PRIOR**2)
+        self._u = self._v = 0.0
+        self._covariance = self._prior
+        self._differs = False
+
+    def hypotheses(self) -> tuple[FrictionConfig, ...]:
+        """The three under which the next span is to be foretold: the estimate first."""
+        u, v = self._u, self._v
+        return self._friction(u, v), self._friction(u + _STEP, v), self._friction(u, v + _STEP)
+
+    def update(self, measured: Floats, foretold: Floats, span_s: float) -> FoundFriction:
+        """Take a span of motion.
+
+        Args:
+            measured: (3,) way ahead and to the left, m, and turn, rad.
+            foretold: (3, 3) a row under each of ``hypotheses``; what is not finite tells nothing.
+            span_s: its length.
+
+        """
+        kept = math.exp(-span_s / _MEMORY_S)
+        before = _Square(*(kept**2 * each for each in self._covariance))
+        self._covariance = before.plus(self._prior, 1.0 - kept**2)
+        rows = [measured.tolist(), *foretold.tolist()]
+        if all(math.isfinite(each) for row in rows for each in row):
+            self._correct(*rows)
+        self._u = min(max(kept * self._u, -_BOUND), _BOUND)
+        self._v = min(max(kept * self._v, -_BOUND), _BOUND)
+        away = self._covariance.inverse.about(self._u, self._v)
+        self._differs = away > (_TRUST if self._differs else _DOUBT)
+        return self.found
+
+    def _correct(
+        self, measured: list[float], here: list[float], by_u: list[float], by_v: list[float]
+    ) -> None:
+        """Move the estimate by what the body did beside what was foretold under it."""
+        gap = [m - h for m, h in zip(measured, here, strict=True)]
+        gap[2] = math.remainder(gap[2], 2.0 * math.pi)
+        slopes = [
+            ((a - h) / _STEP, (b - h) / _STEP) for a, b, h in zip(by_u, by_v, here, strict=True)
+        ]
+        whole, information, pull_u, pull_v = 0.0, _Square(0.0, 0.0, 0.0), 0.0, 0.0
+        for weight, g, (u, v) in zip(self._weights, gap, slopes, strict=True):
+            whole += weight * g * g
+            information = information.plus(_Square(u * u, u * v, v * v), weight)
+            pull_u, pull_v = pull_u + weight * u * g, pull_v + weight * v * g
+        span, about = self._of_span(information, 1.0)
+        excess = max(1.0, (whole - about.about(pull_u, pull_v)) / len(gap))
+        span, about = self._of_span(information, excess)  # what is far off counts the less
+        u, v = about.times(pull_u / excess, pull_v / excess)
+        cov, to_span = self._covariance, span.inverse
+        u, v = cov.times(*to_span.times(u, v))
+        self._u += min(max(u, -_MOST), _MOST)
+        self._v += min(max(v, -_MOST), _MOST)
+        less = span.plus(about, -1.0)
+        first, second = (to_span.times(*row) for row in ((cov.uu, cov.uv), (cov.uv, cov.vv)))
+        both = less.times(*second)
+        self._covariance = _Square(
+            cov.uu - less.about(*first),
+            cov.uv - (first[0] * both[0] + first[1] * both[1]),
+            cov.vv - less.about(*second),
+        )
+
+    def _of_span(self, information: _Square, excess: float) -> tuple[_Square, _Square]:
+        """Covariance of the friction of one span before and after it, its noise in excess."""
+        span = self._covariance.plus(_Square(_STRAY**2, 0.0, _STRAY**2), excess)
+        return span, span.inverse.plus(information, 1.0 / excess).inverse
+
+    @property
+    def found(self) -> FoundFriction:
+        """The estimate."""
+        mean, (uu, uv, vv) = self._friction(self._u, self._v), self._covariance
+        along = math.exp(_NORMAL_95 * math.sqrt(0.5 * (uu + vv) + uv))
+        across = math.exp(_NORMAL_95 * math.sqrt(0.5 * (uu + vv) - uv))
+        return FoundFriction(
+            mean,
+            (mean.along / along, mean.along * along),
+            (mean.across / across, mean.across * across),
+            self._differs,
+        )
+
+    def _friction(self, u: float, v: float) -> FrictionConfig:
+        """The file's times a factor along, backward too, and one across."""
+        file, along, across = self._file, math.exp(_ROOT * (u + v)), math.exp(_ROOT * (u - v))
+        back = None if file.back is None else min(file.back * along, 5.0)
+        given = {"along": min(file.along * along, 5.0), "across": min(file.across * across, 5.0)}
+        return FrictionConfig(**given, back=back)

@@ -1,0 +1,203 @@
+"""Friction monitor: what the friction under the body is, found while it moves.
+
+Every second and a half the motion that was measured is replayed by a model under three frictions,
+one a cycle; which of them brings the body to where it came tells the ground's. The model is a twin,
+or the balance of forces on a level floor.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final, Protocol
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.kinematics.links import BodyView, body_in_world
+from snakewalk.controller.mechanics.friction_filter import FoundFriction, FrictionFilter
+from snakewalk.controller.mechanics.rigid_motion import rigid_velocity
+from snakewalk.controller.walk.twin_rollout import Twin, seen_state
+
+SPAN_S = 1.5
+"""Of motion that is replayed (ours): in less the speed that it begins with counts too much, in more
+bodies go apart."""
+_STRIDE = 5
+"""Cycles in a step on paper."""
+_NOTABLE = 0.25
+"""Change of a friction, over what was last told, from which on it is told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A span of measured motion of C cycles."""
+
+    views: tuple[BodyView, ...]
+    """(C + 2) at the cycles: the first is the one before it begins."""
+    goals_rad: tuple[Floats, ...]
+    """C of (J,): what was sent in each."""
+    cycle_s: float
+
+    @property
+    def slid(self) -> Floats:
+        """(3,) way ahead and to the left of the mean line, m, and turn, rad."""
+        end = self.views[-1]
+        return self.slid_to(end.centre_m[:2], float(end.headings_rad.mean()))
+
+    def slid_to(self, centre_m: Floats, heading_rad: float) -> Floats:
+        """(3,) the same of a body that came to another centre (2,) and mean heading."""
+        begin = self.views[1]
+        mean = float(begin.headings_rad.mean())
+        (x, y), c, s = centre_m - begin.centre_m[:2], np.cos(mean), np.sin(mean)
+        return np.array([c * x + s * y, c * y - s * x, heading_rad - mean])
+
+
+class SlideModel(Protocol):
+    """Foretells where a body comes to."""
+
+    @property
+    def sigma(self) -> tuple[float, float, float]:
+        """Standard deviations, m, m and rad."""
+        ...
+
+    def slid(self, span: Span, friction: FrictionConfig) -> Floats:
+        """(3,) as ``Span.slid``, on ground with this friction; NaN where it cannot tell."""
+        ...
+
+
+class OnTwin:
+    """A ``SlideModel``: physics moves a second body by the goals that were sent."""
+
+    sigma: Final = (0.012, 0.012, 0.035)
+    """A little more than the median error with the true friction on rough slopes, 3 mm and 0.6
+    degrees in a second, calls for (ours): now and then a link that gets stuck is far off."""
+
+    def __init__(self, robot: RobotConfig, make_twin: Callable[[], Twin]) -> None:
+        self._robot, self._make_twin = robot, make_twin
+
+    def slid(self, span: Span, friction: FrictionConfig) -> Floats:
+        """As ``SlideModel``."""
+        twin, robot = self._make_twin(), self._robot
+        twin.use_friction(friction)
+        (before, before_rad), (now, now_rad) = (seen_state(robot, v) for v in span.views[:2])
+        try:
+            twin.begin(before, now, before_rad, now_rad, span.cycle_s)
+            for goal_rad in span.goals_rad:
+                now, now_rad = twin.step(goal_rad, span.cycle_s)
+        except RuntimeError:  # it has diverged
+            return np.full(3, np.nan)
+        end = body_in_world(robot, now, now_rad)
+        return span.slid_to(end.centre_m[:2], float(end.headings_rad.mean()))
+
+
+class OnPaper:
+    """A ``SlideModel`` of a level floor: friction under the measured shapes is in balance."""
+
+    sigma: Final = (0.02, 0.02, 0.05)
+    """With room for what a camera is off (ours). On hills it is no model: few links bear the body,
+    and it would be taken for friction."""
+
+    def slid(self, span: Span, friction: FrictionConfig) -> Floats:
+        """As ``SlideModel``."""
+        views, last = span.views, len(span.views) - 1
+        centre_m = views[1].centre_m[:2].copy()
+        heading, velocity = float(views[1].headings_rad.mean()), None
+        for here, there in pairwise([*range(1, last, _STRIDE), last]):
+            step_s = (there - here) * span.cycle_s
+            (here_m, here_rad), (there_m, there_rad) = _shape(views[here]), _shape(views[there])
+            velocity = rigid_velocity(
+                _turned(0.5 * (here_m + there_m), heading),
+                heading + 0.5 * (here_rad + there_rad),
+                _turned((there_m - here_m) / step_s, heading),
+                friction,
+                velocity,
+            )
+            centre_m += velocity[:2] * step_s
+            heading += float(velocity[2]) * step_s
+        return span.slid_to(centre_m, heading)
+
+
+def _shape(view: BodyView) -> tuple[Floats, Floats]:
+    """Links' centres (L, 2) and headings (L,) about the body's centre and mean heading."""
+    mean = float(view.headings_rad.mean())
+    return _turned((view.link_m - view.centre_m)[:, :2], -mean), view.headings_rad - mean
+
+
+def _turned(points_m: Floats, by_rad: float) -> Floats:
+    """Points (L, 2) turned about the origin."""
+    (x, y), c, s = points_m.T, np.cos(by_rad), np.sin(by_rad)
+    return np.stack([c * x - s * y, s * x + c * y], axis=1)
+
+
+class FrictionMonitor:
+    """Call ``update`` once a cycle."""
+
+    def __init__(
+        self,
+        file: FrictionConfig,
+        model: SlideModel,
+        cycle_s: float,
+        use: Callable[[FrictionConfig], None],
+    ) -> None:
+        """Begin with the file's friction.
+
+        Args:
+            file: of the world.
+            model: foretells motion.
+            cycle_s: length of a control cycle.
+            use: given the friction to reckon with when it changes: the file's until that is out.
+
+        """
+        self._file, self._model, self._cycle_s, self._use = file, model, cycle_s, use
+        self._filter = FrictionFilter(file, model.sigma)
+        self._count = max(1, round(SPAN_S / cycle_s))
+        self._views: list[BodyView] = []
+        self._goals_rad: list[Floats] = []
+        self._replays: Iterator[FoundFriction | None] = iter(())
+        self._used = self._reported = file
+
+    def update(self, view: BodyView, goal_rad: Floats) -> FoundFriction | None:
+        """Take the measured body, and the goals (J,) that were sent in the cycle before.
+
+        Returns:
+            What is found now, when a span has been judged; else None.
+
+        """
+        self._views.append(view)
+        self._goals_rad.append(goal_rad)
+        if len(self._views) == self._count + 2:
+            span = Span(tuple(self._views), tuple(self._goals_rad[2:]), self._cycle_s)
+            self._replays = self._judge(span)
+            del self._views[:-2], self._goals_rad[:-2]
+        found = next(self._replays, None)
+        if found is not None:
+            friction = found.friction if found.differs else self._file
+            if friction != self._used:
+                self._used = friction
+                self._use(friction)
+        return found
+
+    def event_text(self) -> str | None:
+        """A line when the friction that is reckoned with has changed notably since the last one."""
+        used, reported = self._used, self._reported
+        change = max(
+            abs(used.along / reported.along - 1.0), abs(used.across / reported.across - 1.0)
+        )
+        if change < _NOTABLE:
+            return None
+        self._reported, file = used, self._file
+        if used == file:
+            return "the friction found is that of the world's file again"
+        return (
+            f"found {used.along:.2f} along and {used.across:.2f} across the body; the world's file "
+            f"has {file.along:g} and {file.across:g}"
+        )
+
+    def _judge(self, span: Span) -> Iterator[FoundFriction | None]:
+        """Replay a span, a hypothesis a cycle; what is found comes last."""
+        foretold = []
+        for friction in self._filter.hypotheses():
+            foretold.append(self._model.slid(span, friction))
+            yield None
+        yield self._filter.update(span.slid, np.array(foretold), self._count * self._cycle_s)

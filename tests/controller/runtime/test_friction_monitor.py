@@ -1,0 +1,169 @@
+"""The friction monitor: a body that slides by a friction tells of it."""
+
+import numpy as np
+import pytest
+
+from snakewalk.config.loader import load_robot
+from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.kinematics.links import BodyView, body_in_world, mean_heading_rad
+from snakewalk.controller.mechanics.friction_filter import FoundFriction
+from snakewalk.controller.mechanics.rigid_motion import rigid_velocity
+from snakewalk.controller.runtime.friction_monitor import (
+    SPAN_S,
+    FrictionMonitor,
+    OnPaper,
+    OnTwin,
+    Span,
+)
+from snakewalk.drivers.types import BodyPose
+
+ROBOT = load_robot("yaw16")
+FILE = FrictionConfig(along=0.1, across=0.7)
+CYCLE_S = 0.02
+CYCLES = round(SPAN_S / CYCLE_S)
+
+
+def posed(joint_rad: np.ndarray, heading_rad: float, centre_m: np.ndarray) -> BodyView:
+    """The body with its centre and mean heading there."""
+    turn = heading_rad - mean_heading_rad(ROBOT, joint_rad)
+    c, s = np.cos(turn), np.sin(turn)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    there = body_in_world(ROBOT, BodyPose(0.0, np.zeros(3), rotation), joint_rad)
+    head_m = np.append(centre_m, 0.03) - there.centre_m * [1.0, 1.0, 0.0]
+    return body_in_world(ROBOT, BodyPose(0.0, head_m, rotation), joint_rad)
+
+
+def joints_rad(time_s: float) -> np.ndarray:
+    """A wave that turns one way and the other."""
+    phase = 2.0 * np.pi * (0.4 * time_s + np.arange(ROBOT.joint_count) / 14.0)
+    return np.asarray(0.4 * np.sin(phase) + 0.05 * np.sin(0.7 * time_s))
+
+
+def sliding(friction: FrictionConfig, seconds: float) -> list[BodyView]:
+    """A body that slides by a friction, in steps of a cycle."""
+    centre_m, heading = np.zeros(2), 0.3
+    views = [posed(joints_rad(0.0), heading, centre_m)]
+    for k in range(round(seconds / CYCLE_S)):
+        here = views[-1]
+        there = posed(joints_rad((k + 1) * CYCLE_S), heading, centre_m)
+        velocity = rigid_velocity(
+            (0.5 * (here.link_m + there.link_m) - here.centre_m)[:, :2],
+            0.5 * (here.headings_rad + there.headings_rad),
+            (there.link_m - here.link_m)[:, :2] / CYCLE_S,
+            friction,
+        )
+        centre_m = centre_m + velocity[:2] * CYCLE_S
+        heading += float(velocity[2]) * CYCLE_S
+        views.append(posed(joints_rad((k + 1) * CYCLE_S), heading, centre_m))
+    return views
+
+
+def watched(friction: FrictionConfig) -> tuple[list[FoundFriction], list[FrictionConfig]]:
+    """What is found of 30 s, and what is to be reckoned with."""
+    used: list[FrictionConfig] = []
+    monitor = FrictionMonitor(FILE, OnPaper(), CYCLE_S, used.append)
+    told = [monitor.update(view, joints_rad(0.0)) for view in sliding(friction, 30.0)]
+    return [found for found in told if found is not None], used
+
+
+@pytest.mark.parametrize("factors", [(1.5, 0.8), (1.0, 0.5), (1.5, 1.5)])
+def test_the_friction_that_a_body_slides_by_is_found(factors: tuple[float, float]) -> None:
+    """On a level floor motion tells the ratio; each friction lies within its wide interval."""
+    planted = FrictionConfig(along=0.1 * factors[0], across=0.7 * factors[1])
+    found, used = watched(planted)
+    last = found[-1]
+    assert last.along_95[0] < planted.along < last.along_95[1]
+    assert last.across_95[0] < planted.across < last.across_95[1]
+    ratio = planted.across / planted.along
+    assert last.friction.across / last.friction.along == pytest.approx(ratio, rel=0.1)
+    assert used[-1:] == ([last.friction] if last.differs else [])
+    assert last.differs == (factors[0] != factors[1])
+
+
+def test_a_body_as_the_file_says_leaves_the_file_in_force() -> None:
+    found, used = watched(FILE)
+    assert len(found) == 19
+    assert used == []
+    assert found[-1].friction.along == pytest.approx(0.1, rel=0.03)
+
+
+class Notes:
+    """A model that notes what it is asked, and does not know."""
+
+    sigma = np.array([0.01, 0.01, 0.03])
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[Span, FrictionConfig]] = []
+
+    def slid(self, span: Span, friction: FrictionConfig) -> np.ndarray:
+        self.asked.append((span, friction))
+        return np.full(3, np.nan)
+
+
+def test_a_span_is_replayed_with_the_goals_of_its_cycles_one_friction_a_cycle() -> None:
+    """Goals of cycle k bring it from view k to view k + 1; no cycle is left out between spans."""
+    notes = Notes()
+    monitor = FrictionMonitor(FILE, notes, CYCLE_S, lambda friction: None)
+    views = [posed(np.zeros(ROBOT.joint_count), 0.0, np.array([k, 0.0])) for k in range(250)]
+    counts = []
+    for k, view in enumerate(views):
+        monitor.update(view, np.full(ROBOT.joint_count, k - 1.0))
+        counts.append(len(notes.asked))
+    assert max(np.diff(counts)) == 1
+    spans = [span for span, _ in notes.asked[::3]]
+    begins = []
+    for span in spans:
+        x_m = [view.centre_m[0] for view in span.views]
+        at = [round(x - views[0].centre_m[0]) for x in x_m]
+        assert at == list(range(at[0], at[0] + CYCLES + 2))
+        assert [goal[0] for goal in span.goals_rad] == at[1:-1]
+        begins.append(at[1])
+    assert begins == [1, 1 + CYCLES, 1 + 2 * CYCLES]
+    assert notes.asked[0][1] == FILE
+
+
+def test_what_cannot_be_foretold_changes_nothing() -> None:
+    used: list[FrictionConfig] = []
+    monitor = FrictionMonitor(FILE, Notes(), CYCLE_S, used.append)
+    for view in sliding(FrictionConfig(along=0.3, across=0.5), 5.0):
+        monitor.update(view, joints_rad(0.0))
+        assert monitor.event_text() is None
+    assert used == []
+
+
+class Diverges:
+    """A twin whose physics comes to no end."""
+
+    def use_friction(self, friction: FrictionConfig) -> None:
+        pass
+
+    def begin(
+        self,
+        before: BodyPose,
+        now: BodyPose,
+        before_rad: np.ndarray,
+        now_rad: np.ndarray,
+        dt_s: float,
+    ) -> None:
+        pass
+
+    def step(self, goal_rad: np.ndarray, dt_s: float) -> tuple[BodyPose, np.ndarray]:
+        raise RuntimeError("the physics diverged")
+
+
+def test_a_twin_that_diverges_tells_nothing() -> None:
+    views = tuple(sliding(FILE, 0.1))
+    span = Span(views, tuple(joints_rad(0.0) for _ in views[2:]), CYCLE_S)
+    assert np.isnan(OnTwin(ROBOT, Diverges).slid(span, FILE)).all()
+
+
+def test_news_are_notable_changes_in_words() -> None:
+    used: list[FrictionConfig] = []
+    monitor = FrictionMonitor(FILE, OnPaper(), CYCLE_S, used.append)
+    lines = []
+    for view in sliding(FrictionConfig(along=0.2, across=0.7), 20.0):
+        monitor.update(view, joints_rad(0.0))
+        lines += [line for line in [monitor.event_text()] if line is not None]
+    assert 1 <= len(lines) <= 3
+    assert lines[0].startswith("found 0.1")
+    assert lines[0].endswith("the world's file has 0.1 and 0.7")
