@@ -36,7 +36,8 @@ from snakewalk.controller.mechanics.rigid_motion import (
 )
 from snakewalk.drivers.compiling import compiled, inlined, readonly_array
 
-_STEP_SEGMENTS = 4.0
+STEP_SEGMENTS = 4.0
+"""Of a step: ends are 1 cm ahead and 3 mm aside of where steps of half a segment end (ours)."""
 _BACK, _FORTH = 5, 40
 """Points of the path among which a place is looked for after a step."""
 _AHEAD = 30
@@ -287,7 +288,7 @@ class RolloutTree:
         count, length = pieces_rad.shape
         if pulse is None:
             pulse = len(self._samples) + length - self._head
-        steps = max(1, round(pulse / _STEP_SEGMENTS))
+        steps = max(1, round(pulse / STEP_SEGMENTS))
         before = self._make_room(count, length, steps)
         self._pieces[before : self._count] = pieces_rad
         out = np.empty((count, _COLUMNS))
