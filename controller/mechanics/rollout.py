@@ -37,7 +37,7 @@ from snakewalk.controller.mechanics.rigid_motion import (
 from snakewalk.drivers.compiling import compiled, inlined, readonly_array
 
 STEP_SEGMENTS = 4.0
-"""Of a step: ends are 1 cm ahead and 3 mm aside of where steps of half a segment end (ours)."""
+"""Of a step (ours): ends lie 1 cm along the way and 3 to 5 mm aside of those by steps of 0.5."""
 _BACK, _FORTH = 5, 40
 """Points of the path among which a place is looked for after a step."""
 _AHEAD = 30
