@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats, Int32s
+from snakewalk.config.arrays import Bools, Floats, Int32s
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.budget import WireBudget, robot_budget
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
@@ -390,7 +390,7 @@ class ServoChain:
         reply = self._cycle.read()
         if self._fast_reads and not self._cycle.fast:
             self._report_plain_reads()
-        losses = self._losses.update(whole=bool(reply.valid.all()))
+        losses = self._losses.update(reply.valid)
         if losses is not None:
             self.on_event(losses)
         measured_at_s = self._take(reply)
@@ -658,26 +658,34 @@ class RegisterCheck:
 
 
 class _Losses:
-    """Replies that are lost again and again: the line is bad, not a servo."""
+    """Replies that are lost again and again, or of all servos: the line is bad, not a servo."""
 
     def __init__(self) -> None:
         self._began: deque[int] = deque()  # numbers of reads, each the first of a loss
         self._reads = 0
-        self._whole, self._shown = True, False
+        self._whole, self._any, self._shown = True, True, False
 
-    def update(self, *, whole: bool) -> str | None:
-        """Count a read; a line for the user, the first time that there are many losses."""
+    def update(self, valid: Bools) -> str | None:
+        """Count a read; a line for the user, the first time that there is reason for one.
+
+        ``valid`` is (J,): which joints were read.
+        """
         self._reads += 1
+        whole, some = bool(valid.all()), bool(valid.any())
         if self._whole and not whole:
             self._began.append(self._reads)
-        self._whole = whole
+        nobody = not (some or self._any)
+        self._whole, self._any = whole, some
         while self._began and self._began[0] <= self._reads - _LOSS_READS:
             self._began.popleft()
-        if self._shown or len(self._began) < _LOSSES:
+        if self._shown or not (nobody or len(self._began) >= _LOSSES):
             return None
         self._shown = True
         span = self._reads - self._began[0] + 1
+        found = f"replies got lost {_LOSSES} times within {span} reads:"
+        if nobody:
+            found = "no servo was read in two reads in a row: no power,"
         return (
-            f"replies got lost {_LOSSES} times within {span} reads: noise, a loose plug, another "
-            "program on the line, or a computer that is too busy; see snakewalk doctor"
+            f"{found} noise, a loose plug, another program on the line, or a computer that is too "
+            "busy; see snakewalk doctor"
         )

@@ -473,12 +473,24 @@ def test_torque_off_is_confirmed_on_a_line_that_loses_a_fifth_of_the_packets() -
 
 
 def test_replies_that_get_lost_again_and_again_are_told_once() -> None:
-    chain, line, events = noisy(0.04, 1)
+    chain, line, events = noisy(0.02, 1)
     for _ in range(200):
         chain.read()
         line.clock.advance(0.02)
-    assert [event.partition(" within")[0] for event in events] == ["replies got lost 4 times"]
+    assert [event[:24] for event in events] == ["replies got lost 4 times"]
     assert "snakewalk doctor" in events[0]
+
+
+def test_a_line_on_which_nobody_is_read_any_more_is_told(chain: ServoChain, line: Recorder) -> None:
+    """Where another program takes the replies, a run stops before four of them are lost."""
+    chain.enable()
+    events: list[str] = []
+    chain.on_event = events.append
+    line.tamper = lambda raw: []
+    chain.read()
+    assert events == []
+    chain.read()
+    assert [event[:42] for event in events] == ["no servo was read in two reads in a row: n"]
 
 
 def test_a_servo_that_falls_silent_is_no_bad_line(chain: ServoChain, line: Recorder) -> None:
@@ -489,7 +501,7 @@ def test_a_servo_that_falls_silent_is_no_bad_line(chain: ServoChain, line: Recor
     line.refresh_ids()
     for _ in range(50):
         chain.read()
-    assert not [event for event in events if "got lost" in event]
+    assert not [event for event in events if "got lost" in event or "no servo" in event]
 
 
 def test_ids_that_are_exchanged_between_two_runs_are_told_at_the_start(
