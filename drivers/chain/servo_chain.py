@@ -380,6 +380,8 @@ class ServoChain:
     def read(self) -> JointState:
         """Read all joints once; voltages and temperatures in every 16th call and when overdue.
 
+        Where no joint could be read nothing else is asked: that is put off to the next call.
+
         Raises:
             BusError: a servo has lost its torque or a setting (it has rebooted, or another program
                 has written to it), or its watchdog has stopped it or is not armed.
@@ -394,19 +396,25 @@ class ServoChain:
         if losses is not None:
             self.on_event(losses)
         measured_at_s = self._take(reply)
-        place = self._reads % SLOW_EVERY
-        self._reads += 1
-        if place == 0 or measured_at_s - self._readings.slow_at_s() > _SLOW_S:
-            reply = self._slow.read()
-            self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
-            self._readings.update_slow(reply, self._sent_at_s)
-        self._check_liveness()
-        imu = None if self._imu is None else self._imu.read(self.on_event)
+        imu = None
+        if reply.valid.any():  # else what is asked beside it waits, too, and the state grows stale
+            self._reads += 1
+            self._read_slow(measured_at_s)
+            self._check_liveness()
+            imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
         if imu is not None:
             state = state._replace(imu=imu)
         self.on_state(state)
         return state
+
+    def _read_slow(self, measured_at_s: float) -> None:
+        """Read voltages and temperatures, if it is their turn or they are overdue."""
+        its_turn = (self._reads - 1) % SLOW_EVERY == 0
+        if its_turn or measured_at_s - self._readings.slow_at_s() > _SLOW_S:
+            reply = self._slow.read()
+            self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
+            self._readings.update_slow(reply, self._sent_at_s)
 
     def _take(self, reply: GroupReadReply) -> float:
         """Take in a group read of the state; when it was measured, s."""
