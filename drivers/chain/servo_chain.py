@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats, Int32s
+from snakewalk.config.arrays import Bools, Floats, Int32s
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.budget import WireBudget, robot_budget
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
@@ -428,6 +428,8 @@ class ServoChain:
     def read(self) -> JointState:
         """Read all joints once; voltages and temperatures in every 16th call and when overdue.
 
+        Where no joint could be read nothing else is asked: that is put off to the next call.
+
         Raises:
             BusError: a servo has lost its torque or a setting (it has rebooted, or another program
                 has written to it), or its watchdog has stopped it or is not armed.
@@ -438,25 +440,31 @@ class ServoChain:
         reply = self._cycle.read()
         if self._fast_reads and not self._cycle.fast:
             self._report_plain_reads()
-        losses = self._losses.update(whole=bool(reply.valid.all()))
+        losses = self._losses.update(reply.valid)
         if losses is not None:
             self.on_event(losses)
         measured_at_s = self._take(reply)
-        place = self._reads % SLOW_EVERY
-        self._reads += 1
-        has_time = bool(reply.valid.all())
-        if place == 0 or measured_at_s - self._readings.slow_at_s > _SLOW_S:
-            has_time = False
-            reply = self._slow.read()
-            self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
-            self._readings.update_slow(reply, self._sent_at_s)
-        self._check_liveness(has_time=has_time)
-        imu = None if self._imu is None else self._imu.read(self.on_event)
+        imu = None
+        if reply.valid.any():  # else what is asked beside it waits, too, and the state grows stale
+            self._reads += 1
+            is_alone = not self._read_slow(measured_at_s)
+            self._check_liveness(has_time=is_alone and bool(reply.valid.all()))
+            imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
         if imu is not None:
             state = state._replace(imu=imu)
         self.on_state(state)
         return state
+
+    def _read_slow(self, measured_at_s: float) -> bool:
+        """Read voltages and temperatures, if it is their turn or they are overdue; if they were."""
+        its_turn = (self._reads - 1) % SLOW_EVERY == 0
+        if not its_turn and measured_at_s - self._readings.slow_at_s <= _SLOW_S:
+            return False
+        reply = self._slow.read()
+        self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
+        self._readings.update_slow(reply, self._sent_at_s)
+        return True
 
     def _take(self, reply: GroupReadReply, *, again: bool = False) -> float:
         """Take in a group read of the state, or one more in this cycle; when it was measured, s."""
@@ -732,26 +740,34 @@ class RegisterCheck:
 
 
 class _Losses:
-    """Replies that are lost again and again: the line is bad, not a servo."""
+    """Replies that are lost again and again, or of all servos: the line is bad, not a servo."""
 
     def __init__(self) -> None:
         self._began: deque[int] = deque()  # numbers of reads, each the first of a loss
         self._reads = 0
-        self._whole, self._shown = True, False
+        self._whole, self._any, self._shown = True, True, False
 
-    def update(self, *, whole: bool) -> str | None:
-        """Count a read; a line for the user, the first time that there are many losses."""
+    def update(self, valid: Bools) -> str | None:
+        """Count a read; a line for the user, the first time that there is reason for one.
+
+        ``valid`` is (J,): which joints were read.
+        """
         self._reads += 1
+        whole, some = bool(valid.all()), bool(valid.any())
         if self._whole and not whole:
             self._began.append(self._reads)
-        self._whole = whole
+        nobody = not (some or self._any)
+        self._whole, self._any = whole, some
         while self._began and self._began[0] <= self._reads - _LOSS_READS:
             self._began.popleft()
-        if self._shown or len(self._began) < _LOSSES:
+        if self._shown or not (nobody or len(self._began) >= _LOSSES):
             return None
         self._shown = True
         span = self._reads - self._began[0] + 1
+        found = f"replies got lost {_LOSSES} times within {span} reads:"
+        if nobody:
+            found = "no servo was read in two reads in a row: no power,"
         return (
-            f"replies got lost {_LOSSES} times within {span} reads: noise, a loose plug, another "
-            "program on the line, or a computer that is too busy; see snakewalk doctor"
+            f"{found} noise, a loose plug, another program on the line, or a computer that is too "
+            "busy; see snakewalk doctor"
         )

@@ -10,7 +10,7 @@ from types import FrameType
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
 from snakewalk.controller.app.messages import plain
-from snakewalk.drivers.errors import DriverError
+from snakewalk.drivers.errors import DriverError, PortError
 
 _ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)
@@ -36,10 +36,11 @@ def main() -> None:
 
         _tell_of_pipes()
         app(prog_name="snakewalk")
-    except InputError as error:
-        *first, last = error.faults
+    except PortError as error:
         began = bool(getattr(error, "__notes__", []))  # of a run, whose port has vanished
-        _end(1 if began else 2, *first, _with_notes(last, error))
+        _end(1 if began else 2, _with_notes("; ".join(error.faults), error))
+    except InputError as error:
+        _end(2, *error.faults)
     except DriverError as error:
         _end(1, _with_notes(str(error), error))
     except ModuleNotFoundError as error:

@@ -1,6 +1,6 @@
 """Reads a bus and puts the checks in order; writes nothing to a servo unless the joints wiggle."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from snakewalk.config.robot import RobotConfig
@@ -26,6 +26,8 @@ from snakewalk.drivers.protocol.registers import BAUDS, ServoUnits
 
 _MEASURED = ("Realtime Tick", "Present Temperature")
 """Registers that differ between two servos, however alike they are."""
+_PINGED = 6
+"""So many missing servos are pinged at each baud rate; for more a broadcast is quicker (ours)."""
 _NOISE_TRIES = 10
 """How often a request is made on a noisy line (ours)."""
 
@@ -73,7 +75,7 @@ def examine(
     if noise is not None:
         bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s, tries=_NOISE_TRIES)
     missing = [i for i in expected if i not in found]
-    elsewhere = _at_other_bauds(port, missing, on_progress) if missing else {}
+    elsewhere = _at_other_bauds(port, robot.models_by_id, missing, latency_s, on_progress)
     here = servos.presence(expected, found, elsewhere, baud, port.name)
     findings += here if noise is None else [*here, noise]
     on_progress("who else is there")
@@ -234,8 +236,27 @@ def _unreadable(error: BusError, noise: Finding | None) -> Finding:
 
 
 def _at_other_bauds(
-    port: BytePort, missing: Sequence[int], on_progress: Callable[[str], None]
+    port: BytePort,
+    models: Mapping[int, str],
+    missing: Sequence[int],
+    latency_s: float,
+    on_progress: Callable[[str], None],
 ) -> dict[int, int]:
-    others = [baud for baud in BAUDS if baud != port.getBaudRate()]
-    answering = scan(port, others, on_progress=on_progress)
-    return {s.servo_id: s.baud for s in answering.servos if s.servo_id in missing}
+    """Which of the missing servos answer at another baud rate, and at which."""
+    if not missing:
+        return {}
+    before = port.getBaudRate()
+    others = [baud for baud in BAUDS if baud != before]
+    if len(missing) > _PINGED:
+        answering = scan(port, others, on_progress=on_progress)
+        return {s.servo_id: s.baud for s in answering.servos if s.servo_id in missing}
+    found: dict[int, int] = {}
+    bus = DynamixelBus(port, models, latency_s=latency_s)
+    try:
+        for baud in others:
+            on_progress(f"{baud} baud")
+            if port.setBaudRate(baud):
+                found |= dict.fromkeys(bus.find(i for i in missing if i not in found), baud)
+    finally:
+        port.setBaudRate(before)
+    return found

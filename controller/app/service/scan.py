@@ -109,11 +109,14 @@ def scan(
     port: BytePort,
     bauds: Sequence[int] = (),
     on_progress: Callable[[str], None] = lambda step: None,
+    *,
+    patient: bool = True,
 ) -> ScanReport:
     """Ask at each baud rate, the likely ones first; leaves the port at the one it had.
 
     Where somebody answers, or bytes come damaged, all are asked again until nobody new answers: on
-    a bad line requests and replies get lost.
+    a bad line requests and replies get lost. Where nobody does, likely rates are asked again, if
+    ``patient``.
 
     Raises:
         PortError: the port vanished.
@@ -128,16 +131,16 @@ def scan(
         for baud in asked:
             on_progress(f"{baud} baud")
             if port.setBaudRate(baud):
-                replies[baud], lost = _answers(port, noise)
+                replies[baud], lost = _answers(port, noise, patient=patient)
                 lossy |= lost
         bad = lossy or bool(noise)
         silent = not any(replies.values())
         likely = {*_LIKELY, before, *(noise if silent else ())}
         again = [baud for baud in asked if baud in likely]
-        for baud in again * _AGAIN if bad or silent else ():
+        for baud in again * _AGAIN if patient and (bad or silent) else ():
             if not replies.get(baud) and port.setBaudRate(baud):
                 on_progress(f"{baud} baud again")
-                replies[baud], lost = _answers(port, noise)
+                replies[baud], lost = _answers(port, noise, patient=patient)
                 lossy |= lost or bool(replies[baud])  # it was silent before
         _tell_once(port, replies, before, on_progress)
         results = []
@@ -151,7 +154,9 @@ def scan(
     return ScanReport(tuple(results), noise, lossy)
 
 
-def _answers(port: BytePort, noise: dict[int, int]) -> tuple[dict[int, StatusPacket], bool]:
+def _answers(
+    port: BytePort, noise: dict[int, int], *, patient: bool
+) -> tuple[dict[int, StatusPacket], bool]:
     """Who answers at the port's baud rate, and whether packets got lost.
 
     Adds to ``noise`` what came damaged.
@@ -171,7 +176,7 @@ def _answers(port: BytePort, noise: dict[int, int]) -> tuple[dict[int, StatusPac
             state = "lossy"
         if same >= _SAME[state] and turn:
             break
-        if not replies and baud not in _LIKELY:
+        if not replies and not (patient and baud in _LIKELY):
             break
     return replies, state == "lossy"
 

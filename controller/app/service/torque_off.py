@@ -21,6 +21,10 @@ from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD
 _LIKELY: Final = (1_000_000, FACTORY_BAUD)
 _USB_S: Final = 5e-3
 """How long an adapter may keep bytes before it sends them (ours)."""
+_COPIES: Final = 3
+"""So often torque off is sent: noise may hit one (ours)."""
+_TRIES: Final = 8
+"""How often a servo is asked whether its torque is off (ours)."""
 _TORQUE_OFF = encode_instruction(
     # Torque Enable(64) of the X and MX(2.0) series
     InstructionPacket(BROADCAST_ID, Instruction.WRITE, bytes([64, 0, 0]))
@@ -47,13 +51,14 @@ def torque_off(
         held_s = max(_USB_S, port.latency_s)
         for rate in rates:
             if port.setBaudRate(rate):
-                port.write(_TORQUE_OFF)
+                port.write(_TORQUE_OFF * _COPIES)
                 sent += 1
-                wire_s = len(_TORQUE_OFF) * BITS_PER_BYTE / rate
+                wire_s = _COPIES * len(_TORQUE_OFF) * BITS_PER_BYTE / rate
                 port.clock.sleep_until_s(port.clock.now_s() + wire_s + held_s)
-        for rate in rates:
+        # on a bad line a request gets lost: the likely rates are asked twice
+        for rate in (*rates, *(rate for rate in rates if rate in _LIKELY)):
             on_progress(f"torque off is sent; who answers at {rate} baud?")
-            found = scan(port, [rate]).servos
+            found = scan(port, [rate], patient=False).servos
             if found:
                 port.setBaudRate(rate)
                 failed = [
@@ -77,7 +82,7 @@ def torque_off(
 def _confirm(port: SerialPort | NetworkPort, servo_id: int, model: str) -> str | None:
     """Read a servo's torque, switch it off once more where it is on; what is wrong, if anything."""
     try:
-        bus = DynamixelBus(port, model, latency_s=port.latency_s)
+        bus = DynamixelBus(port, model, latency_s=port.latency_s, tries=_TRIES)
         bus.write_verified(servo_id, "Torque Enable", 0)
     except (BusError, ControlTableError) as fault:
         return f"servo {servo_id}: not confirmed: {fault}"

@@ -67,6 +67,13 @@ def test_noise_is_named_within_a_bounded_time_and_nothing_for_it(
     assert line.clock.now_s() < BOUND_S
 
 
+@pytest.mark.parametrize("gone", [1, 6])
+def test_servos_without_power_do_not_take_longer(gone: int) -> None:
+    line = a_line({"kind": "mute", "ids": list(range(1, 1 + gone))})
+    assert wrong(doctor(line)) >= {"servo IDs"}
+    assert line.clock.now_s() < BOUND_S
+
+
 def test_stray_bytes_hide_no_alarm() -> None:
     """No servo was read, and the exit code was 0: each had an ID twice by the doctor's rule."""
     line = TestLine(6)

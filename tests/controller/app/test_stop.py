@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from snakewalk.config.faults import FaultPlan
 from snakewalk.controller.app.cli.main import main
 from snakewalk.controller.app.runs.execute import execute
 from snakewalk.controller.app.runs.factory import prepare_gait
@@ -15,6 +16,7 @@ from snakewalk.controller.app.service import emergency_stop
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.drivers.safety.stop_button import StopButton
+from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 from tests.helpers.line_port import OpenedLine, line_port
@@ -113,6 +115,23 @@ def test_a_port_where_nobody_answers_ends_with_exit_code_1(
         code, out, _ = stop("--port", port, "--baud", "1000000")
     assert code == 1
     assert "nobody answers: is the power on?" in out
+
+
+def test_torque_goes_off_on_a_line_that_loses_every_third_request(
+    stop: Callable[..., tuple[int, str, str]],
+) -> None:
+    """Sent once at each rate, and asked three times, it left torque on here and there."""
+    confirmed = 0
+    for seed in range(20):
+        line = OpenedLine(ServoBank(range(1, 4)), BenchPlant(3))
+        line.bank["Torque Enable"][:] = 1
+        fault = {"kind": "drop", "chance": 0.33, "of": "questions"}
+        FaultPlayer(line, FaultPlan.model_validate({"seed": seed, "fault": [fault]}))
+        with line_port(line) as port:
+            code, out, _ = stop("--port", port)
+        assert line.bank["Torque Enable"].tolist() == [0] * 3
+        confirmed += code == 0 and "3 servos confirm it" in out
+    assert confirmed >= 15  # in the others both broadcast pings got lost
 
 
 def test_what_is_asked_wrongly_is_one_line(

@@ -609,13 +609,30 @@ def test_torque_off_is_confirmed_on_a_line_that_loses_a_fifth_of_the_packets() -
         assert line.bank["Torque Enable"].tolist() == [0] * 4
 
 
-def test_replies_that_get_lost_again_and_again_are_told_once() -> None:
-    chain, line, events = noisy(0.04, 1)
-    for _ in range(200):
+def test_replies_that_get_lost_again_and_again_are_told_once(
+    chain: ServoChain, line: Recorder
+) -> None:
+    chain.enable()
+    events: list[str] = []
+    chain.on_event = events.append
+    for read in range(120):
+        line.tamper = (lambda raw: []) if read % 12 == 5 else None
         chain.read()
-        line.clock.advance(0.02)
-    assert [event.partition(" within")[0] for event in events] == ["replies got lost 4 times"]
+        assert len(events) == (read >= 5 + 3 * 12)
+    assert events[0].startswith("replies got lost 4 times within 37 reads: noise")
     assert "snakewalk doctor" in events[0]
+
+
+def test_a_line_on_which_nobody_is_read_any_more_is_told(chain: ServoChain, line: Recorder) -> None:
+    """Where another program takes the replies, a run stops before four of them are lost."""
+    chain.enable()
+    events: list[str] = []
+    chain.on_event = events.append
+    line.tamper = lambda raw: []
+    chain.read()
+    assert events == []
+    chain.read()
+    assert [event[:42] for event in events] == ["no servo was read in two reads in a row: n"]
 
 
 def test_a_servo_that_falls_silent_is_no_bad_line(chain: ServoChain, line: Recorder) -> None:
@@ -626,7 +643,7 @@ def test_a_servo_that_falls_silent_is_no_bad_line(chain: ServoChain, line: Recor
     line.refresh_ids()
     for _ in range(50):
         chain.read()
-    assert not [event for event in events if "got lost" in event]
+    assert not [event for event in events if "got lost" in event or "no servo" in event]
 
 
 def test_ids_that_are_exchanged_between_two_runs_are_told_at_the_start(
@@ -648,3 +665,21 @@ def test_ids_that_are_exchanged_between_two_runs_are_told_at_the_start(
     events.clear()
     chain.enable()
     assert not [event for event in events if "exchanged" in event]
+
+
+@pytest.mark.parametrize("place", range(17))
+def test_a_cycle_in_which_nobody_is_read_asks_for_nothing_else(place: int) -> None:
+    """Three time-outs in one call, of 20 ms and as much draining, made the state stale at once."""
+    line = Recorder(ServoBank(ROBOT.servo_ids), START)
+    chain = ServoChain(DynamixelBus(line, latency_s=0.02), ROBOT)
+    chain.enable()
+    for _ in range(place):
+        chain.read()
+    line.tamper = lambda raw: []
+    begin_s = line.clock.now_s()
+    asked = len(line.heard)
+    assert chain.read().age_s.max() < 0.05
+    assert line.clock.now_s() - begin_s < 0.045
+    assert len(line.heard) == asked + 1
+    line.tamper = None
+    assert chain.read().valid.all()
