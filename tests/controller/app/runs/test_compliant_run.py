@@ -60,8 +60,8 @@ def test_lost_replies_hold_the_yield_and_the_run_goes_on(
 
 
 def test_a_gait_is_a_case_of_trials_whose_start_moves() -> None:
-    case = Case("sidewinding", "gait", compliance=True)
-    changes = {"world": "random-20", "seconds": 6.0, "track": None}
+    case = Case("sidewinding", "gait", compliance=True, world="random-20")
+    changes = {"seconds": 6.0, "track": None}
     one, same = (prepare_case(case, 3, 0.04, changes) for _ in range(2))
     assert one.run == same.run
     assert one.run.start_m != (0.0, 0.0)
