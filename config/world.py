@@ -39,8 +39,12 @@ class ElevationGround(Strict):
     column: int = Field(ge=0, description="first column of the crop")
     rows: int = Field(ge=8, le=512)
     columns: int = Field(ge=8, le=512)
-    spacing_m: float = Field(gt=0.0, description="distance between samples in the robot's world")
-    vertical_scale: float = Field(gt=0.0, description="metres in the robot's world per metre")
+    spacing_m: float = Field(
+        ge=0.005, le=1.0, description="distance between samples in the robot's world"
+    )
+    vertical_scale: float = Field(
+        gt=0.0, le=100.0, description="metres in the robot's world per metre"
+    )
     refine: int = Field(1, ge=1, le=8, description="cubic subdivision of each cell")
 
     def with_relief(self, factor: float) -> Self:
@@ -296,13 +300,20 @@ class CorridorObstacle(Strict):
 class PlannerConfig(Strict):
     """Where a path may go ([PT] 2.6.1)."""
 
-    variance_window_m: float = Field(0.3, gt=0.0, description="radius of the elevation variance")
+    variance_window_m: float = Field(
+        0.3, gt=0.0, le=10.0, description="radius of the elevation variance"
+    )
     variance_limit_m2: float = Field(4e-4, gt=0.0)
-    slope_window_m: float = Field(0.1, gt=0.0, description="radius of the plane fitted for slope")
+    slope_window_m: float = Field(
+        0.1, gt=0.0, le=10.0, description="radius of the plane fitted for slope"
+    )
     slope_limit_rad: float = Field(0.35, gt=0.0, lt=1.5)
     length_weight: float = Field(3e-3, gt=0.0, description="metres of path against variance")
     footprint_m: float = Field(
-        0.6, gt=0.0, description="width of the strip that the body stands on: half its length"
+        0.6,
+        gt=0.0,
+        le=10.0,
+        description="width of the strip that the body stands on: half its length",
     )
     climb_limit_rad: float = Field(
         0.2, gt=0.0, lt=1.5, description="steepest slope under the footprint that the body climbs"
@@ -317,8 +328,10 @@ class PlannerConfig(Strict):
     clearance_weight: float = Field(
         1.0, ge=0.0, description="metres of level path that a metre at such ground costs more"
     )
-    node_spacing_m: float = Field(0.15, gt=0.0)
-    bend_radius_m: float = Field(0.4, ge=0.0, description="wanted of every bend, where possible")
+    node_spacing_m: float = Field(0.15, ge=0.02)
+    bend_radius_m: float = Field(
+        0.4, ge=0.0, le=100.0, description="wanted of every bend, where possible"
+    )
     edge_margin_m: float = Field(0.3, ge=0.0, description="kept free along the border")
 
 

@@ -26,6 +26,8 @@ CLOUDS: Final = (".pcd", ".ply", ".xyz")
 MESHES: Final = (".obj", ".stl", ".glb")
 _MOST_HEIGHT_M: Final = 20_000.0
 """Beyond it a value is no height, but stands for none, or is in another unit (ours)."""
+_MOST_SIZE_M: Final = 100_000.0
+"""Of a map in the robot's world: a run's places reach a hundredth of it (ours)."""
 ENDINGS: Final = (*RASTERS, *CLOUDS, *MESHES)
 _POINTS_A_CELL: Final = 2.0
 """Of a cloud whose spacing is not given, in the mean (ours)."""
@@ -74,6 +76,17 @@ def read_elevation(file: Path, options: MapOptions) -> FileMap:
         OSError: the file cannot be opened.
 
     """
+    found = _read(file, options)
+    size_m = (max(found.elevation.z_m.shape) - 1) * found.elevation.spacing_m
+    if size_m > _MOST_SIZE_M:
+        raise InputError(
+            f"{file}: a map of {size_m:.3g} m at a scale of {options.scale:g}; the most is "
+            f"{_MOST_SIZE_M:g} m: a smaller --scale, or --crop a part"
+        )
+    return found
+
+
+def _read(file: Path, options: MapOptions) -> FileMap:
     ending = file.suffix.lower()
     if ending not in ENDINGS:
         raise InputError(f"{file}: ends in none of {' '.join(ENDINGS)}")

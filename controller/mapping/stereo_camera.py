@@ -108,7 +108,9 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
     for key, names in _NAMES.items():
         name = next((name for name in names if held.get(name) is not None), None)
         if name is None and key not in _OPTIONAL:
-            raise InputError(f"{file}: holds no {' or '.join(names)}; it has {', '.join(held)}")
+            raise InputError(
+                f"{file}: holds no {' or '.join(names)}; it has {', '.join(held) or 'none'}"
+            )
         found[key] = np.zeros(5) if name is None else held[name]
     found["translation"] = np.asarray(found["translation"], dtype=float) * unit_m
     return _checked(file, found)

@@ -12,6 +12,7 @@ from mcap.writer import Writer
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import digest
 from snakewalk.config.robot import RobotConfig
@@ -70,6 +71,7 @@ class RunLog:
             self._channels[topic] = self._writer.register_channel(topic, "json", schema)
         self._flushed_s = 0.0
         self._slow = b""
+        self._has_cycles = False
 
     def __enter__(self) -> Self:
         """Start at once."""
@@ -83,7 +85,8 @@ class RunLog:
     ) -> None:
         """Finish the file also when the run ends with an error: the log says how it came to it.
 
-        A log that the disk does not take stays what it is, ``.part``, and the error says its name.
+        Nothing is left of a run that was refused before its first cycle. A log that the disk does
+        not take stays what it is, ``.part``, and the error says its name.
         """
         try:
             try:
@@ -97,7 +100,10 @@ class RunLog:
             if error is None:
                 raise
             return
-        self._part.replace(self.path)
+        if isinstance(error, InputError) and not self._has_cycles:
+            self._part.unlink()
+        else:
+            self._part.replace(self.path)
 
     def config(
         self,
@@ -179,6 +185,7 @@ class RunLog:
             f'"verdict":"{verdict}","reason":{encode(reason)},'
             f'"joints":{encode([int(j) for j in joints])}}}'
         )
+        self._has_cycles = True
         self._add_text("/cycle", time_s, row)
         self._slow_row(time_s, state)
         if state.imu is not None:

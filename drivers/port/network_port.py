@@ -8,6 +8,7 @@ import os
 import socket
 from contextlib import suppress
 from typing import Final
+from urllib.parse import urlsplit
 
 import serial
 
@@ -24,6 +25,7 @@ _POLL_S: Final = 0.001
 would be asked to set up its line anew whenever it changed."""
 _FIXED: Final = ("socket://",)
 """URLs that carry no baud rate: that of the far end stays what it is."""
+_TO_A_HOST: Final = ("socket", "rfc2217")
 
 
 def open_port(
@@ -87,6 +89,11 @@ class NetworkPort(LinePort):
         return super().setBaudRate(baudrate)
 
     def _open(self) -> None:
+        kind = self._name.partition("://")[0]
+        if kind in _TO_A_HOST and not _names_host_and_port(self._name):
+            raise PortError(
+                f"{self._name}: cannot be opened: expected {kind}://HOST:PORT, as {kind}://pi:5000"
+            )
         try:
             self._serial = serial.serial_for_url(self._name, self._baud, timeout=_POLL_S)
         except self._refusals as error:
@@ -97,3 +104,11 @@ class NetworkPort(LinePort):
             socket.socket(fileno=os.dup(self._serial.fileno())) as line,
         ):
             line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+
+def _names_host_and_port(url: str) -> bool:
+    try:
+        parts = urlsplit(url)
+        return bool(parts.hostname and parts.port)
+    except ValueError:  # of a port that is no number up to 65535
+        return False

@@ -30,6 +30,9 @@ SPIN_S = 1e-3
 """What is due sooner is awaited without sleep: on a busy machine a sleeper is woken 10 ms late."""
 LATE_S = 0.1
 """Real time that one step may make up for; what is beyond it is left out."""
+PACE_MAX = 1000.0
+"""A step then makes up for 100 simulated seconds; one that nobody waits for to its end looks at no
+client and at no end of serving (ours)."""
 CHUNK_BYTES = 4096
 _SPEEDS = {getattr(termios, f"B{baud}"): baud for baud in BAUDS if hasattr(termios, f"B{baud}")}
 _OUTPUT_SPEED = 5
@@ -39,6 +42,8 @@ _OUTPUT_SPEED = 5
 def _checked_pace(pace: float) -> float:
     if not 0.0 < pace < math.inf:
         raise InputError(f"pace {pace:g}: must be above 0; 1 is real time, 0.5 half as fast")
+    if pace > PACE_MAX:
+        raise InputError(f"pace {pace:g}: must be at most {PACE_MAX:g}; 1 is real time")
     return pace
 
 
@@ -49,7 +54,8 @@ class PtyServer:
     back under another name.
 
     Raises:
-        InputError: ``link`` is taken, by a file or by a server that runs; ``pace`` is not positive.
+        InputError: ``link`` is taken, by a file or by a server that runs; ``pace`` is not
+            positive, or over ``PACE_MAX``.
 
     """
 

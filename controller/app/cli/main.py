@@ -27,9 +27,14 @@ def main() -> None:
     # Pictures are drawn without a screen, by a context of our own; MuJoCo's import fails on a
     # choice that is not installed.
     os.environ["MUJOCO_GL"] = "disable"
+    # a script has what it starts beside itself ignore ^C and SIGQUIT, and it has to stop all the
+    # same; nohup has SIGHUP ignored, and means it
     for number in _ENDING:
-        if signal.getsignal(number) is signal.SIG_DFL:  # nohup ignores SIGHUP
+        ignored = signal.getsignal(number) is signal.SIG_IGN
+        if signal.getsignal(number) is signal.SIG_DFL or (ignored and number.name != "SIGHUP"):
             signal.signal(number, _unwind)
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         _check_words(sys.argv[1:])
         from snakewalk.controller.app.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it

@@ -235,7 +235,8 @@ def _free_urdf(root: ET.Element, path: Path) -> str:
     children = {child.get("link") for child in root.iter("child")}
     first = [link.get("name") for link in root.findall("link") if link.get("name") not in children]
     if len(first) != 1:
-        raise InputError(f"{path}: has {len(first)} first links: {', '.join(map(str, first))}")
+        found = ", ".join(map(str, first)) or "each hangs on another"
+        raise InputError(f"{path}: one link must be the first, on which all hang: {found}")
     for link in root.findall("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             if shape.find("geometry/mesh") is not None:

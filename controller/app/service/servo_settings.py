@@ -193,6 +193,8 @@ def _raw(
 
 
 def _limit(bus: DynamixelBus, register: str, value: float) -> int:
+    if not np.isfinite(value):
+        raise InputError("must be a finite number")
     if register.endswith("Position Limit"):
         units = bus.table
         raw = round(value / units.rad_per_position) + units.zero_position

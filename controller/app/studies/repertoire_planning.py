@@ -154,6 +154,8 @@ def load_plan(path: Path, *, replan: bool = True) -> RepertoireRun:
         raise InputError(f"{path}: no such plan; snakewalk plan --with repertoire -o makes one")
     try:
         about = parse_json(read_bytes(path, MOST_JSON_BYTES))
+        if not isinstance(about, dict):
+            raise ValueError("no JSON object")
         if about["format"] != FORMAT:
             raise InputError(f"{path}: format {about['format']}; expected {FORMAT}")
         file = Path(about["repertoire"])
@@ -165,9 +167,9 @@ def load_plan(path: Path, *, replan: bool = True) -> RepertoireRun:
         )
         parts = about["run"], about["robot"], about["world"]
     except (KeyError, TypeError, ValueError) as error:
+        why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         raise InputError(
-            f"{path}: not a plan ({type(error).__name__}: {error}); "
-            "snakewalk plan --with repertoire -o makes one"
+            f"{path}: not a plan ({why}); snakewalk plan --with repertoire -o makes one"
         ) from None
     if not actions:
         raise InputError(f"{path}: a plan without actions")

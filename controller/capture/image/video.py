@@ -19,9 +19,9 @@ from snakewalk.config.archive import why_no_file
 from snakewalk.config.arrays import DeepImage, Floats, Image
 from snakewalk.config.errors import InputError
 
-os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
-
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # faults get our own messages
+if "OPENCV_LOG_LEVEL" not in os.environ:  # which OpenCV has read when it was loaded
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".webp")
 ASSUMED_HZ = 30.0

@@ -153,6 +153,23 @@ def test_a_signal_before_anything_moves_is_one_line_too(
     assert capsys.readouterr().err == f"snakewalk: ended by {name}\n"
 
 
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGQUIT", 131), ("SIGHUP", 0)])
+def test_what_a_script_starts_beside_itself_stops(name: str, code: int) -> None:
+    """A shell has it ignore ^C and SIGQUIT; nohup's SIGHUP stays ignored."""
+    number = int(signal.Signals[name])
+    program = (
+        f"import signal, sys; signal.signal({number}, signal.SIG_IGN)\n"
+        "from snakewalk.controller.app.cli import main\n"
+        f"main._check_words = lambda words: signal.raise_signal({number})\n"
+        'sys.argv = ["snakewalk", "--version"]; main.main()'
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code, done.stderr
+    assert done.stdout.startswith("snakewalk 0") == (code == 0)
+
+
 def test_what_is_imported_before_an_interrupt_is_caught_is_little() -> None:
     code = "import sys, snakewalk.controller.app.cli.main; print(*sys.modules)"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -1,5 +1,6 @@
 """Changing what outlives a servo's power: planned, refused, written, read back."""
 
+import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
@@ -99,8 +100,9 @@ def test_all_wrong_wishes_at_once(bus: DynamixelBus) -> None:
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e30])
 def test_values_that_no_register_holds(bus: DynamixelBus, value: float) -> None:
     for field in ("temperature_limit_c", "max_position_rad", "return_delay_us", "current_limit_a"):
-        with pytest.raises(InputError):
+        with pytest.raises(InputError) as info:
             plan(bus, 1, SettingsRequest(**{field: value}))
+        assert ("must be a finite number" in info.value.faults[0]) == (not np.isfinite(value))
 
 
 def test_position_limits_the_wrong_way_round(bus: DynamixelBus) -> None:

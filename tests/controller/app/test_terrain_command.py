@@ -109,7 +109,8 @@ def test_a_stereo_pair_becomes_a_world_in_the_frame_of_its_camera(tmp_path: Path
     k = [[f, 0.0, 159.5], [0.0, f, 119.5], [0.0, 0.0, 1.0]]
     np.savez(tmp_path / "c.npz", K1=k, K2=k, R=np.eye(3), T=[-1000 * baseline_m, 0.0, 0.0])
     pair = ("terrain", "from-stereo", tmp_path / "l.png", tmp_path / "r.png")
-    words = (*pair, "--calibration", tmp_path / "c.npz", "--unit", "mm", "-o", tmp_path / "y.toml")
+    plain = (*pair, "--calibration", tmp_path / "c.npz", "-o", tmp_path / "y.toml")
+    words = (*plain, "--unit", "mm")
     made = call(*words, "--disparities", 64, "--far", 1.5, "--spacing", 0.04)
     assert made["camera"] == "fitted to the points"
     assert made["camera_height_m"] == pytest.approx(height_m, abs=0.005)
@@ -124,12 +125,12 @@ def test_a_stereo_pair_becomes_a_world_in_the_frame_of_its_camera(tmp_path: Path
     assert "0.60" in text
     assert "fitted to the points" in text
     for more, expected in (
-        (("--height", 1), "--height and --tilt belong together"),
-        (("--roll", 3), "--roll belongs to --height and --tilt"),
+        (("--unit", "mm", "--height", 1), "--height and --tilt belong together"),
+        (("--unit", "mm", "--roll", 3), "--roll belongs to --height and --tilt"),
         (("--unit", "px"), "is none of m, cm, mm"),
-        (("--error", 0), "--error 0: must be above 0"),
-        (("--error", 1e-6), "nothing in the pictures is matched, or all is too far"),
+        (("--unit", "mm", "--error", 0), "--error 0: must be above 0"),
+        (("--unit", "mm", "--error", 1e-6), "nothing in the pictures is matched, or all is too"),
     ):
-        assert expected in refused(*words, "--force", *more)
+        assert expected in refused(*plain, "--force", *more)
     (tmp_path / "l.png").write_bytes(b"no picture")
     assert "l.png: cannot be read as a picture" in refused(*words, "--force")

@@ -10,9 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.runlog.reader import LogError, read_log
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.writer import RunLog, part_path
+from snakewalk.drivers.errors import ChainError
+from tests.controller.runlog.conftest import JOINTS, joint_state
 
 Write = Callable[[Path, int], Path]
 
@@ -21,6 +24,21 @@ Write = Callable[[Path, int], Path]
 def whole(write: Write, tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, RunRecord]:
     path = write(tmp_path_factory.mktemp("log") / "run.mcap", 220)
     return path.read_bytes(), read_log(path)
+
+
+@pytest.mark.parametrize("refusal", [InputError("no"), ChainError("no answer from servo 3")])
+@pytest.mark.parametrize("cycles", [0, 1])
+def test_what_is_refused_before_its_first_cycle_leaves_no_log(
+    refusal: InputError, cycles: int, tmp_path: Path
+) -> None:
+    path, angles_rad = tmp_path / "log.mcap", np.zeros(JOINTS)
+    log = RunLog(path)
+    log.event(0.0, "check", "who is on the bus", "warning")
+    for k in range(cycles):
+        log.cycle(0.1, angles_rad, angles_rad, joint_state(k), deadline_s=0.02, lateness_s=0.0)
+    log.__exit__(type(refusal), refusal, None)
+    assert len(list(tmp_path.iterdir())) == cycles
+    assert path.exists() == bool(cycles)
 
 
 def test_cut_anywhere_gives_a_prefix_and_says_so(

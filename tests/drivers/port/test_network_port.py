@@ -258,6 +258,13 @@ def test_a_url_that_leads_nowhere_is_told(url: str) -> None:
         NetworkPort(url)
 
 
+@pytest.mark.parametrize("place", ["", "pi", "pi:", "pi:0", "pi:65536", "pi:x", ":5000", "[::1"])
+@pytest.mark.parametrize("kind", ["socket", "rfc2217"])
+def test_a_url_without_host_and_port_is_told_what_is_expected(kind: str, place: str) -> None:
+    with pytest.raises(PortError, match=f"expected {kind}://HOST:PORT, as {kind}://pi:5000"):
+        NetworkPort(f"{kind}://{place}")
+
+
 @pytest.mark.parametrize(
     "command",
     [

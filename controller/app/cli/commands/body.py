@@ -50,8 +50,9 @@ def body(
         int | None, typer.Option(help="boundary curves of the skin; default 37")
     ] = None,
     order: Annotated[
-        int, typer.Option(help="of the skin: 1 creased, 2 biharmonic, 3 with even curvature")
-    ] = 2,
+        int | None,
+        typer.Option(help="of the skin: 1 creased, 2 biharmonic (default), 3 with even curvature"),
+    ] = None,
     surface: Annotated[
         bool, typer.Option("--surface", help="of a mesh: the surface through its curves instead")
     ] = False,
@@ -65,8 +66,9 @@ def body(
         Path | None, typer.Option(help="picture of the body from above: the skin's texture")
     ] = None,
     frame: Annotated[
-        int, typer.Option(help="frame of the track that the picture shows, from 0")
-    ] = 0,
+        int | None,
+        typer.Option(help="of the track, from 0 (default): that --image shows, or --posed takes"),
+    ] = None,
     side: Annotated[
         Path | None, typer.Option(help="an .npz of the same body seen from the side: its heights")
     ] = None,
@@ -94,15 +96,18 @@ def body(
         given,
         animate,
         of_widths={"--image": image, "--side": side, "--posed": posed},
-        of_skins={"--fps": fps, "--curves": curves},
+        of_skins={"--fps": fps, "--curves": curves, "--order": order},
         of_meshes={"--surface": surface, "--forward": forward, "--up": up},
     )
-    how = Cut(37 if curves is None else curves, order, forward, up, surface)
+    if frame is not None and image is None and not posed:
+        raise InputError("--frame: is for --image and --posed")
+    how = Cut(37 if curves is None else curves, 2 if order is None else order, forward, up, surface)
     if given:
         made.refuse(textured=True)
         made.skin(body_skin(track, how), animate, fps)
         return
     made.refuse(textured=image is not None)
+    frame = frame or 0
     measured = _measure(track, image, frame, side, aspect)
     if animate is not None:
         if posed:
@@ -243,9 +248,9 @@ def _check_options(
     faults += [
         f"{name}: is for a skin: give --animate"
         for name, v in of_skins.items()
-        if v and not (given or animate)
+        if v is not None and not (given or animate)
     ]
-    if of_skins["--fps"] and not animate:
+    if of_skins["--fps"] is not None and not animate:
         faults.append("--fps: is for --animate")
     if faults:
         raise InputError(list(dict.fromkeys(faults)))

@@ -149,6 +149,8 @@ def _check_serving(
     """
     if not 0.0 <= latency < math.inf:
         raise InputError(f"--latency {latency:g}: must not be negative, nor without end")
+    if latency > 1e4:  # no client waits for it (ours)
+        raise InputError(f"--latency {latency:g}: must be at most 10000 ms")
     if for_s is not None and not for_s > 0.0:
         raise InputError(f"--for {for_s:g}: must be over 0 s")
     if record is not None and link is not None and record.absolute() == link.absolute():

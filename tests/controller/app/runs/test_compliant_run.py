@@ -60,7 +60,7 @@ def test_lost_replies_hold_the_yield_and_the_run_goes_on(
 
 
 def test_a_gait_is_a_case_of_trials_whose_start_moves() -> None:
-    case = Case("sidewinding", "gait", world="random-20", compliance=True)
+    case = Case("sidewinding", "gait", compliance=True, world="random-20")
     changes = {"seconds": 6.0, "track": None}
     one, same = (prepare_case(case, 3, 0.04, changes) for _ in range(2))
     assert one.run == same.run

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from snakewalk.controller.app.cli import options
 from snakewalk.controller.app.cli.command_line import app
 from snakewalk.controller.app.studies.run_comparison import compared_run, differing, log_names
 from snakewalk.controller.runlog.record import RunRecord
@@ -60,3 +61,17 @@ def test_the_command_compares_and_draws(make: Make, tmp_path: Path) -> None:
     table = CliRunner().invoke(app, ["compare", *logs]).stdout
     assert "run.seed" in table
     assert "path error mean m" in table
+
+
+def test_long_names_are_told_apart_at_80_columns(
+    make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    logs = []
+    for seed in range(3):
+        folder = tmp_path / f"jacksboro-traverse-serpenoid-seed{seed}"
+        folder.mkdir()
+        logs.append(str(make(folder / "log.mcap", seconds=4.0, seed=seed)))
+    monkeypatch.setattr(options.console, "_width", 80)
+    table = CliRunner().invoke(app, ["compare", *logs]).stdout
+    assert all(table.count(f"seed{seed}") == 2 for seed in range(3))
+    assert "\N{HORIZONTAL ELLIPSIS}" not in table

@@ -24,6 +24,8 @@ Fill = Annotated[
 Picture = Annotated[
     Path | None, typer.Option(help="picture of the map: heights, holes, safe ground")
 ]
+_LEAST, _MOST = 1e-6, 1e6
+"""Of lengths, m, and of factors: what is beyond is in another unit (ours)."""
 
 
 def elevation(
@@ -147,12 +149,14 @@ def check_world_files(
 
 
 def not_positive(options: Mapping[str, float | None]) -> list[str]:
-    """Say which options have a value that is not above 0."""
-    return [
-        f"{option} {value:g}: must be above 0"
-        for option, value in options.items()
-        if value is not None and not 0.0 < value < math.inf
-    ]
+    """Say which options have a value that is not above 0, or beyond all lengths and factors."""
+    faults = []
+    for option, value in options.items():
+        if value is not None and not 0.0 < value < math.inf:
+            faults.append(f"{option} {value:g}: must be above 0")
+        elif value is not None and not _LEAST <= value <= _MOST:
+            faults.append(f"{option} {value:g}: must be from {_LEAST:g} to {_MOST:g}")
+    return faults
 
 
 def check_fill(fill_m: float, faults: list[str]) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
+from rich.table import Column, Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.app.cli.options import Force, Json, console
@@ -63,21 +63,29 @@ def compare(
 
 def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> None:
     """What differs in the configurations, then the numbers that at least one run has."""
-    names = [run.name for run in runs]
-    settings = Table("setting", *names, box=None, title="What differs", title_justify="left")
+    settings = Table(
+        "setting", *_columns(runs), box=None, title="What differs", title_justify="left"
+    )
     for key, values in changed.items():
         settings.add_row(key, *map(_text, values))
     if changed:
         console.print(settings, "")
     else:
         console.print("Run, robot and world are the same.\n")
-    numbers = Table("number", *names, box=None, title="What came of it", title_justify="left")
+    numbers = Table(
+        "number", *_columns(runs), box=None, title="What came of it", title_justify="left"
+    )
     for key in runs[0].summary.to_dict():
         values = [run.summary.to_dict()[key] for run in runs]
         told = any(value not in (None, "") for value in values)
         if told and not isinstance(values[0], dict) and key not in {"config_hash", "software"}:
             numbers.add_row(key.replace("_", " "), *map(_text, values))
     console.print(numbers)
+
+
+def _columns(runs: "list[ComparedRun]") -> list[Column]:
+    """Columns of the runs, whose names are not cut: they differ at their ends."""
+    return [Column(run.name, overflow="fold") for run in runs]
 
 
 def _text(value: Any) -> str:
