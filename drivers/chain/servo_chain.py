@@ -433,7 +433,7 @@ class ServoChain:
         measured_at_s = self._take(reply)
         place = self._reads % SLOW_EVERY
         self._reads += 1
-        has_time = bool(reply.valid.all())
+        has_time = reply.complete
         if place == 0 or measured_at_s - self._readings.slow_at_s() > _SLOW_S:
             has_time = False
             reply = self._slow.read()

@@ -120,6 +120,17 @@ def test_the_witness_sees_goals_that_should_not_be_sent(goal: float) -> None:
     assert rig.witness.too_fast == JOINTS
 
 
+def test_the_witness_knows_that_a_joint_is_not_where_it_was_read() -> None:
+    """The reading may be another servo's: where it was read was taken for where it is."""
+    rig = Rig(FaultPlan(), "stop")
+    rig.link.enable()
+    state = rig.read()
+    rig._seen = _with(state, position_rad=state.position_rad + 0.3)
+    rig.chain._cycle.write_goals(raw_positions(rig._units, np.full(JOINTS, 0.3)))
+    rig.line.drain_until_quiet(1e-3)
+    assert rig.witness.too_fast == JOINTS
+
+
 def test_the_table_has_a_line_for_each_kind() -> None:
     text = table(Tally(cycles=1_234), {"brown_out": Tally(old=7)})
     assert text.splitlines()[2].startswith("| brown out | 0 |")
