@@ -58,6 +58,7 @@ _FIRST_READS = 5
 _LOSS_READS, _LOSSES = 100, 4
 """So many losses within so many reads show a bad line (ours): a servo that falls silent, or a
 computer that stands still for a while, is one loss."""
+_GOAL = "Goal Position"
 _HOLD_READS = 2
 """Reads in which the servos may tell where they are before they hold (ours)."""
 STILL_RAD = 0.1
@@ -237,7 +238,11 @@ class ServoChain:
         self._bus.reopen()
 
     def _own_positions(self, reads: int, *, ask_again: bool = False) -> Floats:
-        """(J,) where each joint is, by a reply that also tells which joint's its servo is.
+        """(J,) where each joint is, by a reply that also tells which joint's its servo is."""
+        return self._own_registers(reads, ask_again=ask_again)[0]
+
+    def _own_registers(self, reads: int, *, ask_again: bool = False) -> tuple[Floats, Floats]:
+        """(J,) where each joint is, and its raw goal, by a reply that tells whose its servo is.
 
         So no joint is given the place of another whose servo has the same ID, or its ID.
 
@@ -250,22 +255,25 @@ class ServoChain:
             PortError: the port is gone.
 
         """
-        here_rad = np.full(self.joint_count, np.nan)
+        here_rad, goals = np.full((2, self.joint_count), np.nan)
+        registers = self._own
+        start = registers[IDENTITY].address
+
+        def take(joint: int, values: Mapping[str, int]) -> None:
+            if values[IDENTITY] == identity(joint):
+                here_rad[joint] = self._units.position_rad(joint, values[self._position_name])
+                goals[joint] = values[_GOAL]
+
         for _ in range(reads):
             reply = self._identified.read()
             for joint in np.flatnonzero(reply.valid & np.isnan(here_rad)).tolist():
                 row = reply.data[joint].tobytes()
-                if self._identity.decode(row) == identity(joint):
-                    raw = self._position.decode(row[-self._position.size :])
-                    here_rad[joint] = self._units.position_rad(joint, raw)
+                take(joint, {n: r.decode(row[r.address - start :]) for n, r in registers.items()})
             if not np.isnan(here_rad).any():
                 break
-        names = self._identity.name, self._position.name
         for joint in np.flatnonzero(np.isnan(here_rad)).tolist() if ask_again else ():
-            values = self._bus.read_each(self.robot.servo_ids[joint], names)
-            if values[IDENTITY] == identity(joint):
-                here_rad[joint] = self._units.position_rad(joint, values[self._position.name])
-        return here_rad
+            take(joint, self._bus.read_each(self.robot.servo_ids[joint], registers))
+        return here_rad, goals
 
     def _check_stillness(self, position_rad: Floats, found_rad: Floats, most_rad: float) -> None:
         """Compare where the joints are with where they have just been found.
@@ -309,7 +317,13 @@ class ServoChain:
         bus, ids = self._bus, self.robot.servo_ids
         bus.sync_write(ids, "Bus Watchdog", 0)  # goals follow at once, else an old goal counts
         goals = self._send_goals(here_rad)
-        self._expect("Goal Position", goals.tolist())
+        now_rad, held = self._own_registers(_FIRST_READS, ask_again=True)
+        self._check_stillness(now_rad, here_rad, STILL_RAD)  # IDs may have been exchanged since
+        for joint in np.flatnonzero(held != goals).tolist():
+            raise BusError(
+                f"{self.robot.joint_name(joint)}: {_GOAL} is {held[joint]:.0f} after "
+                f"{goals[joint]} was written to all"
+            )
         bus.sync_write(ids, "Torque Enable", 1)
         self._expect("Torque Enable", [1] * len(ids))
         ticks = self._watchdog_ticks
@@ -448,7 +462,7 @@ class ServoChain:
         if reply.valid.any():  # else what is asked beside it waits, too, and the state grows stale
             self._reads += 1
             is_alone = not self._read_slow(measured_at_s)
-            self._check_liveness(has_time=is_alone and bool(reply.valid.all()))
+            self._check_liveness(has_time=is_alone and reply.complete)
             imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
         if imu is not None:
@@ -516,9 +530,10 @@ class ServoChain:
         self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
         table = bus.table_of(ids[0])
-        self._identity = table.register(IDENTITY)
-        self._position = table.register(table.state_names[-1])
-        self._identified: GroupCycle = bus.block(ids, IDENTITY, self._position.name, fast=False)
+        self._position_name = table.state_names[-1]
+        names = IDENTITY, _GOAL, self._position_name
+        self._own = {name: table.register(name) for name in names}
+        self._identified: GroupCycle = bus.block(ids, names[0], names[-1], fast=False)
         self._fast_reads = fast
 
     def _budget(self, *, fast: bool) -> WireBudget:

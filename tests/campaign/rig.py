@@ -41,6 +41,7 @@ NOTICED_CYCLES = 4 * SLOW_EVERY
 """A register is compared every third round at the latest; one more for an answer that is lost."""
 _STAMPS = 60
 _GOALS = (116).to_bytes(2, "little") + (4).to_bytes(2, "little")
+_TORQUE = (64).to_bytes(2, "little") + (1).to_bytes(2, "little")
 
 
 @dataclass
@@ -259,8 +260,7 @@ class Rig:
 
     def _here_rad(self) -> np.ndarray:
         """(J,) where the servo of each joint is."""
-        rows = rows_by_id(self.line.bank)
-        return self.line.firmware.plant.position_rad[slice(None) if rows is None else rows].copy()
+        return self._joints(self.line.firmware.plant.position_rad)
 
     def _overhear(self, time_s: float, from_host: bool, data: bytes) -> None:
         self._was_rad.append((time_s, self._here_rad()))
@@ -269,13 +269,27 @@ class Rig:
         if not from_host:
             return
         for packet in PacketParser().feed(data):
-            if (
-                isinstance(packet, InstructionPacket)
-                and packet.instruction == Instruction.SYNC_WRITE
-                and packet.params[:4] == _GOALS
-            ):
+            if not isinstance(packet, InstructionPacket):
+                continue
+            if packet.instruction != Instruction.SYNC_WRITE:
+                continue
+            if packet.params[:4] == _GOALS:
                 block = np.frombuffer(packet.params, np.uint8, offset=4).reshape(-1, 5)
                 self._check_goals(time_s, block[:, 1:].copy().view("<i4")[:, 0])
+            elif packet.params[:4] == _TORQUE and packet.params[5]:
+                self._check_torque_on()
+
+    def _joints(self, values: np.ndarray) -> np.ndarray:
+        """(J,) of what each servo has, that of the servo of each joint."""
+        rows = rows_by_id(self.line.bank)
+        return values[slice(None) if rows is None else rows].copy()
+
+    def _check_torque_on(self) -> None:
+        """Judge the goals that servos without torque hold when it comes on."""
+        goal = self._units.position_rad(self._joints(self.line.bank["Goal Position"]))
+        limp = self._joints(self.line.bank["Torque Enable"]) == 0
+        far = np.abs(goal - self._here_rad()) > self.limits.goal_lead_rad + TICK_RAD
+        self._sin("beyond_limit", far & limp)
 
     def _check_goals(self, time_s: float, raw: np.ndarray) -> None:
         goal = self._units.position_rad(raw)
@@ -285,6 +299,8 @@ class Rig:
         ahead = np.minimum(np.abs(goal - known), np.abs(goal - here))
         last = self._sent
         far = ahead > self.limits.goal_lead_rad + TICK_RAD
+        torque = self._joints(self.line.bank["Torque Enable"]) == 1
+        far &= torque  # without it a goal counts when torque comes on
         if last is not None:  # the rate may let it come no nearer at once
             far &= np.abs(goal - known) >= np.abs(last - known)
         self._sin("beyond_limit", far)
@@ -294,7 +310,7 @@ class Rig:
             # a chain that was interrupted holds: its goals are where its joints are, or just were
             where = [rad for _, rad in self._was_rad]
             held = np.minimum.reduce([np.abs(goal - each) for each in where]) < HELD_RAD
-            self._sin("too_fast", fast & ~held)
+            self._sin("too_fast", fast & ~held & torque)
         self._sent, self._sent_at_s = goal, time_s
 
     def _sin(self, kind: str, bad: np.ndarray) -> None:

@@ -15,7 +15,7 @@ from tests.oracles.raw_positions import raw_positions
 
 from .campaign import Tally, campaign, run_scenario
 from .report import table
-from .rig import JOINTS, Rig
+from .rig import JOINTS, ROBOT, Rig
 from .scenarios import CHANGES, KINDS, SCENARIOS, WRITES
 
 
@@ -118,6 +118,39 @@ def test_the_witness_sees_goals_that_should_not_be_sent(goal: float) -> None:
     rig.line.drain_until_quiet(1e-3)
     assert rig.witness.beyond_limit >= JOINTS
     assert rig.witness.too_fast == JOINTS
+
+
+def test_the_witness_knows_that_a_joint_is_not_where_it_was_read() -> None:
+    """The reading may be another servo's: where it was read was taken for where it is."""
+    rig = Rig(FaultPlan(), "stop")
+    rig.link.enable()
+    state = rig.read()
+    rig._seen = _with(state, position_rad=state.position_rad + 0.3)
+    rig.chain._cycle.write_goals(raw_positions(rig._units, np.full(JOINTS, 0.3)))
+    rig.line.drain_until_quiet(1e-3)
+    assert rig.witness.too_fast == JOINTS
+
+
+@pytest.mark.parametrize("limp", [True, False])
+def test_the_witness_judges_a_goal_when_there_is_torque(*, limp: bool) -> None:
+    """Without torque it moves nothing; it does when torque comes on."""
+    rig = Rig(FaultPlan(), "stop")
+    rig.link.enable()
+    rig.read()
+    if limp:
+        rig.link.disable()
+    rig.chain._cycle.write_goals(raw_positions(rig._units, np.full(JOINTS, 0.9)))
+    rig.line.drain_until_quiet(1e-3)
+    assert rig.witness.violations == (0 if limp else 2 * JOINTS)
+    rig.bus.sync_write(ROBOT.servo_ids, "Torque Enable", 1)
+    rig.line.drain_until_quiet(1e-3)
+    assert rig.witness.beyond_limit == JOINTS
+
+
+def test_ids_that_are_exchanged_behind_the_goals_of_a_start_are_found_before_torque() -> None:
+    tally = run_scenario(("voltage", "exchange"), 7001, 240)
+    assert tally.trips
+    assert tally.complaints == []
 
 
 def test_the_table_has_a_line_for_each_kind() -> None:

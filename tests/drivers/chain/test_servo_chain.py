@@ -188,12 +188,12 @@ def test_who_is_missing_in_the_reply_of_all_is_asked_alone(
     def cut(data: bytes) -> list[bytes]:
         group = line.heard[-1]
         asked = group.instruction == Instruction.SYNC_READ and data[4] > 1
-        return [] if asked and group.params[0] in (64, 98, 116) else [data]
+        return [] if asked and group.params[0] in (64, 76, 98) else [data]
 
     line.tamper = cut
     chain.enable()
     assert line.bank["Torque Enable"].tolist() == [1] * 4
-    assert {p.params[0] for p in line.heard if p.instruction == Instruction.READ} >= {64, 98, 116}
+    assert {p.params[0] for p in line.heard if p.instruction == Instruction.READ} >= {64, 76, 98}
 
 
 def test_a_slow_line_has_time_to_carry_what_was_written_before_a_read() -> None:
@@ -414,6 +414,33 @@ def test_a_joint_whose_servo_tells_another_joint_is_not_gone_on_with(
     line.bank[IDENTITY][2] = 1  # what a servo tells that had another ID when it was set up
     with pytest.raises(ChainError, match=r"joint 3 \(ID 3\): its servo does not tell that it is"):
         chain.resume(found)
+    assert line.bank["Torque Enable"].tolist() == [0] * 4
+
+
+@pytest.mark.parametrize("exchange", [True, False])
+def test_torque_does_not_come_on_where_ids_were_exchanged_or_joints_moved_behind_the_goals(
+    chain: ServoChain, line: Recorder, exchange: bool
+) -> None:
+    """It came on for 5 ms, in which each began to move to the other's place."""
+    send_goals = chain._send_goals
+
+    def send_and_disturb(goal_rad: np.ndarray) -> np.ndarray:
+        goals = send_goals(goal_rad)
+        line.drain_until_quiet(1e-3)
+        if exchange:
+            line.rename(0, 2)
+            line.rename(1, 1)
+            line.refresh_ids()
+        else:
+            line.firmware.plant.position_rad[0] += 0.3
+        return goals
+
+    chain._send_goals = send_and_disturb  # type: ignore[method-assign]
+    with pytest.raises(
+        ChainError, match=r"joint 1 \(ID 1\): (its servo does not tell|read \+0.30)"
+    ):
+        chain.enable()
+    assert (64, b"\x01") not in [(address, data) for address, _, data in line.writes()]
     assert line.bank["Torque Enable"].tolist() == [0] * 4
 
 

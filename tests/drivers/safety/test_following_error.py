@@ -84,6 +84,28 @@ def test_the_joint_that_has_not_followed_for_longest_is_named() -> None:
     assert following.update(state(time_s=0.6), both) is None
 
 
+@pytest.mark.parametrize("later_s", [0.0, 0.2])
+def test_of_two_joints_the_first_is_named_unless_the_other_has_not_followed_for_longer(
+    later_s: float,
+) -> None:
+    following = FollowingError(LIMITS)
+    early = np.array([0.5, 0.0, 0.5 if later_s == 0.0 else 0.0])
+    both = np.array([0.5, 0.0, 0.5])
+    assert following.update(state(time_s=0.0), early) is None
+    assert following.update(state(time_s=0.2), both) is None
+    fault = following.update(state(time_s=0.5), both)
+    assert fault is not None
+    assert fault.startswith(LIMITS.joint_names[0])
+
+
+def test_the_error_that_is_told_is_from_where_the_joint_is() -> None:
+    following = FollowingError(LIMITS)
+    for time_s in (0.0, 0.5):
+        fault = following.update(state(time_s=time_s, position_rad=one(0.3, 1)), one(0.9, 1))
+    assert fault is not None
+    assert fault.startswith(f"{LIMITS.joint_names[1]}: 0.60 rad from its goal")
+
+
 def test_limits_leave_room_for_the_lag_of_the_p_gain_and_stay_within_the_lead() -> None:
     """At P gain 800 full output comes at 0.217 rad (e-manual: PWM 885, gain over 128)."""
     usual = SafetyLimits.from_config(load_robot("alternating16"), SafetyConfig())
