@@ -79,11 +79,11 @@ def main() -> None:
             inside = np.concatenate([each.inside for each in found]).mean(axis=0)
             rms = np.sqrt((off**2).mean(axis=0))
             ratio = np.sqrt(((off[:, 1] - off[:, 0]) ** 2).mean())
-            out = ", ".join(f"{each.out_s:.0f}" for each in found if each.out_s == each.out_s)
+            out = ", ".join("-" if np.isnan(each.out_s) else f"{each.out_s:.0f}" for each in found)
             console.print(
                 f"| `{run}` | {name} | {100 * rms[0]:.0f} % | {100 * rms[1]:.0f} % | "
                 f"{100 * ratio:.0f} % | {100 * inside[0]:.0f} % | {100 * inside[1]:.0f} % | "
-                f"{out or '-'} |"
+                f"{out} |"
             )
 
 

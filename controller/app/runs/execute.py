@@ -235,7 +235,7 @@ def _second_body(
     """Let a bare snake that walks ground that is known use a second body, where there is one.
 
     Returns:
-        What finds the friction under a walk: on that body; without one, on a level floor, on paper.
+        What finds the friction under a walk: on a level floor on paper, elsewhere on that body.
         None where the pose tells nothing of it: by the joints or an IMU it takes friction as known.
 
     """
@@ -249,10 +249,10 @@ def _second_body(
     measured = run.pose == "camera" or (run.pose_is_true and backend.pose is not None)
     if not finds or not measured or isinstance(world.ground, WaterGround):
         return None
-    if twin is not None:
-        model: SlideModel = OnTwin(robot, twin)
-    elif isinstance(world.ground, FlatGround) and world.obstacle is None:
-        model = OnPaper()
+    if isinstance(world.ground, FlatGround) and world.obstacle is None:
+        model: SlideModel = OnPaper()  # a fiftieth of what a twin costs
+    elif twin is not None:
+        model = OnTwin(robot, twin)
     else:
         return None
     use = cast(UsesFriction, source).use_friction
