@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from snakewalk.controller.app.runs.walk_run import WalkRun
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, OnProgress, Progress
+from snakewalk.controller.runtime.friction_monitor import FrictionMonitor, OnPaper
 from snakewalk.controller.runtime.loop import ticks
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
@@ -70,6 +71,9 @@ class NoLog(RunLog):
     def walk(self, *given: Any, **named: Any) -> None:
         """Nothing."""
 
+    def friction(self, *given: Any, **named: Any) -> None:
+        """Nothing."""
+
     def path_replanned(self, *given: Any, **named: Any) -> None:
         """Nothing."""
 
@@ -100,17 +104,21 @@ class SimulatedRobot:
         self.link = SafeLink(chain, limits, self.line.clock)
 
     def walk(self, log: RunLog, on_progress: OnProgress) -> None:
-        """Run the job until its time limit."""
+        """Run the job, on a level floor, until its time limit."""
+        run, pilot = self._prepared.run, self._prepared.pilot()
+        file, period_s = self._prepared.world.friction, 1.0 / run.cycle_hz
+        friction = FrictionMonitor(file, OnPaper(), period_s, pilot.use_friction)
         drive = Drive(
             link=self.link,
             clock=self.line.clock,
             pose=lambda _: self.plant.head_pose(),
-            motion=self._prepared.pilot(),
+            motion=pilot,
             log=log,
             robot=self._prepared.robot,
-            run=self._prepared.run,
+            run=run,
             gain=self._prepared.gain,
             wire_busy_s=lambda: self.line.busy_s,
+            friction=friction if run.walk.finds_friction else None,
             on_progress=on_progress,
         )
         tripped = drive.run().tripped

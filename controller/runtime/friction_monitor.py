@@ -1,8 +1,8 @@
 """Friction monitor: what the friction under the body is, found while it moves.
 
-Every second and a half the motion that was measured is replayed by a model under three frictions,
-one a cycle; which of them brings the body to where it came tells the ground's. The model is a twin,
-or the balance of forces on a level floor.
+Every second and a half, less often while the file's friction holds, the motion that was measured
+is replayed by a model under three frictions, one a cycle; which of them brings the body to where it
+came tells the ground's. The model is a twin, or the balance of forces on a level floor.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,6 +23,9 @@ from snakewalk.controller.walk.twin_rollout import Twin, seen_state
 SPAN_S = 1.5
 """Of motion that is replayed (ours): in less the speed that it begins with counts too much, in more
 bodies go apart."""
+_SETTLED, _RESTS = 4, 3
+"""After so many spans in a row in which the file's friction held, so many are passed over behind
+each that is replayed (ours): a quarter of the cost, and up to 4.5 s until a change is seen."""
 _STRIDE = 5
 """Cycles in a step on paper."""
 _NOTABLE = 0.25
@@ -155,6 +158,7 @@ class FrictionMonitor:
         self._views: list[BodyView] = []
         self._goals_rad: list[Floats] = []
         self._replays: Iterator[FoundFriction | None] = iter(())
+        self._held, self._rests, self._since_s = 0, 0, 0.0
         self._used = self._reported = file
 
     def update(self, view: BodyView, goal_rad: Floats) -> FoundFriction | None:
@@ -167,11 +171,17 @@ class FrictionMonitor:
         self._views.append(view)
         self._goals_rad.append(goal_rad)
         if len(self._views) == self._count + 2:
-            span = Span(tuple(self._views), tuple(self._goals_rad[2:]), self._cycle_s)
-            self._replays = self._judge(span)
+            self._since_s += self._count * self._cycle_s
+            if self._rests > 0:
+                self._rests -= 1
+            else:
+                span = Span(tuple(self._views), tuple(self._goals_rad[2:]), self._cycle_s)
+                self._replays = self._judge(span)
             del self._views[:-2], self._goals_rad[:-2]
         found = next(self._replays, None)
         if found is not None:
+            self._held = 0 if found.differs else self._held + 1
+            self._rests = _RESTS if self._held >= _SETTLED else 0
             friction = found.friction if found.differs else self._file
             if friction != self._used:
                 self._used = friction
@@ -200,4 +210,5 @@ class FrictionMonitor:
         for friction in self._filter.hypotheses():
             foretold.append(self._model.slid(span, friction))
             yield None
-        yield self._filter.update(span.slid, np.array(foretold), self._count * self._cycle_s)
+        since_s, self._since_s = self._since_s, 0.0
+        yield self._filter.update(span.slid, np.array(foretold), since_s)
