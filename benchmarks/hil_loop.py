@@ -1,8 +1,9 @@
 """The whole simulated loop against the physics alone.
 
-The loop is that of ``snakewalk run``: 50 Hz, pilot and what finds the friction, safety, chain, bytes
-both ways, simulated servos, friction, body. The physics alone is ``mj_step`` of the same model at 2 ms, ten steps a
-call, begun in every cycle from the state and forces that the loop had there. Start-up is left out.
+The loop is that of ``snakewalk run``: 50 Hz, pilot and what finds the friction, safety, chain,
+bytes both ways, simulated servos, friction, body. The physics alone is ``mj_step`` of the same
+model at 2 ms, ten steps a call, begun in every cycle from the state and forces that the loop had
+there. Start-up is left out.
 
 All runs repeat bit for bit, so each cycle's cost is the least of all rounds, and what is shown is
 the mean of all cycles: what other programs on the machine cost is left out, on both sides alike.
