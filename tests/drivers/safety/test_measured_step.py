@@ -77,6 +77,32 @@ def test_what_is_read_again_where_it_cannot_be_stays_in_doubt() -> None:
     assert steps.update(back, believed) == (back, None)
 
 
+@pytest.mark.parametrize("all_read", [True, False])
+def test_a_step_has_the_time_from_when_the_one_was_measured_to_when_the_other_was(
+    *, all_read: bool
+) -> None:
+    valid = np.array([True, True, all_read])
+    late = state(position_rad=one(0.4, 0, 0.1), age_s=one(0.01, 0), valid=valid)
+    assert MeasuredSteps(LIMITS).update(late, BEFORE)[1] is not None  # 0.3 rad in 0.01 s
+    old = BEFORE._replace(age_s=one(0.02, 0))
+    now = state(position_rad=one(0.55, 0, 0.1), valid=valid)
+    assert MeasuredSteps(LIMITS).update(now, old)[1] is None  # 0.45 rad in 0.04 s
+
+
+def test_a_reset_forgets_what_was_doubted() -> None:
+    steps = MeasuredSteps(LIMITS)
+    held, _ = steps.update(state(position_rad=one(0.5, 1, 0.1)), BEFORE)
+    steps.reset()
+    now = state(time_s=NOW + 0.2, position_rad=one(0.5, 1, 0.1))
+    assert steps.update(now, held) == (now, None)
+
+
+def test_what_is_held_is_read_only() -> None:
+    held, _ = MeasuredSteps(LIMITS).update(state(position_rad=one(1.4, 1, 0.1)), BEFORE)
+    for array in (held.position_rad, held.velocity_rad_s, held.current_a, held.age_s, held.valid):
+        assert not array.flags.writeable
+
+
 def test_what_is_no_number_is_left_to_the_vetting() -> None:
     now = state(position_rad=one(np.nan, 2, 0.1))
     assert MeasuredSteps(LIMITS).update(now, BEFORE) == (now, None)
