@@ -382,3 +382,66 @@ def balance(
         if may_slide and rigid < (1.0 - 1e-9) * gain:
             return False  # gravity outdoes friction ever faster in this direction
     return True
+
+
+def planar_slide(
+    headings_rad: Floats,
+    points_m: Floats,
+    step_s: Floats,
+    heading_rad: float,
+    along: float,
+    across: float,
+) -> tuple[float, float, float]:
+    """Where a body slides on a level floor whose shape goes through ``n`` given ones.
+
+    Args:
+        headings_rad: (n, L) of the links, about the body's.
+        points_m: (n, L, 2) their centres about the body's, in its frame.
+        step_s: (n - 1,) between the shapes.
+        heading_rad: of the body at the begin.
+        along: friction along the links; every link carries the same weight.
+        across: likewise.
+
+    Returns:
+        Way (2) of the body's centre, m, and its heading at the end.
+
+    """
+    return _slide_through(
+        *(headings_rad, points_m, step_s, heading_rad, along, across),
+        link_table(headings_rad.shape[1]),
+    )
+
+
+@compiled(
+    "UniTuple(float64, 3)(float64[:, ::1], float64[:, :, ::1], float64[::1], float64, float64,"
+    " float64, float64[::1])"
+)
+def _slide_through(
+    headings: Floats,
+    points: Floats,
+    step_s: Floats,
+    heading: float,
+    along: float,
+    across: float,
+    table: Floats,
+) -> tuple[float, float, float]:
+    """``planar_slide`` with a ``link_table``, which is overwritten."""
+    links = headings.shape[1]
+    linear, velocity, quadratic = np.zeros(3), np.zeros(3), np.zeros((3, 3))
+    work, x_m, y_m = np.empty((6, 3)), 0.0, 0.0
+    for n in range(len(step_s)):
+        dt, c, s = step_s[n], np.cos(heading), np.sin(heading)
+        for k in range(links):
+            at = k // LANES * OTHERS + k % LANES
+            here, there = points[n, k], points[n + 1, k]
+            x, y = 0.5 * (here[0] + there[0]), 0.5 * (here[1] + there[1])
+            table[at + POINT_X], table[at + POINT_Y] = c * x - s * y, s * x + c * y
+            x, y = (there[0] - here[0]) / dt, (there[1] - here[1]) / dt
+            table[at + SHAPE_X], table[at + SHAPE_Y] = c * x - s * y, s * x + c * y
+            angle = heading + 0.5 * (headings[n, k] + headings[n + 1, k])
+            table[at + FORWARD_X], table[at + FORWARD_Y] = np.cos(angle), np.sin(angle)
+            table[at + NORMAL] = 1.0
+        balance(table, OTHERS, links, along, across, linear, quadratic, velocity, work)
+        x_m, y_m = x_m + velocity[0] * dt, y_m + velocity[1] * dt
+        heading += velocity[2] * dt
+    return x_m, y_m, heading

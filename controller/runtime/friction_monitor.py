@@ -7,7 +7,6 @@ came tells the ground's. The model is a twin, or the balance of forces on a leve
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final, Protocol
 
 import numpy as np
@@ -17,7 +16,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.mechanics.friction_filter import FoundFriction, FrictionFilter
-from snakewalk.controller.mechanics.rigid_motion import rigid_velocity
+from snakewalk.controller.mechanics.rigid_motion import planar_slide
 from snakewalk.controller.walk.twin_rollout import Twin, seen_state
 
 SPAN_S = 1.5
@@ -101,36 +100,34 @@ class OnPaper:
     """With room for what a camera is off (ours). On hills it is no model: few links bear the body,
     and it would be taken for friction."""
 
+    def __init__(self) -> None:
+        self._span: Span | None = None
+        self._shapes = np.empty((0, 0)), np.empty((0, 0, 2)), np.empty(0)
+
     def slid(self, span: Span, friction: FrictionConfig) -> Floats:
         """As ``SlideModel``."""
-        views, last = span.views, len(span.views) - 1
-        centre_m = views[1].centre_m[:2].copy()
-        heading, velocity = float(views[1].headings_rad.mean()), None
-        for here, there in pairwise([*range(1, last, _STRIDE), last]):
-            step_s = (there - here) * span.cycle_s
-            (here_m, here_rad), (there_m, there_rad) = _shape(views[here]), _shape(views[there])
-            velocity = rigid_velocity(
-                _turned(0.5 * (here_m + there_m), heading),
-                heading + 0.5 * (here_rad + there_rad),
-                _turned((there_m - here_m) / step_s, heading),
-                friction,
-                velocity,
-            )
-            centre_m += velocity[:2] * step_s
-            heading += float(velocity[2]) * step_s
-        return span.slid_to(centre_m, heading)
+        if self._span is not span:  # the shapes are those of every friction
+            self._span, self._shapes = span, _shapes(span)
+        begin = span.views[1]
+        *place_m, heading = planar_slide(
+            *self._shapes, float(begin.headings_rad.mean()), friction.along, friction.across
+        )
+        return span.slid_to(begin.centre_m[:2] + place_m, heading)
 
 
-def _shape(view: BodyView) -> tuple[Floats, Floats]:
-    """Links' centres (L, 2) and headings (L,) about the body's centre and mean heading."""
-    mean = float(view.headings_rad.mean())
-    return _turned((view.link_m - view.centre_m)[:, :2], -mean), view.headings_rad - mean
+def _shapes(span: Span) -> tuple[Floats, Floats, Floats]:
+    """Headings (n, L) and centres (n, L, 2) of the links about those of the body, every few cycles.
 
-
-def _turned(points_m: Floats, by_rad: float) -> Floats:
-    """Points (L, 2) turned about the origin."""
-    (x, y), c, s = points_m.T, np.cos(by_rad), np.sin(by_rad)
-    return np.stack([c * x - s * y, s * x + c * y], axis=1)
+    Last the times (n - 1,) between them, s.
+    """
+    last = len(span.views) - 1
+    at = np.array([*range(1, last, _STRIDE), last])
+    headings = np.array([span.views[k].headings_rad for k in at])
+    points = np.array([(span.views[k].link_m - span.views[k].centre_m)[:, :2] for k in at])
+    mean = headings.mean(axis=1)[:, None]
+    x, y, c, s = points[..., 0], points[..., 1], np.cos(mean), np.sin(mean)
+    turned = np.stack([c * x + s * y, c * y - s * x], axis=-1)
+    return headings - mean, turned, np.diff(at) * span.cycle_s
 
 
 class FrictionMonitor:
