@@ -6,6 +6,7 @@ import pytest
 from snakewalk.config.loader import load_robot
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world, mean_heading_rad
+from snakewalk.controller.mechanics import rigid_motion
 from snakewalk.controller.mechanics.friction_filter import FoundFriction
 from snakewalk.controller.mechanics.rigid_motion import rigid_velocity
 from snakewalk.controller.runtime.friction_monitor import (
@@ -96,6 +97,18 @@ def test_a_change_of_ground_is_found_though_it_had_settled() -> None:
         monitor.update(view, joints_rad(0.0))
     assert used
     assert used[-1].across / used[-1].along == pytest.approx(0.5 / 0.15, rel=0.2)
+
+
+def test_the_slide_of_shapes_is_that_of_single_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A body slides as it did when it was made, compiled or not, but for longer steps."""
+    views = sliding(FILE, 1.0)
+    span = Span(tuple(views), (), CYCLE_S)
+    foretold = OnPaper().slid(span, FILE)
+    np.testing.assert_allclose(foretold, span.slid, atol=6e-3)
+    for name, each in vars(rigid_motion).items():
+        if hasattr(each, "py_func"):
+            monkeypatch.setattr(rigid_motion, name, each.py_func)
+    np.testing.assert_array_equal(OnPaper().slid(span, FILE), foretold)
 
 
 class Notes:

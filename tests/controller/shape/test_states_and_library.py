@@ -9,6 +9,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.capture.readers.generated import EMBEDDED, embedded
 from snakewalk.controller.mechanics.traction import quasi_static_gain
+from snakewalk.controller.shape import crossing
 from snakewalk.controller.shape.crossing import self_touches
 from snakewalk.controller.shape.library import build_library
 from snakewalk.controller.shape.states import energy_kept, pad, random_states, to_angles, to_states
@@ -159,3 +160,15 @@ def test_embedded_waves_travel_from_head_to_tail(name: str) -> None:
 def test_an_unknown_recording_is_refused_by_name() -> None:
     with pytest.raises(InputError, match="nosuch"):
         embedded("nosuch")
+
+
+def test_self_contact_is_the_same_as_the_loops_are_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng, at = np.random.default_rng(3), np.arange(100)
+    phase = 2.0 * np.pi * (rng.uniform(0.5, 3.0, (30, 1)) * at / 100 + rng.uniform(0, 1, (30, 1)))
+    shapes = rng.uniform(0.5, 2.5, (30, 1)) * np.sin(phase)
+    compiled = self_touches(shapes, 1.2, 0.03)
+    assert 0 < compiled.sum() < 30
+    for name, each in vars(crossing).items():
+        if hasattr(each, "py_func"):
+            monkeypatch.setattr(crossing, name, each.py_func)
+    np.testing.assert_array_equal(self_touches(shapes, 1.2, 0.03), compiled)

@@ -6,7 +6,9 @@ import pytest
 from snakewalk.config.loader import load_robot
 from snakewalk.config.run import WalkConfig
 from snakewalk.controller.capture.readers.generated import embedded
+from snakewalk.controller.kinematics import retarget
 from snakewalk.controller.kinematics.retarget import Retarget
+from snakewalk.controller.walk import joint_track, time_law
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.joint_track import JointTrack
 from snakewalk.controller.walk.serpenoid import Serpenoid
@@ -130,3 +132,22 @@ def test_without_the_acceleration_limit_the_same_walk_breaks_it() -> None:
         pulse.advance(DT)
         goals.append(pulse.goal_rad())
     assert np.abs(np.diff(goals, 2, axis=0)).max() / DT**2 > ACCELERATION
+
+
+def test_the_loops_as_they_are_written_go_the_same_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    def heads() -> list[float]:
+        joints = JointTrack(AngleTrack(np.zeros(100)), Retarget(load_robot("yaw16")).joints_rad)
+        law, rng = timed(joints), np.random.default_rng(5)
+        at = []
+        for _ in range(60):
+            if joints.track.end - law.head < 8.0:
+                joints.track.append(np.cumsum(0.05 * rng.standard_normal(10)))
+            at.append(law.advance(DT))
+        return at
+
+    compiled = heads()
+    for module in (time_law, joint_track, retarget):
+        for name, each in vars(module).items():
+            if hasattr(each, "py_func"):
+                monkeypatch.setattr(module, name, each.py_func)
+    assert heads() == compiled
