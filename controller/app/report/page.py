@@ -149,8 +149,10 @@ def _tiles(n: RunSummary) -> list[str]:
     ]  # fmt: skip
     found = n.friction_found
     if found is not None:
+        (along, along_to), (across, across_to) = found.along_95, found.across_95
         tiles.append(
             _tile("Friction found", f"{found.along:.2f} along, {found.across:.2f} across",
+                  f"95 %: {along:.2f} to {along_to:.2f}, {across:.2f} to {across_to:.2f}; "
                   f"world's file: {found.along_file:g}, {found.across_file:g}")
         )  # fmt: skip
     if n.waypoints == 0:  # a gait has no path, and its shape need not go along the body
