@@ -61,8 +61,6 @@ class MeasuredSteps:
         doubted &= state.valid
         self._remember(doubted, state)
         if not doubted.any():
-            if state.valid.all() or believed.valid.all():
-                return state, None
             held = ~state.valid & (position_rad != believed.position_rad)
             return (_held(state, believed, held) if held.any() else state), None
         joint = int(np.argmax(np.where(doubted, step_rad, 0.0)))

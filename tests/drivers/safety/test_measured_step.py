@@ -57,9 +57,12 @@ def test_what_was_not_believed_is_not_believed_because_it_is_not_read_again() ->
     steps = MeasuredSteps(LIMITS)
     held, _ = steps.update(forged, BEFORE)
     unread = forged._replace(time_s=NOW + 0.02, valid=np.arange(J) != 1, age_s=one(0.02, 1))
+    unread.position_rad[0] = 0.12
     found, doubt = steps.update(unread, held)
     assert doubt is None
     assert found.position_rad[1] == 0.1
+    assert found.position_rad[0] == 0.12
+    assert found.valid[0]
     assert found.age_s[1] == pytest.approx(0.04)
     assert not found.valid[1]
 
@@ -87,6 +90,51 @@ def test_a_step_has_the_time_from_when_the_one_was_measured_to_when_the_other_wa
     old = BEFORE._replace(age_s=one(0.02, 0))
     now = state(position_rad=one(0.55, 0, 0.1), valid=valid)
     assert MeasuredSteps(LIMITS).update(now, old)[1] is None  # 0.45 rad in 0.04 s
+
+
+AT_ZERO = BEFORE._replace(position_rad=np.zeros(J))
+NOT_ALL = np.arange(J) != J - 1
+
+
+def test_a_joint_that_is_not_read_keeps_what_was_believed() -> None:
+    before = BEFORE._replace(valid=NOT_ALL)
+    unread = state(position_rad=one(0.15, J - 1, 0.1), valid=NOT_ALL)
+    found, doubt = MeasuredSteps(LIMITS).update(unread, before)
+    assert doubt is None
+    assert found.position_rad[J - 1] == 0.1
+
+
+@pytest.mark.parametrize("step_rad", [0.19, 0.2])
+def test_a_reading_from_before_the_last_one_has_the_slack_alone(step_rad: float) -> None:
+    older = state(position_rad=one(step_rad, 0), age_s=one(0.05, 0), valid=NOT_ALL)
+    assert MeasuredSteps(LIMITS).update(older, AT_ZERO)[1] is None
+    farther = older._replace(position_rad=one(step_rad + 0.02, 0))
+    assert MeasuredSteps(LIMITS).update(farther, AT_ZERO)[1] is not None
+
+
+def test_a_doubt_of_one_joint_is_no_doubt_of_another_that_moves_quickly() -> None:
+    steps = MeasuredSteps(LIMITS)
+    held, _ = steps.update(state(position_rad=one(0.5, 1)), AT_ZERO)
+    later = state(time_s=NOW + 0.02, position_rad=one(0.25, 0))
+    assert steps.update(later, held)[1] is None
+
+
+def test_a_doubt_lasts_within_the_slack_about_it_and_beyond_the_slack_of_what_was_believed() -> (
+    None
+):
+    """Both edges count as the slack's."""
+    for believed_rad, doubted_rad, again_rad, lasts in (
+        (-0.25, 0.2, 0.0, True),
+        (0.0, 0.375, 0.2, False),
+    ):
+        before, steps = (
+            BEFORE._replace(position_rad=np.full(J, believed_rad)),
+            MeasuredSteps(LIMITS),
+        )
+        held, doubt = steps.update(state(position_rad=one(doubted_rad, 1, believed_rad)), before)
+        assert doubt is not None
+        later = state(time_s=NOW + 0.1, position_rad=one(again_rad, 1, believed_rad))
+        assert (steps.update(later, held)[1] is not None) == lasts
 
 
 def test_a_reset_forgets_what_was_doubted() -> None:

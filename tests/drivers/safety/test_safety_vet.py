@@ -8,8 +8,16 @@ from hypothesis import strategies as st
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.run import SafetyConfig
+from snakewalk.drivers.protocol.packet import ALERT
+from snakewalk.drivers.protocol.registers import Alarm
 from snakewalk.drivers.safety.limits import SafetyLimits
-from snakewalk.drivers.safety.vet import SafetyMemory, Verdict, vet
+from snakewalk.drivers.safety.vet import (
+    SafetyMemory,
+    Verdict,
+    overloaded_joint,
+    vet,
+    without_alarm,
+)
 from snakewalk.drivers.types import JointCommand, JointState
 
 J = 3
@@ -293,3 +301,35 @@ def test_the_names_of_a_joint_are_its_place_from_the_head_and_its_id() -> None:
         "joint 2 (ID 42)",
         "joint 3 (ID 43)",
     )
+
+
+@pytest.mark.parametrize("joint", range(J))
+def test_an_overload_is_a_joint_s_if_it_is_the_only_alarm(joint: int) -> None:
+    other = (joint + 1) % J
+    none, overload = np.zeros(J, np.uint8), np.zeros(J, np.uint8)
+    alert, result = none.copy(), none.copy()
+    overload[joint], alert[joint], result[other] = Alarm.OVERLOAD, ALERT, 1
+    assert overloaded_joint(state()) is None
+    assert overloaded_joint(state(hardware_error=overload)) == joint
+    assert overloaded_joint(state(hardware_error=overload, error=alert)) == joint
+    assert overloaded_joint(state(hardware_error=overload, error=result)) == joint
+    assert overloaded_joint(state(error=alert)) is None
+    hot = overload | np.uint8(Alarm.OVERHEATING)
+    assert overloaded_joint(state(hardware_error=hot)) is None
+    both, alerts = overload.copy(), alert.copy()
+    both[other], alerts[other] = Alarm.OVERLOAD, ALERT
+    assert overloaded_joint(state(hardware_error=both)) is None
+    assert overloaded_joint(state(hardware_error=overload, error=alerts)) is None
+
+
+def test_without_its_alarm_a_joint_shows_what_else_is_wrong() -> None:
+    hardware_error, error = np.full(J, Alarm.OVERLOAD, np.uint8), np.full(J, ALERT | 1, np.uint8)
+    before = state(hardware_error=hardware_error, error=error)
+    found = without_alarm(before, 1)
+    others = [k for k in range(J) if k != 1]
+    assert found.hardware_error[1] == 0
+    assert found.error[1] == 1
+    assert (found.hardware_error[others] == Alarm.OVERLOAD).all()
+    assert (found.error[others] == ALERT | 1).all()
+    assert (before.hardware_error == Alarm.OVERLOAD).all()
+    assert (before.error == ALERT | 1).all()
