@@ -250,7 +250,7 @@ def _second_body(
     if not finds or not measured or isinstance(world.ground, WaterGround):
         return None
     if isinstance(world.ground, FlatGround) and world.obstacle is None:
-        model: SlideModel = OnPaper()  # a fiftieth of what a twin costs
+        model: SlideModel = OnPaper()  # moves no second body in every walk
     elif twin is not None:
         model = OnTwin(robot, twin)
     else:
