@@ -41,26 +41,46 @@ class BodyView(NamedTuple):
         return _mean_advance_m(before.link_m, self.link_m, self.rotation)
 
 
+class SpineLinks(NamedTuple):
+    """The links of a robot's spine, for those who ask where they are in every cycle."""
+
+    yaws: Bools
+    """(L - 1,) whether a joint is a yaw joint."""
+    half_m: Floats
+    """(L,) half the length of each link."""
+    weight: Floats
+    """(L,) mass of each link over the head's: exactly 1 if all are alike."""
+
+    @staticmethod
+    def of(robot: RobotConfig) -> "SpineLinks":
+        """Of a robot's file."""
+        return _spine(robot.joint_axes, robot.link_lengths_m, robot.link_masses_kg)
+
+    def in_world(self, pose: BodyPose, joint_rad: Floats) -> BodyView:
+        """As ``body_in_world``."""
+        yaws, half_m, weight = self
+        links = len(half_m)
+        rotation, centres = np.empty((links, 3, 3)), np.empty((links + 1, 3))
+        _forward(
+            *(yaws, pose.rotation, pose.head_in_world_m, joint_rad[: links - 1]),
+            *(half_m, weight, rotation, centres),
+        )
+        return BodyView(centres[:-1], rotation, centres[-1])
+
+
 def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> BodyView:
     """Forward kinematics of the spine from the head pose and joint angles (J,), legs left out.
 
     Yaw turns the link behind by ``-q`` about the up axis, pitch by ``+q`` about the left axis, so a
     positive joint bends the head side to the left, or lifts it.
     """
-    links = robot.link_count
-    rotation, centres = np.empty((links, 3, 3)), np.empty((links + 1, 3))
-    half_m, weight = _spine(robot.link_lengths_m, robot.link_masses_kg)
-    _forward(
-        *(_yaws(robot.joint_axes), pose.rotation, pose.head_in_world_m, joint_rad[: links - 1]),
-        *(half_m, weight, rotation, centres),
-    )
-    return BodyView(centres[:-1], rotation, centres[-1])
+    return SpineLinks.of(robot).in_world(pose, joint_rad)
 
 
 def chain_angles_rad(robot: RobotConfig, body: BodyView) -> Floats:
     """(J,) angles of the spine's joints, in (-pi, pi]: the inverse of ``body_in_world``."""
     ahead, behind = body.rotation[:-1], body.forward[1:]
-    side = np.where(_yaws(robot.joint_axes)[:, None], ahead[:, :, 1], ahead[:, :, 2])
+    side = np.where(SpineLinks.of(robot).yaws[:, None], ahead[:, :, 1], ahead[:, :, 2])
     sine, cosine = (behind * side).sum(axis=1), (behind * ahead[:, :, 0]).sum(axis=1)
     return np.asarray(np.arctan2(-sine, cosine))
 
@@ -73,19 +93,19 @@ def chain_points_m(robot: RobotConfig, body: BodyView) -> Floats:
 
 def half_lengths_m(robot: RobotConfig) -> Floats:
     """(L,) half the length of each link of the spine."""
-    return _spine(robot.link_lengths_m, robot.link_masses_kg)[0]
+    return SpineLinks.of(robot).half_m
 
 
 def link_weights(robot: RobotConfig) -> Floats:
     """(L,) mass of each link of the spine over that of a mean link; ones if all are alike."""
-    weight = _spine(robot.link_lengths_m, robot.link_masses_kg)[1]
+    weight = SpineLinks.of(robot).weight
     return np.asarray(weight * (len(weight) / weight.sum()))
 
 
 def chain_axes(robot: RobotConfig, body: BodyView) -> Floats:
     """(J, 3) unit axes about which a positive angle of each joint turns what is *behind* it."""
     left, up = body.rotation[:-1, :, 1], body.rotation[:-1, :, 2]
-    return np.where(_yaws(robot.joint_axes)[:, None], -up, left)
+    return np.where(SpineLinks.of(robot).yaws[:, None], -up, left)
 
 
 def chain_jacobian(points_m: Floats, axes: Floats) -> Floats:
@@ -107,22 +127,20 @@ def chain_jacobian(points_m: Floats, axes: Floats) -> Floats:
 
 
 @cache
-def _yaws(joint_axes: str) -> Bools:
-    """(J,) whether a joint is a yaw joint."""
-    return np.array([axis == "y" for axis in joint_axes])
-
-
-@cache
-def _spine(lengths_m: tuple[float, ...], masses_kg: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """(L,) half lengths of links, and their masses over the head's: exactly 1 if all are alike."""
-    half_m, weight = 0.5 * np.array(lengths_m), np.array(masses_kg) / masses_kg[0]
-    half_m.flags.writeable = weight.flags.writeable = False
-    return half_m, weight
+def _spine(
+    joint_axes: str, lengths_m: tuple[float, ...], masses_kg: tuple[float, ...]
+) -> SpineLinks:
+    yaws = np.array([axis == "y" for axis in joint_axes])
+    spine = SpineLinks(yaws, 0.5 * np.array(lengths_m), np.array(masses_kg) / masses_kg[0])
+    for array in spine:
+        array.flags.writeable = False
+    return spine
 
 
 @compiled(
-    f"void(boolean[::1], {readonly_array(dimensions=2)}, {readonly_array()}, {readonly_array()},"
-    f" {readonly_array()}, {readonly_array()}, float64[:, :, ::1], float64[:, ::1])"
+    f"void({readonly_array('boolean')}, {readonly_array(dimensions=2)}, {readonly_array()},"
+    f" {readonly_array()}, {readonly_array()}, {readonly_array()}, float64[:, :, ::1],"
+    " float64[:, ::1])"
 )
 def _forward(
     yaws: Bools,

@@ -11,7 +11,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.controller.kinematics.links import BodyView, body_in_world
+from snakewalk.controller.kinematics.links import BodyView, SpineLinks
 from snakewalk.controller.kinematics.smoothstep import QUINTIC_BEND_MAX, QUINTIC_SLOPE_MAX, quintic
 from snakewalk.controller.motion.compliance import Compliance
 from snakewalk.controller.motion.path_progress import OpenWaypoints, path_progress
@@ -173,13 +173,13 @@ class Drive:
     def run(self) -> Outcome:
         """Enable, ramp to the first shape, follow the path, settle, disable."""
         clock, log, motion, path = self._clock, self._log, self._motion, self._path
-        period_s = 1.0 / self._run.cycle_hz
+        period_s, spine = 1.0 / self._run.cycle_hz, SpineLinks.of(self._robot)
         with _no_long_collections(), self._link:
             state = self._link.enable()
             self._wire_s = self._wire_busy_s()
             if self._observer is not None:
                 self._observer.begin(state)
-            view = body_in_world(self._robot, self._pose(state), state.position_rad)
+            view = spine.in_world(self._pose(state), state.position_rad)
             if isinstance(motion, StartsAnywhere):
                 motion.start_at(state.position_rad)
             ramp = Ramp(
@@ -198,7 +198,7 @@ class Drive:
                 except SafetyTrippedError:
                     break
                 pose = self._pose(state)
-                view = body_in_world(self._robot, pose, state.position_rad)
+                view = spine.in_world(pose, state.position_rad)
                 self._displacement_m = (
                     view.advance_since_m(self._last) if self._last is not None else 0.0
                 )

@@ -261,18 +261,18 @@ class ControlCycle:
             self._requests[key] = request
         return request
 
-    def _send(self, packet: bytes) -> float:
-        """Write; when the bytes will have left the host (a write does not wait for it)."""
-        free_s = self._line.reserve(self._wire_s(len(packet)))
+    def _send(self, packet: bytes) -> None:
+        self._line.reserve(len(packet) * self._byte_s)
         self._port.write(packet)
-        return free_s
 
     def _begin_read(self, request: GroupReadRequest, goals: NDArray[np.int32] | None) -> float:
         """Send a request; until when its reply is awaited."""
-        goal_packet = b"" if goals is None else self._goals.encode(goals)
+        packet = request.packet if goals is None else self._goals.encode(goals) + request.packet
         self._port.clearPort()
-        free_s = self._send(goal_packet + request.packet)
-        return free_s + self._wire_s(request.reply_bytes) + self._latency_s
+        byte_s = self._byte_s
+        free_s = self._line.reserve(len(packet) * byte_s)
+        self._port.write(packet)
+        return free_s + request.reply_bytes * byte_s + self._latency_s
 
     def _receive_rest(
         self, request: GroupReadRequest, raw: bytes, remaining_s: float
@@ -297,7 +297,7 @@ class ControlCycle:
         while len(raw) >= request.reply_bytes and not reply.complete:
             more = request.missing_bytes(raw)  # stuffed bytes, or an older reply, come on top
             surplus = len(raw) + more - expected
-            got = self._port.read_until(more, deadline_s + self._wire_s(surplus)) if more else b""
+            got = self._port.read_until(more, deadline_s + surplus * self._byte_s) if more else b""
             if not got:
                 break
             raw += got
@@ -309,7 +309,7 @@ class ControlCycle:
         port, expected = self._port, request.reply_bytes
         if not request.parse(raw[:expected]).whole:
             return raw
-        more_s = port.clock.now_s() + self._wire_s(2 * HEAD)
+        more_s = port.clock.now_s() + 2 * HEAD * self._byte_s
         raw += port.read_until(expected + HEAD - len(raw), more_s)
         if HEADER not in raw[expected:]:
             return raw[:expected]  # noise, as when an adapter turns the line round
@@ -317,12 +317,15 @@ class ControlCycle:
 
     def _came_twice(self, request: GroupReadRequest, deadline_s: float) -> bool:
         """Whether a reply that is complete now is an older one."""
-        reply_s = self._wire_s(request.reply_bytes)
+        byte_s = self._byte_s
+        reply_s = request.reply_bytes * byte_s
         free_s = deadline_s - reply_s - self._latency_s
-        return self._line.came_twice(free_s, self._wire_s(len(request.packet)), reply_s)
+        return self._line.came_twice(free_s, len(request.packet) * byte_s, reply_s)
 
-    def _wire_s(self, count: int) -> float:
-        return count * BITS_PER_BYTE / self._port.getBaudRate()
+    @property
+    def _byte_s(self) -> float:
+        """Time of a byte on the line."""
+        return BITS_PER_BYTE / self._port.getBaudRate()
 
     def _succeeded(self) -> None:
         self._clean_in_a_row += 1

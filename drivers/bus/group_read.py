@@ -44,11 +44,18 @@ class GroupReadReply(NamedTuple):
     """Whether only the expected bytes were on the line."""
     whole: bool = False
     """Known to be complete: a regular reply."""
+    flawless: bool = False
+    """Known to be valid from all servos, and none reports an error."""
 
     @property
     def complete(self) -> bool:
         """Whether all servos have replied."""
         return self.whole or int(np.count_nonzero(self.answered)) == len(self.answered)
+
+    @property
+    def valid_count(self) -> int:
+        """Number of servos whose block is valid."""
+        return len(self.valid) if self.flawless else int(np.count_nonzero(self.valid))
 
 
 class GroupReadRequest:
@@ -94,7 +101,9 @@ class GroupReadRequest:
         """Regular reply: ``status`` is what the frame reader returned; ``data`` is kept."""
         everyone = self._all
         if status == FLAWLESS:
-            return GroupReadReply(data, everyone, self._no_error, everyone, clean=True, whole=True)
+            return GroupReadReply(
+                *(data, everyone, self._no_error, everyone), clean=True, whole=True, flawless=True
+            )
         error = error.copy()
         return GroupReadReply(data, (error & _RESULT) == 0, error, everyone, clean=True, whole=True)
 

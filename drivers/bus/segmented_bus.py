@@ -279,5 +279,8 @@ class SegmentedCycle:
             error[at] = reply.error
         each = replies.values()
         return GroupReadReply(
-            data, valid, error, answered, all(r.clean for r in each), all(r.whole for r in each)
+            *(data, valid, error, answered),
+            clean=all(r.clean for r in each),
+            whole=all(r.whole for r in each),
+            flawless=all(r.flawless for r in each),
         )

@@ -198,8 +198,7 @@ class Readings:
         Where it is read ``again`` in a cycle, what came the first time is of this cycle as well.
         """
         ok = reply.valid
-        trouble = np.count_nonzero(reply.error) or self._alarmed
-        if not trouble and np.count_nonzero(ok) == len(ok):  # the regular case
+        if reply.flawless and not self._alarmed:  # the regular case
             self._decoder.decode(reply.data, self._motion)
             self._measured_at_s.fill(measured_at_s)
             if ok is not self._valid:

@@ -454,7 +454,7 @@ class ServoChain:
         reply = self._cycle.read()
         if self._fast_reads and not self._cycle.fast:
             self._report_plain_reads()
-        read = int(np.count_nonzero(reply.valid))  # a tenth of the time of any() and all()
+        read = reply.valid_count
         losses = self._losses.update(read, len(reply.valid))
         if losses is not None:
             self.on_event(losses)
@@ -740,7 +740,7 @@ class RegisterCheck:
         reply, register = self.cycle.read(), self.register
         kind = f"<{'i' if register.signed else 'u'}{register.size}"
         values = np.ascontiguousarray(reply.data).view(kind)[:, 0]
-        everybody = int(np.count_nonzero(reply.valid)) == len(reply.valid)
+        everybody = reply.valid_count == len(reply.valid)
         if everybody and values.tolist() == self.values:  # the usual case
             return {}, True
         found = {}

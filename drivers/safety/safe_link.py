@@ -222,8 +222,8 @@ class SafeLink:
         except DriverError as fault:
             self._recover(str(fault), fault)
         else:  # if the program stood still in between, the next step counts from here
-            memory = verdict.memory
-            self._memory = memory._replace(time_s=self._clock.now_s())
+            _, goal_rad, since_s, checked = verdict.memory
+            self._memory = SafetyMemory(self._clock.now_s(), goal_rad, since_s, checked)
 
     def request_stop(self, reason: str) -> None:
         """Latch at the next read or write; may be called from another thread (a stop button)."""

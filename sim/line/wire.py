@@ -130,8 +130,11 @@ class Wire(ABC):
 
     def getBytesAvailable(self) -> int:
         """Bytes that have arrived by now."""
-        self._deliver(self.clock.now_s())
-        return self._rx_queue.count(self.clock.now_s())
+        if not (self._sent or self._rx_queue):
+            return 0
+        now_s = self.clock.now_s()
+        self._deliver(now_s)
+        return self._rx_queue.count(now_s)
 
     def writePort(self, packet: bytes | list[int]) -> int:
         """As ``write``; the number of bytes taken."""

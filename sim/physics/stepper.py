@@ -477,6 +477,7 @@ class CompiledSteps:
             m.spine_links,
         )
         self._sizes = np.array(sizes, dtype=np.int64)
+        self._mu = m.mu
         self._constants = np.array([*m.mu, m.radius_m, m.step_s, *m.planes.corner_m])
         self._drive: ServoDrive | None = None
         self._addresses = np.zeros(0, dtype=np.int64)
@@ -491,5 +492,7 @@ class CompiledSteps:
             joints = m.model.dof_frictionloss, m.data.qfrc_bias, m.data.qfrc_constraint
             arrays = (*self._arrays, *motors, *links, *joints)
             self._addresses = np.array([each.ctypes.data for each in arrays], dtype=np.int64)
-        self._constants[:3] = self._m.mu  # it may have changed
+        mu = self._m.mu
+        if mu is not self._mu:
+            self._mu, self._constants[:3] = mu, mu
         run_steps(steps, self._where, self._addresses, self._sizes, self._constants)

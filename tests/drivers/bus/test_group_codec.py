@@ -103,6 +103,7 @@ def test_fast_answers_are_never_unstuffed(compiled: bool, data: list[bytes]) -> 
         assert [row.tobytes() for row in reply.data] == data
         assert reply.valid.all()
         assert reply.clean
+        assert reply.flawless
 
 
 @both_ways
@@ -123,6 +124,8 @@ def test_what_is_valid_after_damage_is_what_was_sent(
         reply = request.parse(bytes(raw))
         for k in np.flatnonzero(reply.valid):
             assert reply.data[k].tobytes() == data[k]
+        assert reply.valid_count == reply.valid.sum()
+        assert not reply.flawless or (reply.valid.all() and not reply.error.any())
 
 
 @given(st.integers(0, 15))
@@ -153,6 +156,8 @@ def test_the_error_byte_of_each_servo_comes_through(compiled: bool) -> None:
             assert reply.error.tolist() == [0, 0x80, 0x03, 0x87]
             assert reply.valid.tolist() == [True, True, False, False]  # an alert still has values
             assert reply.answered.all()
+            assert not reply.flawless
+            assert reply.valid_count == 2
 
 
 def test_an_error_without_data_is_an_answer_but_no_value() -> None:

@@ -308,7 +308,7 @@ def test_a_check_whose_reply_is_lost_is_made_again_in_the_next_cycle_with_time(
         if not remaining:
             return reply
         remaining.pop()
-        return reply._replace(valid=np.zeros(4, np.bool_))
+        return reply._replace(valid=np.zeros(4, np.bool_), flawless=False)
 
     check.cycle.read = lose  # type: ignore[method-assign]
     for _ in range(lost):
