@@ -99,7 +99,7 @@ class WalkConfig(Strict):
         ge=0,
         le=50,
         description="in simulation, on slopes over 8 degrees: pieces of a decision that a second "
-        "simulated body tries where the best one fails there; 0: none",
+        "simulated body tries where the best one fails there; 0: none, and rolls are on paper",
     )
     finds_friction: bool = Field(
         True,

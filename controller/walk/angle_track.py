@@ -8,7 +8,6 @@ with no sliding every point of the body passes through the angles of the head ex
 import copy
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from snakewalk.config.arrays import Floats
 
@@ -58,14 +57,17 @@ class AngleTrack:
         """
         if not self.points <= head <= self.end:
             raise ValueError(f"head at {head:.2f}; the track serves {self.points} to {self.end}")
-        first, last = int(head) - self.points, min(int(head) + 1, self.end)
-        at = head - np.arange(1, self.points + 1)
-        return np.asarray(np.interp(at, np.arange(first, last), self._samples[first:last]))
+        first, part = int(head) - self.points, head % 1.0
+        body = self._samples[first : int(head)][::-1]
+        if part == 0.0:
+            return body.copy()
+        before = self._samples[first + 1 : int(head) + 1][::-1]
+        return np.asarray(body + part * (before - body))
 
     def bodies_rad(self, first: int, last: int) -> Floats:
         """(n, N) ``body_rad`` at the whole heads from ``first`` to ``last``, both included."""
-        samples = self._samples[first - self.points : last]
-        return sliding_window_view(samples, self.points)[:, ::-1]
+        heads = np.arange(first, last + 1)[:, None]
+        return np.asarray(self._samples[heads - np.arange(1, self.points + 1)])
 
     def at_rad(self, sample: Floats) -> Floats:
         """Angles at places on the track, between samples linearly; clamped to its ends."""

@@ -301,6 +301,26 @@ class Course:
         if best is not None and best.path is not path:
             self.path, self._passed_m, self.replanned = best.path, best.passed_m, why
 
+    @property
+    def off_path_m(self) -> float:
+        """Distance of the body's centre from the path."""
+        return float(self._gap_m[0])
+
+    def lay_from_here(self, why: str, heading_rad: Callable[[], float]) -> None:
+        """Plan again from the head, in the body's direction; it counts as no miss.
+
+        Where no path is found, the old one stays.
+
+        Args:
+            why: for ``replanned``.
+            heading_rad: of the body.
+
+        """
+        with suppress(InputError):
+            self._lay(self._followers_m[1].copy(), heading_rad())
+            self.replanned = why
+            self._replan_after = self._travel + _REPLAN_AFTER_BODIES * self._per_body
+
     def lead_to(self, left_m: Floats, heading_rad: Callable[[], float]) -> None:
         """Go on to waypoints (k, 2) instead of those that are left.
 

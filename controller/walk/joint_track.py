@@ -42,7 +42,9 @@ class JointTrack:
         self._q = self._joints_of(track.body_rad(float(track.points)))[None]
 
     def _joints_of(self, body_rad: Floats) -> Floats:
-        return np.clip(self._joints(body_rad), -self._limit_rad, self._limit_rad)
+        joint_rad = self._joints(body_rad)
+        clipped = np.minimum(np.maximum(joint_rad, -self._limit_rad), self._limit_rad)
+        return np.asarray(clipped)
 
     def on(self, track: AngleTrack) -> "JointTrack":
         """Return a copy on a track that begins as its own."""

@@ -138,9 +138,12 @@ class Pilot(OnCourse):
         self._roll = roll
         self._table: PathTable | None = None
         self._table_of: tuple[SplinePath, int] | None = None
+        points = chooser.track.points
         self._links = len(self._goal_rad) + 1
+        self._segments = np.arange(points)
+        self._middles = (np.arange(self._links) + 0.5) * points / self._links - 0.5
         self._pitch_lead_s = pitch_lead_s
-        self._segment_m = length_m / chooser.track.points
+        self._segment_m = length_m / points
         self._carrot_m = carrot_m
         self._feedback = feedback
         self._aim_at_waypoint = aim_at_waypoint
@@ -148,6 +151,7 @@ class Pilot(OnCourse):
         self._start: tuple[Floats, float] | None = None
         self._at_rest = True
         self._decides = True
+        self._coasts = False
         self.decision: Decision | None = None
         """Made in the last step, if one was."""
 
@@ -192,7 +196,7 @@ class Pilot(OnCourse):
     @property
     def at_end(self) -> bool:
         """Whether the head has come to the end of the track."""
-        return self.head >= self._chooser.track.end - 1.0
+        return self.head >= self._time_law.joints.track.end - 1.0
 
     def end_on(self, piece_rad: Floats) -> None:
         """Append a piece (n,) of track, the last until ``go_on`` or ``restart``."""
@@ -228,7 +232,7 @@ class Pilot(OnCourse):
         if self._saved_s < _SHORTEST_STEP_S:
             return self._goal_rad
         dt_s, self._saved_s = self._saved_s, 0.0
-        goal = self._steer(dt_s, view)
+        goal = self._move(dt_s, view) if self._coasts else self._steer(dt_s, view)
         self._earlier_rad, self._last_rad, self._goal_rad = self._last_rad, self._goal_rad, goal
         self._earlier_s, self._last_s = self._last_s, dt_s
         return goal
@@ -280,11 +284,23 @@ class Pilot(OnCourse):
         if self._twin is not None:
             self._twin.friction = friction
 
+    @property
+    def twin(self) -> TwinRollout | None:
+        """On which pieces of track are tried, where there is one."""
+        return self._twin
+
+    def coasting(self, piece_rad: Floats) -> "Pilot":
+        """Return a copy that goes on by itself to the end of the track and a piece (n,) more."""
+        other, track = copy.copy(self), self._chooser.track.with_piece(piece_rad)
+        other._time_law, other._roll = self._time_law.on(track), copy.copy(self._roll)
+        other._coasts = True
+        return other
+
     def _try_piece(self, pose: PathPose, piece_rad: Floats) -> Rolled:
         """What becomes of the body on a piece (n,) that would be appended to the track."""
         assert self._twin is not None
-        other, track = copy.copy(self), self._chooser.track.with_piece(piece_rad)
-        other._time_law, other._roll = self._time_law.on(track), copy.copy(self._roll)
+        other = self.coasting(piece_rad)
+        track = other._time_law.joints.track
         end = min(self.head + LENGTH_BODIES * track.points, track.end - _LOOKAHEAD_SEGMENTS)
         return self._twin.roll(pose, lambda: other.head >= end, other._move)
 
@@ -321,9 +337,7 @@ class Pilot(OnCourse):
 
     def _at_links(self, body: Floats) -> Floats:
         """Values (L,) at the links' middles of values (N,) along the body."""
-        points = len(body)
-        at = (np.arange(self._links) + 0.5) * points / self._links - 0.5
-        return np.interp(at, np.arange(points), body)
+        return np.interp(self._middles, self._segments, body)
 
     def path_pose(self, view: BodyView) -> PathPose:
         """Where the body is, and where its path leads."""
@@ -345,7 +359,9 @@ class Pilot(OnCourse):
 
     def _aim(self, view: BodyView) -> tuple[float, float]:
         """Offset from track to world, and the direction of the aim there."""
-        offset, head_m, centre_m = self._measured(view)
+        headings_rad, head_m, centre_m = view.headings_rad, view.link_m[0, :2], view.centre_m[:2]
+        believed_rad = self._at_links(self._chooser.track.body_rad(self.head))
+        offset = offset_rad(headings_rad, believed_rad)
         if self._start is None:
             self._start = (head_m, offset)
         waypoints_m = self.course.waypoints_m
@@ -359,15 +375,11 @@ class Pilot(OnCourse):
             return offset, aim_rad(self.path, head_m, along_m, self._carrot_m)
         # The piece begins where the track ends now: aim from where the head will be by then.
         lead_m = (self._chooser.track.end - self.head) * self._segment_m
-        heading = view.headings_rad.mean()
+        heading = headings_rad.mean()
         ahead_m = head_m + lead_m * np.array([np.cos(heading), np.sin(heading)])
         return offset, aim_rad(
             self.path, ahead_m, self.course.head_along_m + lead_m, self._carrot_m
         )
-
-    def _measured(self, view: BodyView) -> tuple[float, Floats, Floats]:
-        believed = self._at_links(self._chooser.track.body_rad(self.head))
-        return offset_rad(view.headings_rad, believed), view.link_m[0, :2], view.centre_m[:2]
 
     def _dead_reckoned(self, start_m: Floats, offset: float) -> Floats:
         """Head of a body that never slipped since the first decision."""

@@ -21,6 +21,7 @@ from snakewalk.controller.mechanics.rollout import Rolled
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.shape.star import StarVisits
 from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.controller.walk.bend_search import FAR, SCREEN, UNLIKE, hexagon, vertex
 from snakewalk.controller.walk.serpenoid import SERPENOID, SerpenoidParameters, phase_at_end
 from snakewalk.controller.walk.steering import PathPose, Steering
 from snakewalk.drivers.compiling import compiled
@@ -41,18 +42,10 @@ _REST = 20
 """Decisions in which no state comes again."""
 _BATCH = 6
 """Rollouts in a cycle: 1 to 3 ms of a processor of 2020."""
-_FIVE = (-1.0, -0.5, 0.0, 0.5, 1.0)
-_SCREEN = 0.5 * np.array([-1.0, 0.0, 1.0])
-_GRID = np.array([(first, second) for second in (-1.0, 0.0, 1.0) for first in _FIVE])
-_AROUND = np.array(
-    [[-1, 0], [1, 0], [0, -1], [0, 1], [-1, -1], [1, 1], [-1, 1], [1, -1]], dtype=float
-)
-_UNLIKE = np.array([[0, 0], [-1, 0], [1, 0], [-1, 1], [1, -1]], dtype=float)
-"""Bends of other states that are tried."""
+_ASTRAY_M2 = 0.08
+"""Cost from which on bends all over are judged (ours): 0.2 m off the path at both ends."""
 _TROUBLE_M2 = 0.2
 """Cost on a simulated body from which on other pieces are tried: 0.3 m off the path at the end."""
-_FINER = np.array([0.25, 0.5])
-"""Steps to the neighbours of the best of the grid: half of the grid's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +118,10 @@ class PredictiveWalker:
         self.try_piece: Callable[[PathPose, Floats], Rolled] | None = None
         """Tries a piece (n,) on a simulated body; None where there is none."""
         self.outlook = 1.0
-        """Predicted of the last decision: progress over that at the wanted pulse without slip."""
+        """Predicted of the last decision: progress over that at the wanted pulse without slip.
+
+        Where the piece was tried on a simulated body, it is that body's.
+        """
 
     def restart(self, body_rad: Floats) -> None:
         """Go on with another state from a body (N,) that came about otherwise than by the track."""
@@ -204,29 +200,32 @@ class PredictiveWalker:
         """Try the best piece on a simulated body where it is steep; where that fails, others."""
         if not self.try_piece or self._walk.tries == 0 or not self.steering.is_steep(pose):
             return best
-        least, found = self._cost_of_try(pose, best), best
-        if least <= _TROUBLE_M2 or self._lost:
-            return best
+        found = self._on_twin(pose, best)
+        if found.cost_m2 <= _TROUBLE_M2 or self._lost:
+            return found
         for each in self._others(pose, best):
-            cost = self._cost_of_try(pose, each)
-            if cost < least:
-                least, found = cost, each
+            tried = self._on_twin(pose, each)
+            if tried.cost_m2 < found.cost_m2:
+                found = tried
         if found.option is not best.option:
             self._until = self._at  # another state begins here
         return found
 
-    def _cost_of_try(self, pose: PathPose, piece: _Tried) -> float:
+    def _on_twin(self, pose: PathPose, piece: _Tried) -> _Tried:
+        """Return the piece with what it costs on the simulated body, and its progress there."""
         assert self.try_piece is not None
-        return float(self.steering.cost(self.try_piece(pose, piece.piece_rad))[0][0])
+        cost_m2, progress = self.steering.cost(self.try_piece(pose, piece.piece_rad))
+        return piece._replace(cost_m2=float(cost_m2[0]), progress=float(progress[0]))
 
     def _others(self, pose: PathPose, best: _Tried) -> list[_Tried]:
         """Pieces unlike each other, the cheapest first: of the state under way, and of others."""
+        self._roll(pose, [(best.option, bends) for bends in FAR])
         if not self._is_new:
             options = self._new_options(pose)
             for carrier in CLIMBING:
                 options += self._new_options(pose, carrier)[:3]
             for option in options:
-                self._roll(pose, [(option, bends) for bends in _UNLIKE])
+                self._roll(pose, [(option, bends) for bends in UNLIKE])
         chosen = [best]
         for each in sorted(self._tried, key=lambda each: each.cost_m2):
             if len(chosen) == self._walk.tries:
@@ -242,21 +241,37 @@ class PredictiveWalker:
 
     def _judge(self, pose: PathPose) -> Iterator[bool]:
         """Judge options and bends, a batch at a time, the most likely ones first."""
-        first = np.append(np.column_stack([_SCREEN, np.zeros(3)]), [self._bends], axis=0)
-        yield from self._screen(pose, self._options(pose), first)
+        bends = self._bends[None]
+        if self._is_new:
+            bends = np.append(SCREEN, bends, axis=0)
+        yield from self._screen(pose, self._options(pose), bends)
         if (
             self._is_new
             and not self._lost
             and self._best_so_far().progress < self._walk.climb_progress
         ):
             for carrier in CLIMBING:
-                yield from self._screen(pose, self._options(pose, carrier), first)
-        option = self._best_so_far().option
-        yield from self._screen(pose, [option], _GRID)
-        for finer in (_FINER, 0.5 * _FINER):
+                yield from self._screen(pose, self._options(pose, carrier), bends)
+        yield from self._narrow(pose)
+        best = self._best_so_far()
+        if best.cost_m2 > _ASTRAY_M2:
+            yield from self._screen(pose, [best.option], FAR)
+            yield from self._narrow(pose)
+
+    def _narrow(self, pose: PathPose) -> Iterator[bool]:
+        """Judge bends about the best, and where a parabola through them is least.
+
+        Where the least may lie beyond them, it is done again about the best of them.
+        """
+        for _ in range(2):
+            middle = self._best_so_far()
+            yield from self._screen(pose, [middle.option], hexagon(middle.bends))
+            costs_m2 = [each.cost_m2 for each in self._tried[-6:]]
+            found = vertex(middle.bends, middle.cost_m2, costs_m2)
+            yield from self._screen(pose, [middle.option], found.bends[None])
             best = self._best_so_far()
-            near = np.clip(best.bends + finer * _AROUND, -1.0, 1.0)
-            yield from self._screen(pose, [best.option], near)
+            if found.enclosed and (best is middle or best is self._tried[-1]):
+                break
 
     def _screen(self, pose: PathPose, options: list[_Option], bends: Floats) -> Iterator[bool]:
         """Roll out every option with every row of ``bends`` (C, 2)."""
@@ -270,7 +285,9 @@ class PredictiveWalker:
 
     def _roll(self, pose: PathPose, tried: list[tuple[_Option, Floats]]) -> None:
         points = self.track.points
-        pieces = np.array([option.wave_rad[:points] for option, _ in tried])
+        pieces = np.empty((len(tried), points))
+        for row, (option, _) in zip(pieces, tried, strict=True):
+            row[:] = option.wave_rad[:points]
         bases = np.array([option.base_rad for option, _ in tried])
         bends = np.array([each for _, each in tried])
         _bend(pieces, bases, bends, self._walk.bend_limit_rad, points)
@@ -336,13 +353,10 @@ class PredictiveWalker:
 
     def _roughness(self, angles_rad: Floats) -> Floats:
         """Mean square (n,) of what joints on angles (n, m) accelerate, in a unit of their own."""
-        span = self._span
-        tail = self.track.at_rad(np.arange(self.track.end - 2.0 * span, self.track.end))
-        rows = np.concatenate([np.tile(tail, (len(angles_rad), 1)), angles_rad], axis=1)
-        total = np.cumsum(rows, axis=1)
-        mean = (total[:, span:] - total[:, :-span]) / span
-        joint = mean[:, span:] - mean[:, :-span]
-        return np.asarray((np.diff(joint, 2, axis=1) ** 2).mean(axis=1))
+        tail_rad = self.track.samples(self.track.end - 2 * self._span)
+        rough = np.empty(len(angles_rad))
+        _roughness(tail_rad, angles_rad, self._span, rough)
+        return rough
 
 
 @compiled("void(float64[:, ::1], float64[::1], float64[:, ::1], float64, int64)")
@@ -356,3 +370,22 @@ def _bend(
             first, second = min(k + 1, half) / points, max(k + 1 - half, 0) / points
             turn = limit_rad * (bends[c, 0] * first + bends[c, 1] * second)
             pieces_rad[c, k] = bases_rad[c] + pieces_rad[c, k] + turn
+
+
+@compiled("void(float64[::1], float64[:, ::1], int64, float64[::1])")
+def _roughness(tail_rad: Floats, angles_rad: Floats, span: int, rough: Floats) -> None:
+    """Write how rough (n,) joints are on angles (n, m) behind the track's last two spans.
+
+    A joint is the difference of the mean angles over two spans; rough is the mean square of its
+    second differences.
+    """
+    row = np.empty(len(tail_rad) + angles_rad.shape[1])
+    row[: len(tail_rad)] = tail_rad
+    for n in range(len(angles_rad)):
+        row[len(tail_rad) :] = angles_rad[n]
+        slope, total = 0.0, 0.0
+        for k in range(len(row) - 2 * span):
+            step = row[k + 2 * span] - 2.0 * row[k + span] + row[k]  # of the joint
+            total += (step - slope) ** 2 if k > 0 else 0.0
+            slope = step
+        rough[n] = total / (span * span * (len(row) - 2 * span - 1))

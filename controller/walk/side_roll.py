@@ -10,7 +10,7 @@ without a step in speed.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from snakewalk.controller.gaits.rolling import Rolling, RollingParameters
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.roll_compensation import body_roll_rad
 from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.motion.blend import Blend
 from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
@@ -55,6 +56,26 @@ _EARLY_RAD = 0.3
 """Of a whole turn, left to the join."""
 _AGAIN_BODIES = 0.5
 """Travel of the walk between two rolls."""
+_TURNS_RAD = np.array([1.2, 2.4])
+"""Turns of the walk away from the arc, before it, of which one is chosen (ours)."""
+_AT_ONCE_RAD = np.array([-2.6, -2.0, -1.4, 1.4, 2.0, 2.6])
+"""Bends that the joints take at once, without a piece of track (ours)."""
+_TRIES = 6
+"""Plans that are tried on a twin, those first that are fastest on paper (ours)."""
+_SLOW = 0.3
+"""Progress of the walk from which on nothing is tried on a twin (ours)."""
+_TRY_AGAIN_BODIES = 0.4
+"""Travel of the walk between two times that rolls are tried."""
+_LAID_S = 12.0
+"""Longest that the walk may take to its last piece's end."""
+_WALK_ON_S = 1.5
+"""What it costs to walk again after a roll."""
+_LOST_M = 0.15
+"""A body that is so much farther from its target than it was rolls away: it stops."""
+_GAIN_M, _GAIN_S = 0.03, 3.0
+"""A body that has come nearer by less for so long rolls on the spot: it stops (ours)."""
+_OFF_PATH_M = 0.2
+"""A body that a roll has left so far off its path goes on by another (ours)."""
 _STEPS_M = 0.05 * np.eye(2)
 """In x and in y, to either side: what the slope under the body is taken from."""
 
@@ -66,7 +87,7 @@ class RollPlan:
     bend_rad: float
     """Of the whole body, positive to the left; it rolls to the side to which it bends."""
     piece_rad: Floats
-    """(N,) the walk's last piece of track."""
+    """(n,) the walk's last piece of track; empty where the joints bend at once."""
     turns: int
     target_m: Floats
     """(2,) that it shall come near to."""
@@ -126,22 +147,67 @@ class RollPlanner:
                 return np.asarray(away_m[: turns + 1])
         return np.asarray(away_m)
 
-    def _plans(self, pose: PathPose, walker: PredictiveWalker, target_m: Floats) -> list[RollPlan]:
-        points = walker.track.points
-        pieces = walker.track.last_rad + ARCS_RAD[:, None] * np.arange(1, points + 1) / points
-        rolled = walker.steering.roll_out(pose, pieces)
-        now_m = float(np.hypot(*(target_m - pose.centre_m)))
-        plans = []
+    def tried(
+        self, pose: PathPose, walker: PredictiveWalker, target_m: Floats, heading_rad: float
+    ) -> list[RollPlan]:
+        """Return plans that are worth a try, the fastest on paper first.
+
+        Of arcs that are laid by the track, at once or after a turn away from them, and of bends
+        that the joints take at once.
+
+        Args:
+            pose: of the body.
+            walker: of the track.
+            target_m: (2,)
+            heading_rad: of the body's mean line.
+
+        """
+        plans = self._plans(pose, walker, target_m)
+        for turn in _TURNS_RAD.tolist():
+            plans += self._plans(pose, walker, target_m, turn)
+        for bend in _AT_ONCE_RAD.tolist():
+            plans += self._plan(pose, target_m, bend, np.empty(0), pose.centre_m, heading_rad, 0.0)
+        return sorted(plans, key=lambda plan: -plan.speed_m_s)[:_TRIES]
+
+    def _plans(
+        self, pose: PathPose, walker: PredictiveWalker, target_m: Floats, turn_rad: float = 0.0
+    ) -> list[RollPlan]:
+        """Plans of arcs by the track, after a turn to the other side."""
+        points, plans = walker.track.points, list[RollPlan]()
+        ramp = np.arange(1, points + 1) / points
+        arcs = walker.track.last_rad + ARCS_RAD[:, None] * ramp
+        if turn_rad > 0.0:
+            turns = -turn_rad * np.sign(ARCS_RAD)[:, None]
+            arcs = np.hstack([walker.track.last_rad + turns * ramp, arcs + turns])
+        rolled = walker.steering.roll_out(pose, arcs)
         for k, bend in enumerate(ARCS_RAD.tolist()):
-            heading = float(rolled.offset_rad[k] + pieces[k].mean())
-            links_m = self._arc_m(rolled.centre_m[k], heading, bend)
-            to_go_m = self.to_go_m(target_m, links_m, heading, float(np.sign(bend)))
-            turns = int(np.argmin(to_go_m))
-            if turns:
-                time_s = float(rolled.time_s[k]) + _JOIN_S + turns / FREQUENCY_HZ
-                speed_m_s = (now_m - float(to_go_m[turns])) / time_s
-                plans.append(RollPlan(bend, pieces[k], turns, target_m, speed_m_s))
+            heading = float(rolled.offset_rad[k] + arcs[k, -points:].mean())
+            laid = rolled.centre_m[k], heading, float(rolled.time_s[k])
+            plans += self._plan(pose, target_m, bend, arcs[k], *laid)
         return plans
+
+    def _plan(
+        self,
+        pose: PathPose,
+        target_m: Floats,
+        bend_rad: float,
+        piece_rad: Floats,
+        centre_m: Floats,
+        heading_rad: float,
+        laid_s: float,
+    ) -> list[RollPlan]:
+        """Return the plan to roll in an arc that lies so after ``laid_s``; none if none is nearer.
+
+        The arc's centre (2,) and heading are those of its mean line.
+        """
+        links_m = self._arc_m(centre_m, heading_rad, bend_rad)
+        to_go_m = self.to_go_m(target_m, links_m, heading_rad, float(np.sign(bend_rad)))
+        turns = int(np.argmin(to_go_m))
+        if turns == 0:
+            return []
+        gain_m = float(np.hypot(*(target_m - pose.centre_m))) - float(to_go_m[turns])
+        speed_m_s = gain_m / (laid_s + _JOIN_S + turns / FREQUENCY_HZ)
+        return [RollPlan(bend_rad, piece_rad, turns, target_m, speed_m_s)]
 
     def _arc_m(self, centre_m: Floats, heading_rad: float, bend_rad: float) -> Floats:
         """Centres (L, 2) of links that lie in an arc."""
@@ -192,6 +258,7 @@ class SideRolls(OnCourse):
         self._plan: RollPlan | None = None
         self._rolling: _Rolling | None = None
         self._walks_until = 0.0
+        self._relaid: str | None = None
         self.decision: Decision | None = None
         """Made in the last step, if one was."""
 
@@ -199,6 +266,11 @@ class SideRolls(OnCourse):
     def needs(self) -> Needs:
         """Those of the walk, and pitch joints."""
         return Needs(yaw=True, pitch=True, wheels=True)
+
+    @property
+    def replanned(self) -> str | None:
+        """Why another path was laid in the last step, if one was."""
+        return self._relaid or self.course.replanned
 
     @property
     def rolling(self) -> bool:
@@ -241,6 +313,7 @@ class SideRolls(OnCourse):
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""
+        self._relaid = None
         if self._rolling is not None:
             self._pilot.watch(view)
             if self._rolling.is_over(dt_s, view, self._planner):
@@ -265,25 +338,76 @@ class SideRolls(OnCourse):
             or abs(body_roll_rad(view)) > _UPRIGHT_RAD
         ):
             return
-        target_m = course.ahead_m(_TARGET_M)
-        plan = self._planner.best(self._pilot.path_pose(view), self._walker, target_m)
+        plan = self._best(view, self._target_m(view))
         if plan is None or plan.speed_m_s < max(LEAST_SPEED_M_S, progress * self._pulse_m_s):
             return
         self._plan = plan
-        self._pilot.end_on(plan.piece_rad)
+        if len(plan.piece_rad):
+            self._pilot.end_on(plan.piece_rad)
+        else:
+            self.decision = None  # it is not walked
+            self._roll(view, plan)
+
+    def _target_m(self, view: BodyView) -> Floats:
+        """(2,) the next waypoint if it is near, else a point of the path before it.
+
+        A path that turns a body about leads away from a waypoint beside it.
+        """
+        next_one = self.course.next_waypoint
+        if next_one is not None and np.hypot(*(next_one[0] - view.centre_m[:2])) <= _TARGET_M:
+            return next_one[0]
+        return self.course.ahead_m(_TARGET_M)
+
+    def _best(self, view: BodyView, target_m: Floats) -> RollPlan | None:
+        """Return the fastest roll to a target: on the twin where there is one, else on paper."""
+        pose, twin = self._pilot.path_pose(view), self._pilot.twin
+        if twin is None:
+            return self._planner.best(pose, self._walker, target_m)
+        if self._walker.outlook >= _SLOW:
+            return None
+        plans = self._planner.tried(pose, self._walker, target_m, heading_rad(view))
+        found = [self._tried(plan, view, twin) for plan in plans]
+        travel = _TRY_AGAIN_BODIES * self._walker.track.points
+        self._walks_until = self._pilot.head + travel
+        return max(found, key=lambda plan: plan.speed_m_s, default=None)
+
+    def _tried(self, plan: RollPlan, view: BodyView, twin: TwinRollout) -> RollPlan:
+        """Return a plan with the turns and the speed that are best on the twin."""
+        roll = _RollOnTwin(
+            self._pilot.coasting(plan.piece_rad),
+            _cycle(plan, self._robot),
+            self._robot,
+            at_once=not len(plan.piece_rad),
+        )
+        begin_m = least_m = float(np.hypot(*(view.centre_m[:2] - plan.target_m)))
+        time_s, best_m_s, turns = 0.0, 0.0, 1
+        bodies = twin.bodies(roll.move, _LAID_S + _JOIN_S + plan.turns / FREQUENCY_HZ)
+        try:
+            for body in bodies:
+                time_s += twin.cycle_s
+                if roll.turns > plan.turns:
+                    break
+                to_go_m = float(np.hypot(*(body.centre_m[:2] - plan.target_m)))
+                least_m = min(least_m, to_go_m)
+                if to_go_m > least_m + 3.0 * _LOST_M:
+                    break
+                speed_m_s = (begin_m - to_go_m) / (time_s + _WALK_ON_S)
+                if speed_m_s > best_m_s and roll.turns > 0.0:
+                    best_m_s, turns = speed_m_s, max(1, round(roll.turns))
+        except RuntimeError:  # it has diverged
+            best_m_s = 0.0
+        return replace(plan, speed_m_s=best_m_s, turns=turns)
 
     def _roll(self, view: BodyView, plan: RollPlan) -> None:
         """Begin to roll; walk on if the body does not lie as it was meant to."""
         headings = view.headings_rad
         bent = plan.side * float(headings[0] - headings[-1]) > 0.5 * abs(plan.bend_rad)
+        bent |= not len(plan.piece_rad)
         if not self.course.astray or not bent or abs(body_roll_rad(view)) > _UPRIGHT_RAD:
             self._plan = None
             self._pilot.go_on(self._walker.think_anew)
             return
-        parameters = RollingParameters(
-            frequency_hz=FREQUENCY_HZ, bend_rad=abs(plan.bend_rad), mirror=plan.side < 0.0
-        )
-        cycle = GaitCycle(Rolling(parameters), self._robot)
+        self._plan, cycle = plan, _cycle(plan, self._robot)
         self._switch.join(cycle)
         self._rolling = _Rolling(plan, cycle.frequency_hz, view)
         word = "left" if plan.side > 0.0 else "right"
@@ -296,6 +420,53 @@ class SideRolls(OnCourse):
         self._pilot.restart(view, self._walker.restart)
         self._switch.join(self._pilot)
         self._walks_until = self._pilot.head + _AGAIN_BODIES * self._walker.track.points
+        course = self.course
+        if not course.complete and course.off_path_m > _OFF_PATH_M:
+            course.lay_from_here("the roll has ended off the path", lambda: heading_rad(view))
+            self._relaid = course.replanned
+
+
+def heading_rad(view: BodyView) -> float:
+    """Of the body's mean line."""
+    return float(view.headings_rad.mean())
+
+
+def _cycle(plan: RollPlan, robot: RobotConfig) -> GaitCycle:
+    """The gait that rolls in the arc of a plan."""
+    parameters = RollingParameters(
+        frequency_hz=FREQUENCY_HZ, bend_rad=abs(plan.bend_rad), mirror=plan.side < 0.0
+    )
+    return GaitCycle(Rolling(parameters), robot)
+
+
+class _RollOnTwin:
+    """Moves a twin along the rest of a track, and then in a roll."""
+
+    def __init__(
+        self, pilot: Pilot, cycle: GaitCycle, robot: RobotConfig, *, at_once: bool
+    ) -> None:
+        """Take a pilot that coasts; ``at_once``: it rolls from where the body is."""
+        self._pilot, self._cycle, self._robot = pilot, cycle, robot
+        self._at_once = at_once
+        self._roll: Blend | None = None
+        self._rolled_s = 0.0
+
+    @property
+    def turns(self) -> float:
+        """That were asked of the body so far."""
+        return self._rolled_s * self._cycle.frequency_hz
+
+    def move(self, dt_s: float, view: BodyView) -> Floats:
+        """Goals (J,) of the next cycle, of length ``dt_s``."""
+        if self._roll is not None:
+            self._rolled_s += dt_s
+            return self._roll.step(dt_s, view)
+        goal_rad = self._pilot.goal_rad() if self._at_once else self._pilot.step(dt_s, view)
+        if self._at_once or self._pilot.at_end:
+            self._roll = Blend(
+                goal_rad, self._pilot.velocity_rad_s(), self._cycle, Pace.limit(self._robot)
+            )
+        return goal_rad
 
 
 class _Rolling:
@@ -305,6 +476,7 @@ class _Rolling:
         self._plan, self._hz, self._turns = plan, frequency_hz, plan.turns
         self._start_m = view.centre_m
         self._highest_m = float(view.centre_m[2])
+        self._least_m, self._gained_s = np.inf, 0.0
         self._roll_rad = body_roll_rad(view)
         self._turned_rad = self._time_s = 0.0
 
@@ -315,6 +487,11 @@ class _Rolling:
         self._roll_rad = roll_rad
         self._time_s += dt_s
         self._highest_m = max(self._highest_m, float(view.centre_m[2]))
+        to_target_m = float(np.hypot(*(view.centre_m[:2] - self._plan.target_m)))
+        if to_target_m < self._least_m - _GAIN_M:
+            self._least_m, self._gained_s = to_target_m, self._time_s
+        if to_target_m > self._least_m + _LOST_M or self._time_s > self._gained_s + _GAIN_S:
+            return True
         if view.centre_m[2] < self._highest_m - _DROP_M:
             return True
         if self._time_s > _JOIN_S + 1.5 * self._turns / self._hz:

@@ -4,7 +4,7 @@ The balance of forces on paper knows no weight that rests on few links of a body
 body that physics moves does. It costs a hundred times as much.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Protocol, runtime_checkable
 
 from snakewalk.config.arrays import Floats
@@ -60,6 +60,11 @@ class TwinRollout:
         self._seen: list[BodyView] = []
         self._dt_s = 0.0
 
+    @property
+    def cycle_s(self) -> float:
+        """Length of the cycles that were seen, and of those that are tried."""
+        return self._dt_s
+
     def observe(self, view: BodyView, dt_s: float) -> None:
         """Take the measured body, ``dt_s`` after the last."""
         self._seen = [*self._seen[-1:], view]
@@ -80,18 +85,37 @@ class TwinRollout:
             move: takes the length of a cycle and the body; returns goals (J,).
 
         """
-        twin, robot = self._make_twin(), self._robot
+        followed, view = Followed(pose.path, pose.path_at), self._seen[-1]
+        bodies = self.bodies(move, _LONGEST_S)
+        while not is_over():
+            found = next(bodies, None)
+            if found is None:
+                break
+            view = found
+            followed.note(view.centre_m[:2], self._dt_s)
+        return followed.rolled(view.headings_rad, view.link_m[:, :2] - view.centre_m[:2])
+
+    def bodies(
+        self, move: Callable[[float, BodyView], Floats], longest_s: float
+    ) -> Iterator[BodyView]:
+        """Move the twin from where the robot is; its body after each cycle, for ``longest_s``.
+
+        Args:
+            move: as for ``roll``.
+            longest_s: until it ends by itself.
+
+        """
+        twin, robot, view = self._make_twin(), self._robot, self._seen[-1]
         twin.use_friction(self.friction)
         before, before_rad = seen_state(robot, self._seen[0])
-        now, now_rad = seen_state(robot, self._seen[-1])
+        now, now_rad = seen_state(robot, view)
         twin.begin(before, now, before_rad, now_rad, self._dt_s)
-        followed, time_s, view = Followed(pose.path, pose.path_at), 0.0, self._seen[-1]
-        while time_s < _LONGEST_S and not is_over():
+        time_s = 0.0
+        while time_s < longest_s:
             now, now_rad = twin.step(move(self._dt_s, view), self._dt_s)
             view = body_in_world(robot, now, now_rad)
             time_s += self._dt_s
-            followed.note(view.centre_m[:2], self._dt_s)
-        return followed.rolled(view.headings_rad, view.link_m[:, :2] - view.centre_m[:2])
+            yield view
 
 
 def seen_state(robot: RobotConfig, view: BodyView) -> tuple[BodyPose, Floats]:

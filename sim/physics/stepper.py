@@ -36,15 +36,15 @@ from snakewalk.sim.physics.water import add_water, immersed
 from snakewalk.sim.plant import ServoDrive, shaft_torque
 from snakewalk.sim.servo.motor import friction_n_m
 
-register_jitable(ellipse_force)
+register_jitable(error_model="numpy")(ellipse_force)
 
-register_jitable(stop_share)
+register_jitable(error_model="numpy")(stop_share)
 
-register_jitable(shaft_torque)
+register_jitable(error_model="numpy")(shaft_torque)
 
-register_jitable(immersed)
+register_jitable(error_model="numpy")(immersed)
 
-register_jitable(add_water)
+register_jitable(error_model="numpy")(add_water)
 
 
 LEAST_FRICTION_N_M = 1e-9
@@ -406,20 +406,20 @@ def _run(
     )
 
 
-register_jitable(_move)
+register_jitable(error_model="numpy")(_move)
 
-register_jitable(_collect)
+register_jitable(error_model="numpy")(_collect)
 
-register_jitable(_sliding_link)
-register_jitable(_add_friction)
+register_jitable(error_model="numpy")(_sliding_link)
+register_jitable(error_model="numpy")(_add_friction)
 
-register_jitable(_weigh)
+register_jitable(error_model="numpy")(_weigh)
 
-register_jitable(_has_friction)
+register_jitable(error_model="numpy")(_has_friction)
 
-register_jitable(_steps)
+register_jitable(error_model="numpy")(_steps)
 
-run_steps = njit(cache=True)(_run)
+run_steps = njit(cache=True, error_model="numpy")(_run)
 
 
 class CompiledSteps:

@@ -243,7 +243,8 @@ def _second_body(
     if run.mapping is not None or robot.limb_joints:
         return None
     twin = cache(backend.twin) if backend.twin is not None and run.pose_is_true else None
-    if twin is not None and prepared.ground is not None and isinstance(source, UsesTwin):
+    tries = run.walk.tries > 0 and prepared.ground is not None
+    if twin is not None and tries and isinstance(source, UsesTwin):
         source.use_twin(TwinRollout(robot, twin, world.friction))
     finds = run.motion == "walk" and run.walk.finds_friction and isinstance(source, UsesFriction)
     measured = run.pose == "camera" or (run.pose_is_true and backend.pose is not None)

@@ -177,3 +177,22 @@ def test_one_more_after_one_more_goes_on_from_the_last() -> None:
         on.lead_to(np.array(left_m), lambda: 0.0)
         np.testing.assert_allclose(plan.asked[-1], left_m[-2:], atol=1e-9)
     assert on.leads_on
+
+
+def test_a_path_from_here_begins_at_the_head_and_is_no_miss() -> None:
+    plan = Plans(9.0)
+    on = course(plan)
+    on.follow(np.array([0.0, 0.5]), np.array([0.6, 0.6]), lambda: 0.0, 0.0)
+    assert on.off_path_m == pytest.approx(0.5)
+    on.lay_from_here("moved aside", lambda: 0.3)
+    assert on.replanned == "moved aside"
+    assert (on.reached, on.missed) == (0, 0)
+    np.testing.assert_allclose(plan.asked[-1], [[0.6, 0.6], *WAYPOINTS])
+    before = on.path
+
+    def nothing(*args: object, **named: object) -> SplinePath:
+        raise InputError("no way")
+
+    on._plan = nothing  # type: ignore[assignment]
+    on.lay_from_here("again", lambda: 0.3)
+    assert on.path is before

@@ -20,7 +20,7 @@ from snakewalk.controller.mechanics.rollout import (
     Rollout,
 )
 from snakewalk.controller.walk.angle_track import AngleTrack
-from snakewalk.controller.walk.predictive_walker import PredictiveWalker
+from snakewalk.controller.walk.predictive_walker import PredictiveWalker, _roughness
 from snakewalk.controller.walk.serpenoid import SERPENOID
 from snakewalk.controller.walk.steering import PathPose, Steering
 
@@ -91,6 +91,7 @@ def test_what_fails_on_a_second_body_is_not_walked(monkeypatch: pytest.MonkeyPat
         chooser.decide(pose(chooser.track))
         added = chooser.track.samples(chooser.track.end - 10)
         np.testing.assert_array_equal(added, tried[1][:10])
+        assert chooser.outlook == 0.0  # on the second body, which has not moved
         assert 2 < len(tried) <= 8
 
 
@@ -124,6 +125,38 @@ def test_thinking_in_cycles_decides_what_thinking_at_once_decides() -> None:
         assert made.state == late.state
         assert made.ramp_rad == late.ramp_rad
     np.testing.assert_array_equal(in_cycles.track.samples(0), at_once.track.samples(0))
+
+
+@pytest.mark.parametrize("y_m", [0.0, 0.15, -0.3])
+def test_no_bends_of_a_grid_cost_much_less_than_those_that_are_found(y_m: float) -> None:
+    chooser = walker(7)
+    for _ in range(3):
+        chooser.decide(pose(chooser.track, y_m=y_m))
+    here = pose(chooser.track, y_m=y_m)
+    while chooser.think(lambda: here):
+        pass
+    found = min(chooser._tried, key=lambda each: each.cost_m2)
+    assert len(chooser._tried) <= (15 if found.cost_m2 < 0.08 else 39)
+    chooser._tried = []
+    grid = np.linspace(-1.0, 1.0, 9)
+    for bends in np.array(np.meshgrid(grid, grid)).reshape(2, -1).T:
+        chooser._roll(here, [(found.option, bends)])
+    assert found.cost_m2 < min(each.cost_m2 for each in chooser._tried) + 0.002
+
+
+def test_how_rough_joints_are_is_the_mean_square_of_their_second_differences() -> None:
+    rng, span = np.random.default_rng(8), 6
+    tail, angles = rng.normal(size=2 * span), rng.normal(size=(5, 40))
+    rough = np.empty(5)
+    _roughness(tail, angles, span, rough)
+    for row, value in zip(angles, rough, strict=True):
+        line = np.append(tail, row)
+        means = np.array([line[k : k + span].mean() for k in range(len(line) - span + 1)])
+        joint = means[span:] - means[:-span]
+        assert value == pytest.approx(float(np.mean(np.diff(joint, 2) ** 2)))
+    arc = 0.3 + 0.02 * np.arange(52.0) + 0.001 * np.arange(52.0) ** 2  # joints move evenly
+    _roughness(arc[: 2 * span], arc[None, 2 * span :].copy(), span, rough[:1])
+    assert rough[0] == pytest.approx(0.0, abs=1e-20)
 
 
 def test_a_decision_that_comes_too_early_takes_the_best_so_far() -> None:

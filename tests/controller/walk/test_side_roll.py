@@ -1,5 +1,7 @@
 """Side rolls: what is predicted of them, when they are chosen, and how they are joined."""
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from snakewalk.config.loader import load_robot
 from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.kinematics.links import BodyView, body_in_world, pose_at
 from snakewalk.controller.walk.side_roll import MOST_TURNS, RollPlan, RollPlanner, SideRolls
+from snakewalk.controller.walk.twin_rollout import TwinRollout
 from snakewalk.drivers.attitude import rotation_by
 
 ROBOT = load_robot("alternating16")
@@ -66,7 +69,7 @@ class Scene:
         at = pose_at(np.array([*self.prepared.run.start_m, 0.0])[:2], 1.2)
         turned = at.rotation @ rotation_by(np.array([self.roll_rad, 0.0, 0.0]))
         view = body_in_world(self.prepared.robot, at._replace(rotation=turned), joint_rad)
-        return view._replace(centre_m=view.centre_m * [1.0, 1.0, 0.0])
+        return view._replace(centre_m=np.array([*self.prepared.run.start_m, 0.0]))
 
     def step(self) -> np.ndarray:
         """One cycle; joints that follow at once, and a body that rolls on its ground."""
@@ -83,9 +86,13 @@ def arc(bend_rad: float, turns: int = 2) -> RollPlan:
     return RollPlan(bend_rad, piece, turns, np.zeros(2), 0.1)
 
 
-@pytest.mark.parametrize("bend_rad", [2.0, -1.6])
-def test_walk_and_roll_are_joined_within_the_joints_limits(bend_rad: float) -> None:
-    scene = Scene(arc(bend_rad))
+def at_once(bend_rad: float) -> RollPlan:
+    return RollPlan(bend_rad, np.empty(0), 2, np.zeros(2), 0.1)
+
+
+@pytest.mark.parametrize("plan", [arc(2.0), arc(-1.6), at_once(2.0), at_once(-2.6)])
+def test_walk_and_roll_are_joined_within_the_joints_limits(plan: RollPlan) -> None:
+    scene, bend_rad = Scene(plan), plan.bend_rad
     goals, rolled, walked_on = [scene.rolls.goal_rad()], False, False
     for _ in range(1200):
         goals.append(scene.step())
@@ -124,6 +131,86 @@ def test_a_walk_that_gets_on_does_not_roll(
         scene.step()
     assert not scene.rolls.rolling
     assert not scene.events
+
+
+_NONE = np.empty(0)
+
+
+class Carried(TwinRollout):
+    """A twin whose body is carried along x: towards 1 m, and from there away."""
+
+    def __init__(self, speed_m_s: float, *, diverges: bool = False) -> None:
+        self._speed_m_s, self._diverges, self.tried = speed_m_s, diverges, 0
+
+    @property
+    def cycle_s(self) -> float:
+        return DT_S
+
+    def bodies(
+        self, move: Callable[[float, BodyView], np.ndarray], longest_s: float
+    ) -> Iterator[BodyView]:
+        self.tried += 1
+        if self._diverges:
+            raise RuntimeError("diverged")
+        view = body_in_world(ROBOT, pose_at(np.zeros(2), 0.0), np.zeros(16))
+        for k in range(round(longest_s / DT_S)):
+            x_m = self._speed_m_s * (k + 1) * DT_S
+            view = view._replace(centre_m=np.array([min(x_m, 2.0 - x_m), 0.0, 0.0]))
+            assert np.isfinite(move(DT_S, view)).all()
+            yield view
+
+
+def considered(
+    twin: Carried, outlook: float, piece_rad: np.ndarray = _NONE
+) -> tuple[RollPlan | None, Scene]:
+    scene = Scene(None)
+    scene.rolls._pilot._twin = twin
+    scene.rolls._walker.outlook = outlook
+    target_m = np.array([1.0, 0.0])
+    plans = [RollPlan(bend, bend * piece_rad, 16, target_m, 0.1) for bend in (-2.0, 2.0)]
+    scene.rolls._planner.tried = lambda *given: plans  # type: ignore[method-assign]
+    at = pose_at(np.zeros(2), 0.0)
+    view = body_in_world(ROBOT, at, np.zeros(16))._replace(centre_m=np.zeros(3))
+    return scene.rolls._best(view, target_m), scene
+
+
+def test_a_roll_is_as_fast_as_on_the_twin_and_ends_where_that_is_nearest() -> None:
+    found, scene = considered(Carried(0.2), 0.0)
+    assert found is not None
+    # nearest after 5 s; to walk on takes a second and a half more
+    assert found.speed_m_s == pytest.approx(1.0 / 6.5, rel=0.02)
+    assert found.turns == 5
+    # and none is tried again at once
+    assert scene.rolls._walks_until > scene.rolls._pilot.head
+
+
+def test_an_arc_is_laid_before_turns_are_counted() -> None:
+    found, _ = considered(Carried(0.1), 0.0, np.linspace(0.0, 1.0, 100))
+    assert found is not None
+    # nearest after 10 s, of which the track takes 4 at a quarter of a body a second, and more
+    assert 1 <= found.turns <= 6
+    assert found.speed_m_s == pytest.approx(1.0 / 11.5, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("twin", "tried"), [(Carried(-0.2), 2), (Carried(0.2, diverges=True), 2), (Carried(0.2), 0)]
+)
+def test_what_fails_on_the_twin_is_not_rolled(twin: Carried, tried: int) -> None:
+    found, _ = considered(twin, 0.0 if tried else 0.4)
+    assert found is None or found.speed_m_s == 0.0
+    assert twin.tried == tried
+
+
+def test_plans_to_try_are_few_the_fastest_first_and_some_begin_at_once() -> None:
+    scene = Scene(None)
+    planner, walker = RollPlanner(ROBOT, HILL), scene.rolls._walker
+    body = body_in_world(ROBOT, pose_at(np.zeros(2), np.pi / 2), np.zeros(16))
+    pose = scene.rolls._pilot.path_pose(body)
+    plans = planner.tried(pose, walker, np.array([3.5, 0.0]), np.pi / 2)
+    assert 1 < len(plans) <= 6
+    assert plans == sorted(plans, key=lambda plan: -plan.speed_m_s)
+    assert all(plan.side == -1.0 for plan in plans)  # uphill is to the right
+    assert any(len(plan.piece_rad) == 0 for plan in plans)
 
 
 def test_soft_joints_and_rails_do_not_roll() -> None:
