@@ -12,6 +12,17 @@ import math
 
 from snakewalk.config.arrays import Floats
 
+LANES = 8
+"""Contacts that stand side by side in a table, so that the processor takes them at once."""
+DEPTH, LOAD, STILL, PLACE, SLIDE, NORMAL, AXIS, FORCE, LOSS, SIDEWAYS = (
+    LANES * row for row in (0, 2, 3, 4, 7, 10, 13, 16, 19, 20)
+)
+"""Where rows of a table of contacts begin: depth, and that of all contacts of the link; the link's
+load, and the drag that stops it; three rows each for the velocity of the contact, the ground's
+normal, the link's axis, and, written by ``rub``, the force; power lost, and the speed across times
+the share of the load."""
+ROWS = 21 * LANES
+
 STOP_SHARE = 1.8
 """Share of a contact's momentum that friction may take in one step; the explicit step is stable
 below 2."""
@@ -72,3 +83,34 @@ def ellipse_force(
         -normal_n * mu_along * mu_along * along_m_s / slow_along,
         -normal_n * mu_across * mu_across * across_m_s / slow_across,
     )
+
+
+def rub(table: Floats, contacts: int, mu: tuple[float, float, float]) -> None:
+    """Friction at contacts side by side: the rows of ``table`` that the others make.
+
+    Contact ``k`` has its number of the row that begins at ``ROW`` at
+    ``k // LANES * ROWS + ROW + k % LANES``.
+    """
+    for group in range((contacts + LANES - 1) // LANES):
+        lane = table[group * ROWS : (group + 1) * ROWS]
+        for j in range(LANES):
+            n0, n1, n2 = lane[NORMAL + j], lane[NORMAL + 8 + j], lane[NORMAL + 16 + j]
+            e0, e1, e2 = lane[AXIS + j], lane[AXIS + 8 + j], lane[AXIS + 16 + j]
+            s0, s1, s2 = lane[SLIDE + j], lane[SLIDE + 8 + j], lane[SLIDE + 16 + j]
+            share = lane[DEPTH + j] / lane[DEPTH + 8 + j]
+            lift = e0 * n0 + e1 * n1 + e2 * n2
+            e0, e1, e2 = e0 - lift * n0, e1 - lift * n1, e2 - lift * n2
+            scale = 1.0 / max(math.sqrt(e0 * e0 + e1 * e1 + e2 * e2), 1e-9)
+            e0, e1, e2 = scale * e0, scale * e1, scale * e2
+            g0, g1, g2 = n1 * e2 - n2 * e1, n2 * e0 - n0 * e2, n0 * e1 - n1 * e0
+            along_m_s = s0 * e0 + s1 * e1 + s2 * e2
+            across_m_s = s0 * g0 + s1 * g1 + s2 * g2
+            load = lane[LOAD + j]
+            along_n, across_n = ellipse_force(
+                share * load, along_m_s, across_m_s, mu, lane[STILL + j], load
+            )
+            lane[FORCE + j] = along_n * e0 + across_n * g0
+            lane[FORCE + 8 + j] = along_n * e1 + across_n * g1
+            lane[FORCE + 16 + j] = along_n * e2 + across_n * g2
+            lane[LOSS + j] = along_n * along_m_s + across_n * across_m_s
+            lane[SIDEWAYS + j] = abs(across_m_s) * share

@@ -22,7 +22,23 @@ from numba.extending import intrinsic, register_jitable
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
-from snakewalk.sim.physics.friction import ellipse_force, stop_share
+from snakewalk.sim.physics.friction import (
+    AXIS,
+    DEPTH,
+    FORCE,
+    LANES,
+    LOAD,
+    LOSS,
+    NORMAL,
+    PLACE,
+    ROWS,
+    SIDEWAYS,
+    SLIDE,
+    STILL,
+    ellipse_force,
+    rub,
+    stop_share,
+)
 from snakewalk.sim.physics.layout import step_layout
 from snakewalk.sim.physics.mechanics import (
     FOOT,
@@ -36,7 +52,9 @@ from snakewalk.sim.physics.water import add_water, immersed
 from snakewalk.sim.plant import ServoDrive, shaft_torque
 from snakewalk.sim.servo.motor import friction_n_m
 
-register_jitable(error_model="numpy")(ellipse_force)
+register_jitable(error_model="numpy", inline="always")(ellipse_force)
+
+register_jitable(error_model="numpy")(rub)
 
 register_jitable(error_model="numpy")(stop_share)
 
@@ -123,21 +141,6 @@ def _collect(
         qfrc[3 + k] += rotation[1, k] * m0 + rotation[1, 3 + k] * m1 + rotation[1, 6 + k] * m2
 
 
-def _sliding_link(
-    integers: NDArray[np.int32],
-    at: int,
-    geom_body: NDArray[np.int32],
-    role: NDArray[np.int32],
-) -> int:
-    """Link whose belly meets the ground in a contact, whose geoms stand at ``at``; -1: no such.
-
-    An obstacle's and a foot's have MuJoCo's own friction, two links' none.
-    """
-    if role[integers[at]] != GROUND or role[integers[at + 1]] == FOOT:
-        return -1
-    return int(geom_body[integers[at + 1]]) - 1
-
-
 def _add_friction(
     contacts: tuple[Any, ...],
     qfrc: Floats,
@@ -151,56 +154,64 @@ def _add_friction(
     mass_kg: Floats,
     water: Floats,
     spine: int,
+    table: Floats,
+    of_link: NDArray[np.int64],
 ) -> None:
     """Ellipse at every contact of now under the load of the last step, collected into ``qfrc``."""
     reals, integers, count, at = contacts
     size, at_dist, at_place, at_up, at_geom, _ = at
     geom_body, role, parents = geoms
     v, w, wrench, depth, before = work
-    mu, radius_m, step_s = (law[0], law[1], law[2]), law[3], law[4]
+    step_s = law[4]
     centre, rotation = chain[0], chain[1]
-    stop_per_s = stop_share(centre[1 : spine + 1], radius_m) / step_s
+    stop_per_s = stop_share(centre[1 : spine + 1], law[3]) / step_s
     mean_s = step_s / len(v)
-    depth[:] = 0.0
-    for c in range(count):
-        i = _sliding_link(integers, 2 * size * c + at_geom, geom_body, role)
-        if i < 0:
-            continue
-        depth[i] += max(-reals[size * c + at_dist], LEAST_DEPTH_M)
     _move(v, w, before, qvel, chain, parents, step_s)
-    wrench[:] = 0.0
+    depth[:] = 0.0
+    rubbing = 0
     for c in range(count):
-        i = _sliding_link(integers, 2 * size * c + at_geom, geom_body, role)
-        if i < 0:
+        geom = 2 * size * c + at_geom
+        # an obstacle's and a foot's have MuJoCo's own friction, two links' none
+        if role[integers[geom]] != GROUND or role[integers[geom + 1]] == FOOT:
             continue
-        share = max(-reals[size * c + at_dist], LEAST_DEPTH_M) / depth[i]
-        p = reals[size * c + at_place : size * c + at_place + 3]
-        n = reals[size * c + at_up : size * c + at_up + 3]
-        r0, r1, r2 = p[0] - centre[i + 1, 0], p[1] - centre[i + 1, 1], p[2] - centre[i + 1, 2]
-        s0 = v[i, 0] + w[i, 1] * r2 - w[i, 2] * r1
-        s1 = v[i, 1] + w[i, 2] * r0 - w[i, 0] * r2
-        s2 = v[i, 2] + w[i, 0] * r1 - w[i, 1] * r0
-        e0, e1, e2 = rotation[i + 1, 0], rotation[i + 1, 3], rotation[i + 1, 6]
-        lift = e0 * n[0] + e1 * n[1] + e2 * n[2]
-        e0, e1, e2 = e0 - lift * n[0], e1 - lift * n[1], e2 - lift * n[2]
-        scale = 1.0 / max(np.sqrt(e0 * e0 + e1 * e1 + e2 * e2), 1e-9)
-        e0, e1, e2 = scale * e0, scale * e1, scale * e2
-        g0, g1, g2 = n[1] * e2 - n[2] * e1, n[2] * e0 - n[0] * e2, n[0] * e1 - n[1] * e0
-        v_along = s0 * e0 + s1 * e1 + s2 * e2
-        v_across = s0 * g0 + s1 * g1 + s2 * g2
-        still = stop_per_s * mass_kg[i]
-        f_along, f_across = ellipse_force(share * load[i], v_along, v_across, mu, still, load[i])
-        totals[0] -= (f_along * v_along + f_across * v_across) * step_s
-        totals[1] += abs(v_across) * share * mean_s
-        f0 = f_along * e0 + f_across * g0
-        f1 = f_along * e1 + f_across * g1
-        f2 = f_along * e2 + f_across * g2
+        i = int(geom_body[integers[geom + 1]]) - 1
+        row = rubbing // LANES * ROWS + rubbing % LANES
+        of_link[rubbing] = i
+        rubbing += 1
+        p, n, deep = size * c + at_place, size * c + at_up, -reals[size * c + at_dist]
+        p0, p1, p2 = reals[p], reals[p + 1], reals[p + 2]
+        r0, r1, r2 = p0 - centre[i + 1, 0], p1 - centre[i + 1, 1], p2 - centre[i + 1, 2]
+        w0, w1, w2 = w[i, 0], w[i, 1], w[i, 2]
+        deep = max(deep, LEAST_DEPTH_M)
+        depth[i] += deep
+        table[row + PLACE], table[row + PLACE + 8], table[row + PLACE + 16] = p0, p1, p2
+        table[row + SLIDE] = v[i, 0] + w1 * r2 - w2 * r1
+        table[row + SLIDE + 8] = v[i, 1] + w2 * r0 - w0 * r2
+        table[row + SLIDE + 16] = v[i, 2] + w0 * r1 - w1 * r0
+        table[row + NORMAL] = reals[n]
+        table[row + NORMAL + 8] = reals[n + 1]
+        table[row + NORMAL + 16] = reals[n + 2]
+        table[row + AXIS] = rotation[i + 1, 0]
+        table[row + AXIS + 8] = rotation[i + 1, 3]
+        table[row + AXIS + 16] = rotation[i + 1, 6]
+        table[row + DEPTH], table[row + LOAD] = deep, load[i]
+        table[row + STILL] = stop_per_s * mass_kg[i]
+    for k in range(rubbing):
+        table[k // LANES * ROWS + k % LANES + DEPTH + 8] = depth[of_link[k]]
+    rub(table, rubbing, (law[0], law[1], law[2]))
+    wrench[:] = 0.0
+    for k in range(rubbing):
+        i, row = of_link[k], k // LANES * ROWS + k % LANES
+        f0, f1, f2 = table[row + FORCE], table[row + FORCE + 8], table[row + FORCE + 16]
+        p0, p1, p2 = table[row + PLACE], table[row + PLACE + 8], table[row + PLACE + 16]
+        totals[0] -= table[row + LOSS] * step_s
+        totals[1] += table[row + SIDEWAYS] * mean_s
         wrench[i, 0] += f0
         wrench[i, 1] += f1
         wrench[i, 2] += f2
-        wrench[i, 3] += p[1] * f2 - p[2] * f1
-        wrench[i, 4] += p[2] * f0 - p[0] * f2
-        wrench[i, 5] += p[0] * f1 - p[1] * f0
+        wrench[i, 3] += p1 * f2 - p2 * f1
+        wrench[i, 4] += p2 * f0 - p0 * f2
+        wrench[i, 5] += p0 * f1 - p1 * f0
     if water[0, 3] > 0.0:
         totals[0] += add_water(wrench, centre[1:], rotation[1:], v, w, water, step_s)
     _collect(wrench, qfrc, chain, parents)
@@ -256,6 +267,7 @@ def _steps(
     joints = len(goal)
     speed, ground_n_m = np.empty(joints), np.empty(joints)
     has_friction = _has_friction(gear)
+    table, of_link = np.zeros(0), np.zeros(0, np.int64)
     step_s = law[4]
     step1, step2, model, data = where[0], where[1], where[2], where[3]
     at = (
@@ -300,8 +312,12 @@ def _steps(
             count,
             at,
         )
+        if len(table) < (count + LANES - 1) // LANES * ROWS:
+            table = np.zeros((count + LANES - 1) // LANES * ROWS)
+            of_link = np.zeros(count + LANES, np.int64)
         _add_friction(
-            *(contacts, qfrc, qvel, chain, work, geoms, law, load, totals, mass_kg, water, spine)
+            *(contacts, qfrc, qvel, chain, work, geoms, law, load, totals, mass_kg, water, spine),
+            *(table, of_link),
         )
         for j in range(joints):
             ground_n_m[j] += qfrc[6 + j]
@@ -406,14 +422,13 @@ def _run(
     )
 
 
-register_jitable(error_model="numpy")(_move)
+register_jitable(error_model="numpy", inline="always")(_move)
 
-register_jitable(error_model="numpy")(_collect)
+register_jitable(error_model="numpy", inline="always")(_collect)
 
-register_jitable(error_model="numpy")(_sliding_link)
 register_jitable(error_model="numpy")(_add_friction)
 
-register_jitable(error_model="numpy")(_weigh)
+register_jitable(error_model="numpy", inline="always")(_weigh)
 
 register_jitable(error_model="numpy")(_has_friction)
 
