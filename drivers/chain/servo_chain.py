@@ -706,8 +706,8 @@ class RegisterCheck:
     ids: tuple[int, ...]
     expected: Mapping[int, int]
     """By joint, in the order of ``ids``."""
-    values: list[int]
-    """Of it, in that order."""
+    raw: bytes
+    """Of it, in that order, as they stand in the reply."""
 
     @classmethod
     def of(
@@ -722,8 +722,9 @@ class RegisterCheck:
         """Prepare the read of a register of some joints' servos."""
         ids = tuple(robot.servo_ids[joint] for joint in expected)
         cycle = bus.block(ids, name, name, fast=fast)
-        register, values = bus.table_of(ids[0]).register(name), list(expected.values())
-        return cls(register, cycle, ids, dict(expected), values)
+        register = bus.table_of(ids[0]).register(name)
+        raw = np.array(list(expected.values()), _kind(register)).tobytes()
+        return cls(register, cycle, ids, dict(expected), raw)
 
     def compare(self, ask_again: ChainBus | None = None) -> tuple[dict[int, int], bool]:
         """Read the register; the values that are not as expected, by joint, and if all are known.
@@ -738,11 +739,10 @@ class RegisterCheck:
 
         """
         reply, register = self.cycle.read(), self.register
-        kind = f"<{'i' if register.signed else 'u'}{register.size}"
-        values = np.ascontiguousarray(reply.data).view(kind)[:, 0]
-        everybody = reply.valid_count == len(reply.valid)
-        if everybody and values.tolist() == self.values:  # the usual case
+        if reply.flawless and reply.data.tobytes() == self.raw:  # the usual case
             return {}, True
+        values = np.ascontiguousarray(reply.data).view(_kind(register))[:, 0]
+        everybody = reply.valid_count == len(reply.valid)
         found = {}
         for place, (joint, expected) in enumerate(self.expected.items()):
             if reply.valid[place]:
@@ -754,6 +754,11 @@ class RegisterCheck:
             if got != expected:
                 found[joint] = got
         return found, ask_again is not None or everybody
+
+
+def _kind(register: Register) -> str:
+    """Type of a register's numbers, as they stand in a packet."""
+    return f"<{'i' if register.signed else 'u'}{register.size}"
 
 
 class _Losses:

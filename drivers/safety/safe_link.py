@@ -222,8 +222,9 @@ class SafeLink:
         except DriverError as fault:
             self._recover(str(fault), fault)
         else:  # if the program stood still in between, the next step counts from here
-            _, goal_rad, since_s, checked = verdict.memory
-            self._memory = SafetyMemory(self._clock.now_s(), goal_rad, since_s, checked)
+            sent_s = self._clock.now_s()
+            if sent_s != now_s:
+                self._memory = verdict.memory._replace(time_s=sent_s)
 
     def request_stop(self, reason: str) -> None:
         """Latch at the next read or write; may be called from another thread (a stop button)."""

@@ -76,15 +76,22 @@ def vet(
     that jumps to where a joint is said to be would jump on a wrong answer, too.
     """
     veto, checked = check_state(state, last, limits, now_s)
-    veto = veto or _command_fault(command, limits)
-    if veto is not None:
-        return Verdict(last.goal_rad, veto, np.zeros(len(last.goal_rad), np.bool_), checked)
+    requested, joints = np.asarray(command.goal_rad, float), len(limits.limit_rad)
+    if veto is None and requested.shape != limits.limit_rad.shape:
+        veto = f"command of shape {requested.shape} for {joints} joints"
     # After a pause the allowance does not pile up: never more than that of one stale limit
     dt_s = min(max(now_s - last.time_s, 0.0), limits.stale_limit_s)
     step, lead = limits.goal_rate_rad_s * dt_s, limits.goal_lead_rad
-    goal, clamped = np.empty(len(last.goal_rad)), np.empty(len(last.goal_rad), np.bool_)
-    requested, measured = np.asarray(command.goal_rad, float), np.asarray(state.position_rad, float)
-    _clamp(requested, last.goal_rad, measured, limits.limit_rad, step, lead, goal, clamped)
+    goal, clamped = np.empty(joints), np.empty(joints, np.bool_)
+    measured = np.asarray(state.position_rad, float)
+    if veto is None:
+        joint = _clamp(
+            requested, last.goal_rad, measured, limits.limit_rad, step, lead, goal, clamped
+        )
+        if joint >= 0:
+            veto = f"{limits.joint_names[joint]}: commanded {requested[joint]}: not a number"
+    if veto is not None:
+        return Verdict(last.goal_rad, veto, np.zeros(joints, np.bool_), checked)
     goal.setflags(write=False)
     memory = SafetyMemory(now_s, goal, checked.over_current_since_s, checked.checked_state)
     return Verdict(goal, None, clamped, memory)
@@ -268,7 +275,7 @@ def _quick_check(
 
 
 @compiled(
-    f"void({_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, float64, float64,"
+    f"int64({_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, float64, float64,"
     " float64[::1], boolean[::1])"
 )
 def _clamp(
@@ -280,14 +287,22 @@ def _clamp(
     lead_rad: float,
     goal_rad: Floats,
     clamped: Bools,
-) -> None:
-    """Clamp goals to lead, rate and limit, in this order; note which were changed."""
+) -> int:
+    """Clamp goals to lead, rate and limit, in this order; note which were changed.
+
+    Returns:
+        The first joint whose goal is not a number, or -1.
+
+    """
     for k in range(len(requested_rad)):
+        if not np.isfinite(requested_rad[k]):
+            return k
         low, high = position_rad[k] - lead_rad, position_rad[k] + lead_rad
         goal = min(max(requested_rad[k], low), high)
         goal = min(max(goal, last_rad[k] - step_rad), last_rad[k] + step_rad)
         goal = min(max(goal, -limit_rad[k]), limit_rad[k])
         goal_rad[k], clamped[k] = goal, goal != requested_rad[k]
+    return -1
 
 
 @cache
@@ -296,16 +311,3 @@ def _no_overcurrent(joints: int) -> Floats:
     since_s = np.full(joints, np.nan)
     since_s.setflags(write=False)
     return since_s
-
-
-def _command_fault(command: JointCommand, limits: SafetyLimits) -> str | None:
-    goal = np.asarray(command.goal_rad)
-    if goal.shape != limits.limit_rad.shape:
-        return f"command of shape {goal.shape} for {len(limits.limit_rad)} joints"
-    if not math.isfinite(goal.dot(goal)):
-        bad = ~np.isfinite(goal)
-        if not bad.any():
-            return None
-        joint = int(np.argmax(bad))
-        return f"{limits.joint_names[joint]}: commanded {goal[joint]}: not a number"
-    return None

@@ -102,6 +102,8 @@ class FastRead(GroupRead):
         return [Reply(self._delays_s[0], raw)]
 
 
+_STUFFED = HEADER[:3]
+"""What is followed by a stuffed byte where it stands behind the head."""
 _PREFIX = HEADER + b"\xfe"
 _GOALS = b"\x74\x00\x04\x00"
 """Address 116 and length 4, as a sync write begins."""
@@ -153,14 +155,17 @@ class GroupFastPath:
             if (len(raw) - 14) % 5 or (rows < 0).any() or len(np.unique(rows)) != len(rows):
                 return None
             known = self._goals = (head, ids, rows)
-        if not _intact(raw):
+        packet = np.frombuffer(raw, np.uint8)
+        if not _intact(raw, packet):
             return None
         self._firmware.on_instruction(now_s)
-        self._firmware.write_goals(known[2], np.frombuffer(raw, np.uint8), 12)
+        self._firmware.write_goals(known[2], packet, 12)
         return []
 
     def _plan(self, raw: bytes) -> GroupRead | None:
-        if raw[7] not in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ) or not _intact(raw):
+        if raw[7] not in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
+            return None
+        if not _intact(raw, np.frombuffer(raw, np.uint8)):
             return None
         address, length = int.from_bytes(raw[8:10], "little"), int.from_bytes(raw[10:12], "little")
         ids = np.frombuffer(raw, np.uint8, len(raw) - 14, 12)
@@ -177,9 +182,11 @@ class GroupFastPath:
         return kind(address, length, ids, rows, self._status_address, delays_s)
 
 
-def _intact(raw: bytes) -> bool:
+def _intact(raw: bytes, packet: Bytes) -> bool:
+    """Whether a packet is whole, and not stuffed; given as bytes and as an array."""
+    size = len(raw)
     return (
-        raw[5] | raw[6] << 8 == len(raw) - 7
-        and raw.find(HEADER[:3], 8, -2) < 0
-        and crc_of(np.frombuffer(raw, np.uint8), 0, len(raw) - 2, 0) == raw[-2] | raw[-1] << 8
+        raw[5] | raw[6] << 8 == size - 7
+        and raw.find(_STUFFED, 8, -2) < 0
+        and crc_of(packet, 0, size - 2, 0) == raw[-2] | raw[-1] << 8
     )

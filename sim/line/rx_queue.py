@@ -12,15 +12,12 @@ class RxQueue:
     def __init__(self) -> None:
         self.byte_s = 1e-5
         """Time of one byte on the wire."""
-        self._packets: deque[tuple[float, bytes]] = deque()
-
-    def __bool__(self) -> bool:
-        """Whether anything is under way or waits to be taken."""
-        return bool(self._packets)
+        self.packets: deque[tuple[float, bytes]] = deque()
+        """What is under way or waits to be taken, each with the time at which it begins."""
 
     def add(self, start_s: float, data: bytes) -> float:
         """Put a packet on the wire at ``start_s``; returns when its last byte will have arrived."""
-        packets = self._packets
+        packets = self.packets
         if not packets or packets[-1][0] <= start_s:
             packets.append((start_s, data))
         else:  # there are some that are late
@@ -30,12 +27,14 @@ class RxQueue:
 
     def count(self, now_s: float) -> int:
         """Bytes that have arrived and were not taken."""
-        return sum(self._arrived(packet, now_s) for packet in self._packets)
+        return sum(self._arrived(packet, now_s) for packet in self.packets)
 
     def due_s(self, count: int) -> float | None:
         """When ``count`` bytes will have arrived; None if so many are not under way."""
-        due_s = 0.0
-        for start_s, data in self._packets:
+        due_s, packets = 0.0, self.packets
+        if packets and len(packets[0][1]) >= count:  # one packet, as nearly always
+            return packets[0][0] + count * self.byte_s
+        for start_s, data in packets:
             # what stands behind a slow packet cannot be taken before it
             due_s = max(due_s, start_s + min(count, len(data)) * self.byte_s)
             if len(data) >= count:
@@ -45,7 +44,7 @@ class RxQueue:
 
     def take(self, count: int, now_s: float) -> bytes:
         """Up to ``count`` bytes of those that have arrived."""
-        packets, taken = self._packets, bytearray()
+        packets, taken = self.packets, bytearray()
         if packets and len(packets[0][1]) == count == self._arrived(packets[0], now_s):
             return packets.popleft()[1]  # one packet, all of it, as nearly always
         while packets and len(taken) < count:
@@ -60,12 +59,12 @@ class RxQueue:
 
     def clear(self) -> None:
         """Lose everything."""
-        self._packets.clear()
+        self.packets.clear()
 
     def cut(self, at_s: float) -> None:
         """Lose what has not arrived by ``at_s``."""
-        kept = [(packet[0], packet[1][: self._arrived(packet, at_s)]) for packet in self._packets]
-        self._packets = deque(packet for packet in kept if packet[1])
+        kept = [(packet[0], packet[1][: self._arrived(packet, at_s)]) for packet in self.packets]
+        self.packets = deque(packet for packet in kept if packet[1])
 
     def _arrived(self, packet: tuple[float, bytes], now_s: float) -> int:
         start_s, data = packet

@@ -124,13 +124,14 @@ class Wire(ABC):
     def clearPort(self) -> None:
         """Drop what has arrived by now; bytes still under way will arrive all the same."""
         now_s = self.clock.now_s()
-        self._deliver(now_s)
-        if self._rx_queue:
+        if self._sent:
+            self._deliver(now_s)
+        if self._rx_queue.packets:
             self._rx_queue.take(1 << 30, now_s)
 
     def getBytesAvailable(self) -> int:
         """Bytes that have arrived by now."""
-        if not (self._sent or self._rx_queue):
+        if not (self._sent or self._rx_queue.packets):
             return 0
         now_s = self.clock.now_s()
         self._deliver(now_s)
@@ -173,7 +174,8 @@ class Wire(ABC):
 
     def write(self, data: bytes) -> None:
         """Send bytes behind those already on the wire; returns at once."""
-        self._resume_host()
+        if self._script is not None or not self.is_open:
+            self._resume_host()
         start_s = max(self.clock.now_s(), self._sent_until_s)
         if self._sent:
             self._deliver(start_s)
@@ -191,10 +193,11 @@ class Wire(ABC):
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Up to ``count`` bytes; the clock moves to the last of them, or to ``deadline_s``."""
         clock, rx_queue, sent = self.clock, self._rx_queue, self._sent
-        self._resume_host()
+        if self._script is not None or not self.is_open:
+            self._resume_host()
         limit_s = max(deadline_s, clock.now_s())
         while count > 0:
-            due_s = rx_queue.due_s(count) if rx_queue else None
+            due_s = rx_queue.due_s(count) if rx_queue.packets else None
             if due_s is not None:
                 clock.sleep_until_s(min(due_s, limit_s))
                 break
@@ -202,7 +205,8 @@ class Wire(ABC):
                 clock.sleep_until_s(limit_s)
                 break
             self._deliver(sent[0][0])
-        self._must_be_open()
+        if self._script is not None or not self.is_open:
+            self._must_be_open()
         return rx_queue.take(count, clock.now_s())
 
     def drain_until_quiet(self, quiet_s: float) -> int:
@@ -236,9 +240,7 @@ class Wire(ABC):
         """Wait until a paused host goes on, and check that the port is open."""
         if self._script is not None:
             self.clock.sleep_until_s(self._script.host_resumes_s(self.clock.now_s()))
-            self._must_be_open()
-        elif not self.is_open:
-            self._must_be_open()
+        self._must_be_open()
 
     def _must_be_open(self) -> None:
         if self._script is not None:
@@ -261,8 +263,9 @@ class Wire(ABC):
 
     def _deliver(self, until_s: float) -> None:
         """Deliver to the servos the packets whose last byte has arrived by ``until_s``."""
-        while self._sent and self._sent[0][0] <= until_s + INSTANT_S:
-            end_s, data = self._sent.popleft()
+        sent = self._sent
+        while sent and sent[0][0] <= until_s + INSTANT_S:
+            end_s, data = sent.popleft()
             self._advance(end_s)
             if end_s - len(data) * self._byte_s > self._delivered_s + GAP_S:
                 self._reset_parser()
@@ -272,9 +275,9 @@ class Wire(ABC):
             replies = self._execute(data, end_s)
             if not replies:
                 continue
-            if self._sent and end_s + replies[0].delay_s < self._sent_until_s:
+            if sent and end_s + replies[0].delay_s < self._sent_until_s:
                 self.collisions += 1  # the host has already begun its next packet
-                self._sent.clear()
+                sent.clear()
                 continue
             self._send_replies(end_s, replies)
 

@@ -10,6 +10,9 @@ what would stop the link within the step, so a link comes to rest without chatte
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from snakewalk.config.arrays import Floats
 
 LANES = 8
@@ -83,6 +86,12 @@ def ellipse_force(
         -normal_n * mu_along * mu_along * along_m_s / slow_along,
         -normal_n * mu_across * mu_across * across_m_s / slow_across,
     )
+
+
+def make_lanes(contacts: int) -> tuple[Floats, NDArray[np.int64]]:
+    """Room for so many contacts side by side: a table of them, and the link of each."""
+    groups = (contacts + LANES - 1) // LANES
+    return np.zeros(groups * ROWS), np.zeros(groups * LANES, np.int64)
 
 
 def rub(table: Floats, contacts: int, mu: tuple[float, float, float]) -> None:

@@ -36,6 +36,7 @@ from snakewalk.sim.physics.friction import (
     SLIDE,
     STILL,
     ellipse_force,
+    make_lanes,
     rub,
     stop_share,
 )
@@ -53,6 +54,8 @@ from snakewalk.sim.plant import ServoDrive, shaft_torque
 from snakewalk.sim.servo.motor import friction_n_m
 
 register_jitable(error_model="numpy", inline="always")(ellipse_force)
+
+register_jitable(error_model="numpy")(make_lanes)
 
 register_jitable(error_model="numpy")(rub)
 
@@ -141,6 +144,58 @@ def _collect(
         qfrc[3 + k] += rotation[1, k] * m0 + rotation[1, 3 + k] * m1 + rotation[1, 6 + k] * m2
 
 
+def _line_up(
+    contacts: tuple[Any, ...],
+    chain: tuple[Floats, ...],
+    work: tuple[Floats, ...],
+    geoms: tuple[NDArray[np.int32], ...],
+    load: Floats,
+    still_n_s_m: Floats,
+    lanes: tuple[Floats, NDArray[np.int64]],
+) -> int:
+    """Lay out the contacts of bellies with the ground for ``rub``; their number.
+
+    An obstacle's and a foot's have MuJoCo's own friction, two links' none.
+    """
+    reals, integers, count, at = contacts
+    size, at_dist, at_place, at_up, at_geom, _ = at
+    geom_body, role, _ = geoms
+    v, w, depth = work[0], work[1], work[3]
+    centre, rotation = chain[0], chain[1]
+    table, of_link = lanes
+    found = 0
+    depth[:] = 0.0
+    for c in range(count):
+        geom = 2 * size * c + at_geom
+        if role[integers[geom]] != GROUND or role[integers[geom + 1]] == FOOT:
+            continue
+        i = int(geom_body[integers[geom + 1]]) - 1
+        row = found // LANES * ROWS + found % LANES
+        of_link[found] = i
+        found += 1
+        p, n = size * c + at_place, size * c + at_up
+        deep = max(-reals[size * c + at_dist], LEAST_DEPTH_M)
+        depth[i] += deep
+        p0, p1, p2 = reals[p], reals[p + 1], reals[p + 2]
+        r0, r1, r2 = p0 - centre[i + 1, 0], p1 - centre[i + 1, 1], p2 - centre[i + 1, 2]
+        w0, w1, w2 = w[i, 0], w[i, 1], w[i, 2]
+        table[row + PLACE], table[row + PLACE + 8], table[row + PLACE + 16] = p0, p1, p2
+        table[row + SLIDE] = v[i, 0] + w1 * r2 - w2 * r1
+        table[row + SLIDE + 8] = v[i, 1] + w2 * r0 - w0 * r2
+        table[row + SLIDE + 16] = v[i, 2] + w0 * r1 - w1 * r0
+        table[row + NORMAL] = reals[n]
+        table[row + NORMAL + 8] = reals[n + 1]
+        table[row + NORMAL + 16] = reals[n + 2]
+        table[row + AXIS] = rotation[i + 1, 0]
+        table[row + AXIS + 8] = rotation[i + 1, 3]
+        table[row + AXIS + 16] = rotation[i + 1, 6]
+        table[row + DEPTH], table[row + LOAD] = deep, load[i]
+        table[row + STILL] = still_n_s_m[i]
+    for k in range(found):
+        table[k // LANES * ROWS + k % LANES + DEPTH + 8] = depth[of_link[k]]
+    return found
+
+
 def _add_friction(
     contacts: tuple[Any, ...],
     qfrc: Floats,
@@ -154,53 +209,19 @@ def _add_friction(
     mass_kg: Floats,
     water: Floats,
     spine: int,
-    table: Floats,
-    of_link: NDArray[np.int64],
+    lanes: tuple[Floats, NDArray[np.int64]],
 ) -> None:
     """Ellipse at every contact of now under the load of the last step, collected into ``qfrc``."""
-    reals, integers, count, at = contacts
-    size, at_dist, at_place, at_up, at_geom, _ = at
-    geom_body, role, parents = geoms
-    v, w, wrench, depth, before = work
-    step_s = law[4]
+    v, w, wrench, _, before = work
+    (table, of_link), parents, step_s = lanes, geoms[2], law[4]
     centre, rotation = chain[0], chain[1]
-    stop_per_s = stop_share(centre[1 : spine + 1], law[3]) / step_s
+    still_n_s_m = stop_share(centre[1 : spine + 1], law[3]) / step_s * mass_kg
     mean_s = step_s / len(v)
     _move(v, w, before, qvel, chain, parents, step_s)
-    depth[:] = 0.0
-    rubbing = 0
-    for c in range(count):
-        geom = 2 * size * c + at_geom
-        # an obstacle's and a foot's have MuJoCo's own friction, two links' none
-        if role[integers[geom]] != GROUND or role[integers[geom + 1]] == FOOT:
-            continue
-        i = int(geom_body[integers[geom + 1]]) - 1
-        row = rubbing // LANES * ROWS + rubbing % LANES
-        of_link[rubbing] = i
-        rubbing += 1
-        p, n, deep = size * c + at_place, size * c + at_up, -reals[size * c + at_dist]
-        p0, p1, p2 = reals[p], reals[p + 1], reals[p + 2]
-        r0, r1, r2 = p0 - centre[i + 1, 0], p1 - centre[i + 1, 1], p2 - centre[i + 1, 2]
-        w0, w1, w2 = w[i, 0], w[i, 1], w[i, 2]
-        deep = max(deep, LEAST_DEPTH_M)
-        depth[i] += deep
-        table[row + PLACE], table[row + PLACE + 8], table[row + PLACE + 16] = p0, p1, p2
-        table[row + SLIDE] = v[i, 0] + w1 * r2 - w2 * r1
-        table[row + SLIDE + 8] = v[i, 1] + w2 * r0 - w0 * r2
-        table[row + SLIDE + 16] = v[i, 2] + w0 * r1 - w1 * r0
-        table[row + NORMAL] = reals[n]
-        table[row + NORMAL + 8] = reals[n + 1]
-        table[row + NORMAL + 16] = reals[n + 2]
-        table[row + AXIS] = rotation[i + 1, 0]
-        table[row + AXIS + 8] = rotation[i + 1, 3]
-        table[row + AXIS + 16] = rotation[i + 1, 6]
-        table[row + DEPTH], table[row + LOAD] = deep, load[i]
-        table[row + STILL] = stop_per_s * mass_kg[i]
-    for k in range(rubbing):
-        table[k // LANES * ROWS + k % LANES + DEPTH + 8] = depth[of_link[k]]
-    rub(table, rubbing, (law[0], law[1], law[2]))
+    count = _line_up(contacts, chain, work, geoms, load, still_n_s_m, lanes)
+    rub(table, count, (law[0], law[1], law[2]))
     wrench[:] = 0.0
-    for k in range(rubbing):
+    for k in range(count):
         i, row = of_link[k], k // LANES * ROWS + k % LANES
         f0, f1, f2 = table[row + FORCE], table[row + FORCE + 8], table[row + FORCE + 16]
         p0, p1, p2 = table[row + PLACE], table[row + PLACE + 8], table[row + PLACE + 16]
@@ -224,6 +245,7 @@ def _weigh(
     geoms: tuple[NDArray[np.int32], ...],
 ) -> None:
     """Sum the ground's contact forces on each link."""
+    load[:] = 0.0
     _, integers, count, at = contacts
     geom_body, role, _ = geoms
     for c in range(count):
@@ -267,8 +289,7 @@ def _steps(
     joints = len(goal)
     speed, ground_n_m = np.empty(joints), np.empty(joints)
     has_friction = _has_friction(gear)
-    table, of_link = np.zeros(0), np.zeros(0, np.int64)
-    step_s = law[4]
+    lanes, step_s = make_lanes(2 * joints), law[4]
     step1, step2, model, data = where[0], where[1], where[2], where[3]
     at = (
         where[7] // 8,
@@ -312,12 +333,11 @@ def _steps(
             count,
             at,
         )
-        if len(table) < (count + LANES - 1) // LANES * ROWS:
-            table = np.zeros((count + LANES - 1) // LANES * ROWS)
-            of_link = np.zeros(count + LANES, np.int64)
+        if count > len(lanes[1]):
+            lanes = make_lanes(count)
         _add_friction(
             *(contacts, qfrc, qvel, chain, work, geoms, law, load, totals, mass_kg, water, spine),
-            *(table, of_link),
+            lanes,
         )
         for j in range(joints):
             ground_n_m[j] += qfrc[6 + j]
@@ -341,7 +361,6 @@ def _steps(
                 outside_n_m = ground_n_m[j] - bias[6 + j] + constraint[6 + j] - held_n_m
                 most_n_m = friction_n_m(gear[:, j], qvel[6 + j], torque[j], outside_n_m)
                 friction[6 + j] = max(most_n_m, LEAST_FRICTION_N_M)
-        load[:] = 0.0
         _weigh(load, contacts, force_n, geoms)
 
 
@@ -425,6 +444,8 @@ def _run(
 register_jitable(error_model="numpy", inline="always")(_move)
 
 register_jitable(error_model="numpy", inline="always")(_collect)
+
+register_jitable(error_model="numpy")(_line_up)
 
 register_jitable(error_model="numpy")(_add_friction)
 
