@@ -21,10 +21,11 @@ DEPTH, LOAD, STILL, PLACE, SLIDE, NORMAL, AXIS, FORCE, LOSS, SIDEWAYS = (
     LANES * row for row in (0, 2, 3, 4, 7, 10, 13, 16, 19, 20)
 )
 """Where rows of a table of contacts begin: depth, and that of all contacts of the link; the link's
-load, and the drag that stops it; three rows each for the velocity of the contact, the ground's
-normal, the link's axis, and, written by ``rub``, the force; power lost, and the speed across times
-the share of the load."""
+load, and the drag that stops it; three rows each for the contact's place, its velocity, the
+ground's normal and the link's axis; and what ``rub`` writes: the force, three rows, its power, and
+the speed across times the contact's share of the load. SI units, in the world."""
 ROWS = 21 * LANES
+"""Numbers of a group of contacts."""
 
 STOP_SHARE = 1.8
 """Share of a contact's momentum that friction may take in one step; the explicit step is stable
@@ -95,10 +96,10 @@ def make_lanes(contacts: int) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def rub(table: Floats, contacts: int, mu: tuple[float, float, float]) -> None:
-    """Friction at contacts side by side: the rows of ``table`` that the others make.
+    """Write the friction of contacts side by side; they share a link's load by their depths.
 
     Contact ``k`` has its number of the row that begins at ``ROW`` at
-    ``k // LANES * ROWS + ROW + k % LANES``.
+    ``k // LANES * ROWS + ROW + k % LANES``. Places beyond the last contact come to mean nothing.
     """
     for group in range((contacts + LANES - 1) // LANES):
         lane = table[group * ROWS : (group + 1) * ROWS]

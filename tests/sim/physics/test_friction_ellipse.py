@@ -3,7 +3,23 @@
 import numpy as np
 import pytest
 
-from snakewalk.sim.physics.friction import BENT_STOP_SHARE, ellipse_force, stop_share
+from snakewalk.sim.physics.friction import (
+    AXIS,
+    BENT_STOP_SHARE,
+    DEPTH,
+    FORCE,
+    LANES,
+    LOAD,
+    LOSS,
+    NORMAL,
+    ROWS,
+    SLIDE,
+    STILL,
+    ellipse_force,
+    make_lanes,
+    rub,
+    stop_share,
+)
 from tests.oracles.numpy_steps import ellipse_forces
 
 MU = (0.1, 0.7, 0.3)
@@ -57,6 +73,45 @@ def test_many_at_once_are_one_by_one() -> None:
     along, across = ellipse_forces(0.5 * load, v[:, 0], v[:, 1], MU, DRAG, load)
     single = [ellipse_force(0.5 * n, *each, MU, DRAG, n) for n, each in zip(load, v, strict=True)]
     np.testing.assert_allclose(np.stack([along, across], axis=1), single, atol=1e-15)
+
+
+def lined_up(contacts: list[dict[int, np.ndarray]]) -> np.ndarray:
+    """A table of contacts, each given by its rows."""
+    table, _ = make_lanes(len(contacts))
+    table[:] = 1.0
+    for k, each in enumerate(contacts):
+        for row, values in each.items():
+            at = k // LANES * ROWS + k % LANES + row
+            table[at : at + len(values) * LANES : LANES] = values
+    return table
+
+
+def test_contacts_side_by_side_rub_on_their_own_plane_and_as_each_would_alone() -> None:
+    contacts = []
+    for v in RNG.normal(size=(19, 3)):
+        normal = RNG.normal(size=3) + np.array([0.0, 0.0, 4.0])
+        rows = {SLIDE: v, NORMAL: normal / np.linalg.norm(normal), AXIS: RNG.normal(size=3)}
+        rows[AXIS] /= np.linalg.norm(rows[AXIS])
+        rows |= {DEPTH: np.array([1e-4, 3e-4]), LOAD: np.array([LOAD_N]), STILL: np.array([DRAG])}
+        contacts.append(rows)
+    table = lined_up(contacts)
+    rub(table, len(contacts), MU)
+    for k, each in enumerate(contacts):
+        at, alone = k // LANES * ROWS + k % LANES, lined_up([each])
+        rub(alone, 1, MU)
+        acts = table[at + FORCE : at + FORCE + 3 * LANES : LANES]
+        assert acts.tolist() == alone[FORCE : FORCE + 3 * LANES : LANES].tolist()
+        normal = each[NORMAL]
+        along = each[AXIS] - (each[AXIS] @ normal) * normal
+        along /= np.linalg.norm(along)
+        across = np.cross(normal, along)
+        slides = each[SLIDE] @ along, each[SLIDE] @ across
+        expected = ellipse_force(LOAD_N / 3.0, *slides, MU, DRAG, LOAD_N)
+        np.testing.assert_allclose(
+            (acts @ along, acts @ across, acts @ normal), (*expected, 0.0), atol=1e-12
+        )
+        assert table[at + LOSS] == pytest.approx(acts @ each[SLIDE])
+        assert table[at + LOSS] < 0.0
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.4, np.pi / 2, 3.0])
