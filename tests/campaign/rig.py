@@ -14,7 +14,8 @@ from snakewalk.config.faults import FaultPlan
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.chain.servo_chain import SLOW_EVERY, ServoChain
+from snakewalk.drivers.chain.liveness import SLOW_EVERY
+from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.chain.start_up import IDENTITY
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser

@@ -10,7 +10,8 @@ from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.drivers.bus.budget import chain_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.group_read import GroupReadReply
-from snakewalk.drivers.chain.servo_chain import SLOW_EVERY, ServoChain
+from snakewalk.drivers.chain.liveness import SLOW_EVERY
+from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.chain.start_up import IDENTITY, inspect
 from snakewalk.drivers.errors import BudgetError, BusError, ChainError, PortError
 from snakewalk.drivers.protocol.control_table import load_control_table

@@ -10,7 +10,8 @@ import pytest
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.chain.servo_chain import SLOW_EVERY, ServoChain
+from snakewalk.drivers.chain.liveness import SLOW_EVERY
+from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import ChainError, PortError, SafetyTrippedError
 from snakewalk.drivers.protocol.packet import Instruction
 from snakewalk.drivers.protocol.parser import PacketParser
