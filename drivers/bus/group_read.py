@@ -85,7 +85,11 @@ class GroupReadRequest:
         self._id_bytes = np.array(self.ids, np.uint8)
         self._error = np.zeros(count, np.uint8)
         self._all = _constant(np.ones(count, np.bool_))
-        self._no_error = _constant(np.zeros(count, np.uint8))
+        no_error = _constant(np.zeros(count, np.uint8))
+        self._flawless = GroupReadReply(
+            *(no_error, self._all, no_error, self._all), clean=True, whole=True, flawless=True
+        )[1:]
+        """What a regular reply without errors says beside its data."""
         self.reply_bytes = (len(self._fast_head) if fast else 0) + count * self.frame_bytes
         """Length of the whole reply without stuffing."""
 
@@ -99,13 +103,11 @@ class GroupReadRequest:
 
     def regular(self, status: int, data: Bytes, error: Bytes) -> GroupReadReply:
         """Regular reply: ``status`` is what the frame reader returned; ``data`` is kept."""
-        everyone = self._all
         if status == FLAWLESS:
-            return GroupReadReply(
-                *(data, everyone, self._no_error, everyone), clean=True, whole=True, flawless=True
-            )
+            return GroupReadReply(data, *self._flawless)
         error = error.copy()
-        return GroupReadReply(data, (error & _RESULT) == 0, error, everyone, clean=True, whole=True)
+        valid = (error & _RESULT) == 0
+        return GroupReadReply(data, valid, error, self._all, clean=True, whole=True)
 
     def missing_bytes(self, raw: bytes) -> int:
         """How many bytes more would complete the replies; 0 if none would.

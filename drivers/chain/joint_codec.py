@@ -239,18 +239,18 @@ class Readings:
         numbers.setflags(write=False)
         current, velocity, position, temperature, voltage, age_s, slow_age_s = numbers
         hardware_error, error, valid = self._flags
-        return JointState(
-            time_s=now_s,
-            position_rad=position,
-            velocity_rad_s=velocity,
-            current_a=current,
-            temperature_c=temperature,
-            voltage_v=voltage,
-            hardware_error=hardware_error,
-            error=error,
-            age_s=age_s,
-            valid=valid,
-            slow_age_s=slow_age_s,
+        return JointState(  # by place: by name it takes three times as long
+            now_s,
+            position,
+            velocity,
+            current,
+            temperature,
+            voltage,
+            hardware_error,
+            error,
+            age_s,
+            valid,
+            slow_age_s,
         )
 
     def _frozen_flags(self) -> tuple[Bytes, Bytes, Bools]:

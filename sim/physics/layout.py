@@ -32,6 +32,7 @@ _BALL = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
 class StepLayout:
     """Byte offsets in ``mjData`` and ``mjContact``, and what compiled code calls."""
 
+    time: int
     ncon: int
     contact: int
     efc_force: int
@@ -56,6 +57,7 @@ def step_layout() -> StepLayout | None:
     try:
         of_data, of_contact = _structure("mjData"), _structure("mjContact")
         layout = StepLayout(
+            time=of_data.time.offset,
             ncon=of_data.ncon.offset,
             contact=of_data.contact.offset,
             efc_force=of_data.efc_force.offset,
@@ -109,14 +111,15 @@ def _verified(layout: StepLayout, of_data: type[ctypes.Structure]) -> bool:
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data)
 
-    def at(offset: int, kind: type) -> int:
-        value: int = kind.from_address(data._address + offset).value  # type: ignore[attr-defined]
+    def at(offset: int, kind: type) -> float:
+        value: float = kind.from_address(data._address + offset).value  # type: ignore[attr-defined]
         return value
 
     contacts = data.contact
     stable = of_data.qpos.offset, of_data.qvel.offset
     return (
         data.ncon > 0
+        and at(layout.time, ctypes.c_double) == data.time > 0.0
         and at(layout.ncon, ctypes.c_int) == data.ncon
         and at(layout.contact, ctypes.c_size_t) == contacts.dist.ctypes.data
         and at(layout.efc_force, ctypes.c_size_t) == data.efc_force.ctypes.data

@@ -45,8 +45,8 @@ def _pose(place: Floats, pose: Floats) -> None:
 class Steps(Protocol):
     """Drive, friction and ``mj_step``, a number of times."""
 
-    def run(self, steps: int, drive: ServoDrive) -> None:
-        """Advance ``steps`` steps."""
+    def run(self, steps: int, drive: ServoDrive) -> float:
+        """Advance ``steps`` steps; MuJoCo's time then."""
         ...
 
 
@@ -114,15 +114,13 @@ class MujocoPlant:
             return
         count = self._count + steps
         try:
-            self.steps.run(steps, drive)
+            time_s = self.steps.run(steps, drive)
             self._count = count
         except BaseException:
             # A signal may end it anywhere; on the way out the body is stepped on from there.
             self._count = round(self._data.time / self.step_s)
             raise
-        if (
-            abs(self._data.time - self._count * self.step_s) > 0.5 * self.step_s
-        ):  # MuJoCo resets what diverges
+        if abs(time_s - count * self.step_s) > 0.5 * self.step_s:  # MuJoCo resets what diverges
             raise PhysicsError(
                 f"the physics diverged before {self.time_s:.3f} s; "
                 f"a step of {self.step_s * 1e3:g} ms may be too long for this robot"

@@ -26,8 +26,8 @@ class NumpySteps:
     def __init__(self, mechanics: Mechanics) -> None:
         self._m = mechanics
 
-    def run(self, steps: int, drive: ServoDrive) -> None:
-        """Advance ``steps`` steps."""
+    def run(self, steps: int, drive: ServoDrive) -> float:
+        """Advance ``steps`` steps; MuJoCo's time then."""
         m = self._m
         for _ in range(steps):
             m.planes.lay(m.data)
@@ -42,6 +42,7 @@ class NumpySteps:
             add_energies(m, drive, before)
             hold_joints(m, drive, ground_n_m, before)
             m.measure_loads()
+        return float(m.data.time)
 
 
 def add_energies(m: Mechanics, drive: ServoDrive, before_rad_s: Floats) -> None:

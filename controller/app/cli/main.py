@@ -16,6 +16,10 @@ _ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)
 )
 """Signals that would end a program without a word; SIGQUIT is Ctrl-\\."""
+LEFT_OUT_OF_NUMPY = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR X86_V4"
+"""What numpy, which is imported later, must do without on an x86-64: its sines and exponentials for
+these come from another library and differ in the last bit, and so would runs. A name that a version
+of numpy or a processor does not know is no fault."""
 _BY_SIGNAL = 128
 """Exit code of a program that a signal has ended: this, and the signal's number."""
 _INTERRUPTED = 130
@@ -27,6 +31,7 @@ def main() -> None:
     # Pictures are drawn without a screen, by a context of our own; MuJoCo's import fails on a
     # choice that is not installed.
     os.environ["MUJOCO_GL"] = "disable"
+    os.environ.setdefault("NPY_DISABLE_CPU_FEATURES", LEFT_OUT_OF_NUMPY)
     # a script has what it starts beside itself ignore ^C and SIGQUIT, and it has to stop all the
     # same; nohup has SIGHUP ignored, and means it
     for number in _ENDING:

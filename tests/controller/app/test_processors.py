@@ -19,6 +19,18 @@ from snakewalk.controller.app.runs.factory import prepare_walk
 near = prepare_walk("jacksboro-traverse", waypoints_m=((0.6, 0.2),), time_limit_s=1.0)
 execute(near, Path(sys.argv[1]))
 """
+COMMAND = """
+import sys
+from snakewalk.controller.app.cli.main import main
+assert "numpy" not in sys.modules
+sys.argv = ["snakewalk", "list", "--json"]
+try:
+    main()
+except SystemExit as end:
+    assert not end.code
+from numpy._core._multiarray_umath import __cpu_features__
+assert not [each for each, has in __cpu_features__.items() if has and "AVX512" in each]
+"""
 _AVX512 = "X86_V4 AVX512_ICL AVX512_SPR"
 PROCESSORS = {"Haswell": _AVX512, "Sandybridge": _AVX512, "Prescott": f"X86_V3 {_AVX512}"}
 """Kernels of OpenBLAS with and without fused products, and what numpy must do without.
@@ -43,3 +55,15 @@ def test_a_run_over_hills_leaves_the_same_bytes_whatever_kernel_multiplies(tmp_p
     assert len(logs[0]) > 50_000
     assert logs[1] == logs[0]
     assert logs[2] == logs[0]
+
+
+@pytest.mark.skipif(
+    platform.machine() not in {"x86_64", "AMD64"}, reason="other processors have no AVX-512"
+)
+def test_a_command_has_numpy_do_without_its_other_sines() -> None:
+    """They hang on the processor: main is in time only as long as it does not import numpy."""
+    env = {name: value for name, value in os.environ.items() if "CPU_FEATURES" not in name}
+    done = subprocess.run(
+        [sys.executable, "-c", COMMAND], env=env, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
