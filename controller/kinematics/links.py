@@ -36,6 +36,11 @@ class BodyView(NamedTuple):
         angles[1:] -= 2.0 * np.pi * turns.cumsum()
         return np.asarray(angles)
 
+    @property
+    def heading_rad(self) -> float:
+        """Of the body's mean line: the mean of the links' headings."""
+        return float(self.headings_rad.mean())
+
     def advance_since_m(self, before: "BodyView") -> float:
         """How far the links have gone along themselves since ``before``, mean over the body."""
         return _mean_advance_m(before.link_m, self.link_m, self.rotation)
@@ -198,7 +203,7 @@ def pose_at(position_m: Floats, heading_rad: float, time_s: float = 0.0) -> Body
 
 def mean_heading_rad(robot: RobotConfig, joint_rad: Floats) -> float:
     """Mean heading of the links relative to the head link."""
-    return float(body_in_world(robot, pose_at(np.zeros(2), 0.0), joint_rad).headings_rad.mean())
+    return body_in_world(robot, pose_at(np.zeros(2), 0.0), joint_rad).heading_rad
 
 
 @compiled(

@@ -109,7 +109,7 @@ class PolicyMotion:
     def observe(self, view: BodyView) -> Floats:
         """Take the measured body; returns what a network observes, as ``observation_names``."""
         self._measured_rad = chain_angles_rad(self._robot, view)[self._yaw]
-        self._heading_rad = float(view.headings_rad.mean())
+        self._heading_rad = view.heading_rad
         told = [cos(self._phase_rad), sin(self._phase_rad)]
         told += [cos(self._heading_rad), sin(self._heading_rad)]
         return np.concatenate([told, self._measured_rad, self._limiter.angle_rad])

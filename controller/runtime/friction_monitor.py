@@ -45,12 +45,12 @@ class Span:
     def slid(self) -> Floats:
         """(3,) way ahead and to the left of the mean line, m, and turn, rad."""
         end = self.views[-1]
-        return self.slid_to(end.centre_m[:2], float(end.headings_rad.mean()))
+        return self.slid_to(end.centre_m[:2], end.heading_rad)
 
     def slid_to(self, centre_m: Floats, heading_rad: float) -> Floats:
         """(3,) the same of a body that came to another centre (2,) and mean heading."""
         begin = self.views[1]
-        mean = float(begin.headings_rad.mean())
+        mean = begin.heading_rad
         (x, y), c, s = centre_m - begin.centre_m[:2], np.cos(mean), np.sin(mean)
         return np.array([c * x + s * y, c * y - s * x, heading_rad - mean])
 
@@ -90,7 +90,7 @@ class OnTwin:
         except RuntimeError:  # it has diverged
             return np.full(3, np.nan)
         end = body_in_world(robot, now, now_rad)
-        return span.slid_to(end.centre_m[:2], float(end.headings_rad.mean()))
+        return span.slid_to(end.centre_m[:2], end.heading_rad)
 
 
 class OnPaper:
@@ -110,7 +110,7 @@ class OnPaper:
             self._span, self._shapes = span, _shapes(span)
         begin = span.views[1]
         *place_m, heading = planar_slide(
-            *self._shapes, float(begin.headings_rad.mean()), friction.along, friction.across
+            *self._shapes, begin.heading_rad, friction.along, friction.across
         )
         return span.slid_to(begin.centre_m[:2] + place_m, heading)
 

@@ -148,7 +148,7 @@ class LiveCourse(OnCourse):
 
     def _lead_to(self, left_m: Floats, view: BodyView) -> None:
         path = self.course.path
-        self.course.lead_to(left_m, lambda: float(view.headings_rad.mean()))
+        self.course.lead_to(left_m, lambda: view.heading_rad)
         if self.course.path is not path:
             self._changed = "waypoints were set"
 

@@ -102,6 +102,6 @@ class MapWalk(OnCourse):
             why = "more of the ground is known"
         else:
             return
-        course.renew(why, self._planner.clear, lambda: float(view.headings_rad.mean()))
+        course.renew(why, self._planner.clear, lambda: view.heading_rad)
         if course.replanned is not None:
             self._planned_m = self._travel_m

@@ -243,7 +243,7 @@ class Pilot(OnCourse):
         self.course.follow(
             view.centre_m[:2],
             view.link_m[0, :2],
-            lambda: float(view.headings_rad.mean()),
+            lambda: view.heading_rad,
             self.head,
             self._fall_back,
         )

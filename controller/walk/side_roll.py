@@ -95,6 +95,11 @@ class RollPlan:
     """At which the target comes nearer, joins and all."""
 
     @property
+    def at_once(self) -> bool:
+        """Whether the joints bend at once, without a piece of track."""
+        return not len(self.piece_rad)
+
+    @property
     def side(self) -> float:
         """1 to the left, -1 to the right."""
         return float(np.sign(self.bend_rad))
@@ -342,11 +347,11 @@ class SideRolls(OnCourse):
         if plan is None or plan.speed_m_s < max(LEAST_SPEED_M_S, progress * self._pulse_m_s):
             return
         self._plan = plan
-        if len(plan.piece_rad):
-            self._pilot.end_on(plan.piece_rad)
-        else:
+        if plan.at_once:
             self.decision = None  # it is not walked
             self._roll(view, plan)
+        else:
+            self._pilot.end_on(plan.piece_rad)
 
     def _target_m(self, view: BodyView) -> Floats:
         """(2,) the next waypoint if it is near, else a point of the path before it.
@@ -365,7 +370,7 @@ class SideRolls(OnCourse):
             return self._planner.best(pose, self._walker, target_m)
         if self._walker.outlook >= _SLOW:
             return None
-        plans = self._planner.tried(pose, self._walker, target_m, heading_rad(view))
+        plans = self._planner.tried(pose, self._walker, target_m, view.heading_rad)
         found = [self._tried(plan, view, twin) for plan in plans]
         travel = _TRY_AGAIN_BODIES * self._walker.track.points
         self._walks_until = self._pilot.head + travel
@@ -377,7 +382,7 @@ class SideRolls(OnCourse):
             self._pilot.coasting(plan.piece_rad),
             _cycle(plan, self._robot),
             self._robot,
-            at_once=not len(plan.piece_rad),
+            at_once=plan.at_once,
         )
         begin_m = least_m = float(np.hypot(*(view.centre_m[:2] - plan.target_m)))
         time_s, best_m_s, turns = 0.0, 0.0, 1
@@ -402,8 +407,8 @@ class SideRolls(OnCourse):
         """Begin to roll; walk on if the body does not lie as it was meant to."""
         headings = view.headings_rad
         bent = plan.side * float(headings[0] - headings[-1]) > 0.5 * abs(plan.bend_rad)
-        bent |= not len(plan.piece_rad)
-        if not self.course.astray or not bent or abs(body_roll_rad(view)) > _UPRIGHT_RAD:
+        lies = bent or plan.at_once
+        if not self.course.astray or not lies or abs(body_roll_rad(view)) > _UPRIGHT_RAD:
             self._plan = None
             self._pilot.go_on(self._walker.think_anew)
             return
@@ -422,13 +427,8 @@ class SideRolls(OnCourse):
         self._walks_until = self._pilot.head + _AGAIN_BODIES * self._walker.track.points
         course = self.course
         if not course.complete and course.off_path_m > _OFF_PATH_M:
-            course.lay_from_here("the roll has ended off the path", lambda: heading_rad(view))
+            course.lay_from_here("the roll has ended off the path", lambda: view.heading_rad)
             self._relaid = course.replanned
-
-
-def heading_rad(view: BodyView) -> float:
-    """Of the body's mean line."""
-    return float(view.headings_rad.mean())
 
 
 def _cycle(plan: RollPlan, robot: RobotConfig) -> GaitCycle:
@@ -501,7 +501,7 @@ class _Rolling:
         to_go_m = planner.to_go_m(
             self._plan.target_m,
             view.link_m[:, :2],
-            float(view.headings_rad.mean()),
+            view.heading_rad,
             self._plan.side,
         )
         if self._turns == MOST_TURNS or len(to_go_m) == 1 or to_go_m[1] >= to_go_m[0]:

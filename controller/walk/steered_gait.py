@@ -117,7 +117,7 @@ class SteeredGait(OnCourse):
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""
         course, centre_m = self.course, view.centre_m[:2]
-        heading_rad = float(view.headings_rad.mean())
+        heading_rad = view.heading_rad
         course.follow(centre_m, view.link_m[0, :2], lambda: heading_rad, self.cycles)
         if course.complete:
             self._stop_profile.stop()

@@ -129,8 +129,6 @@ class ControlCycle:
             port.clock.now_s(),
         )
         """Request whose reply is awaited, its order, and what receives it, else until when."""
-        self._asked_byte_s = self._byte_s
-        """Time of a byte on the line when that was sent."""
         self.fast = fast
         """Whether the next read is a fast one."""
         self.counters = CycleCounters()
@@ -214,7 +212,7 @@ class ControlCycle:
         responded = reply.answered
         if not self._pending.empty:
             reply = self._without_late(request, reply)
-        if reply.whole or (reply.clean and reply.complete):
+        if reply.clean and reply.complete:
             self._succeeded()
         else:
             self._failed(request, reply, responded, timed_out=len(raw) < request.reply_bytes)
@@ -271,7 +269,7 @@ class ControlCycle:
         """Send a request; until when its reply is awaited."""
         packet = request.packet if goals is None else self._goals.encode(goals) + request.packet
         self._port.clearPort()
-        byte_s = self._asked_byte_s = self._byte_s
+        byte_s = self._byte_s
         free_s = self._line.reserve(len(packet) * byte_s)
         self._port.write(packet)
         return free_s + request.reply_bytes * byte_s + self._latency_s
@@ -296,7 +294,7 @@ class ControlCycle:
         if len(raw) > expected or (len(raw) == expected and port.getBytesAvailable()):
             raw = self._with_surplus(request, raw, deadline_s)
         reply = request.parse(raw)
-        while not reply.whole and len(raw) >= request.reply_bytes and not reply.complete:
+        while len(raw) >= request.reply_bytes and not reply.complete:
             more = request.missing_bytes(raw)  # stuffed bytes, or an older reply, come on top
             surplus = len(raw) + more - expected
             got = self._port.read_until(more, deadline_s + surplus * self._byte_s) if more else b""
@@ -319,7 +317,7 @@ class ControlCycle:
 
     def _came_twice(self, request: GroupReadRequest, deadline_s: float) -> bool:
         """Whether a reply that is complete now is an older one."""
-        byte_s = self._asked_byte_s
+        byte_s = self._byte_s
         reply_s = request.reply_bytes * byte_s
         free_s = deadline_s - reply_s - self._latency_s
         return self._line.came_twice(free_s, len(request.packet) * byte_s, reply_s)

@@ -76,25 +76,28 @@ def vet(
     that jumps to where a joint is said to be would jump on a wrong answer, too.
     """
     veto, checked = check_state(state, last, limits, now_s)
+    if veto is not None:
+        return _refused(veto, checked)
     requested, joints = np.asarray(command.goal_rad, float), len(limits.limit_rad)
-    if veto is None and requested.shape != limits.limit_rad.shape:
-        veto = f"command of shape {requested.shape} for {joints} joints"
+    if requested.shape != limits.limit_rad.shape:
+        return _refused(f"command of shape {requested.shape} for {joints} joints", checked)
     # After a pause the allowance does not pile up: never more than that of one stale limit
     dt_s = min(max(now_s - last.time_s, 0.0), limits.stale_limit_s)
     step, lead = limits.goal_rate_rad_s * dt_s, limits.goal_lead_rad
     goal, clamped = np.empty(joints), np.empty(joints, np.bool_)
     measured = np.asarray(state.position_rad, float)
-    if veto is None:
-        joint = _clamp(
-            requested, last.goal_rad, measured, limits.limit_rad, step, lead, goal, clamped
-        )
-        if joint >= 0:
-            veto = f"{limits.joint_names[joint]}: commanded {requested[joint]}: not a number"
-    if veto is not None:
-        return Verdict(last.goal_rad, veto, np.zeros(joints, np.bool_), checked)
+    bad = _clamp(requested, last.goal_rad, measured, limits.limit_rad, step, lead, goal, clamped)
+    if bad >= 0:
+        veto = f"{limits.joint_names[bad]}: commanded {requested[bad]}: not a number"
+        return _refused(veto, checked)
     goal.setflags(write=False)
     memory = SafetyMemory(now_s, goal, checked.over_current_since_s, checked.checked_state)
     return Verdict(goal, None, clamped, memory)
+
+
+def _refused(veto: str, checked: SafetyMemory) -> Verdict:
+    """Let nothing pass: the last goals again."""
+    return Verdict(checked.goal_rad, veto, np.zeros(len(checked.goal_rad), np.bool_), checked)
 
 
 def check_state(

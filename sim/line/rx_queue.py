@@ -31,10 +31,8 @@ class RxQueue:
 
     def due_s(self, count: int) -> float | None:
         """When ``count`` bytes will have arrived; None if so many are not under way."""
-        due_s, packets = 0.0, self.packets
-        if packets and len(packets[0][1]) >= count:  # one packet, as nearly always
-            return packets[0][0] + count * self.byte_s
-        for start_s, data in packets:
+        due_s = 0.0
+        for start_s, data in self.packets:
             # what stands behind a slow packet cannot be taken before it
             due_s = max(due_s, start_s + min(count, len(data)) * self.byte_s)
             if len(data) >= count:

@@ -23,7 +23,6 @@ from snakewalk.sim.servo.protection import SupplyAndAmbient
 Tamper = Callable[[bytes], Sequence[bytes]]
 """Changes one reply on the wire: returns the packets that arrive instead, in order."""
 _ID_AT, _CODE_AT = 4, 7
-_TO_ALL = HEADER + bytes((BROADCAST_ID,))
 
 
 class SimLine(Wire):
@@ -109,17 +108,6 @@ class SimLine(Wire):
 
     def _advance(self, until_s: float) -> None:
         self.firmware.advance(until_s)
-
-    def _is_silent(self) -> bool:
-        if self._script is not None or len(self._sent) != 1:
-            return False
-        data = self._sent[0][1]
-        return (
-            data[:5] == _TO_ALL
-            and len(data) > _CODE_AT
-            and data[_CODE_AT] == Instruction.SYNC_WRITE
-            and data[5] | data[6] << 8 == len(data) - 7
-        )
 
     def _reset_parser(self) -> None:
         self._reader.reset()

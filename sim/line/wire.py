@@ -70,10 +70,6 @@ class Wire(ABC):
     def _execute(self, data: bytes, end_s: float) -> list[Reply]:
         """Execute what the host has sent by ``end_s``; returns the servos' replies."""
 
-    def _is_silent(self) -> bool:
-        """Whether what is on its way to the servos is known to bring no reply: it may wait."""
-        return False
-
     @abstractmethod
     def _reset_parser(self) -> None:
         """Forget a partial packet: the line was quiet, so its rest will not come."""
@@ -128,7 +124,7 @@ class Wire(ABC):
     def clearPort(self) -> None:
         """Drop what has arrived by now; bytes still under way will arrive all the same."""
         now_s = self.clock.now_s()
-        if self._sent and not self._is_silent():
+        if self._sent:
             self._deliver(now_s)
         if self._rx_queue.packets:
             self._rx_queue.take(1 << 30, now_s)
@@ -181,7 +177,7 @@ class Wire(ABC):
         if self._script is not None or not self.is_open:
             self._resume_host()
         start_s = max(self.clock.now_s(), self._sent_until_s)
-        if self._sent and not self._is_silent():
+        if self._sent:
             self._deliver(start_s)
         clear = self._quiet_s <= start_s + INSTANT_S
         if not clear:

@@ -104,10 +104,10 @@ def rub(table: Floats, contacts: int, mu: tuple[float, float, float]) -> None:
     for group in range((contacts + LANES - 1) // LANES):
         lane = table[group * ROWS : (group + 1) * ROWS]
         for j in range(LANES):
-            n0, n1, n2 = lane[NORMAL + j], lane[NORMAL + 8 + j], lane[NORMAL + 16 + j]
-            e0, e1, e2 = lane[AXIS + j], lane[AXIS + 8 + j], lane[AXIS + 16 + j]
-            s0, s1, s2 = lane[SLIDE + j], lane[SLIDE + 8 + j], lane[SLIDE + 16 + j]
-            share = lane[DEPTH + j] / lane[DEPTH + 8 + j]
+            n0, n1, n2 = lane[NORMAL + j], lane[NORMAL + LANES + j], lane[NORMAL + 2 * LANES + j]
+            e0, e1, e2 = lane[AXIS + j], lane[AXIS + LANES + j], lane[AXIS + 2 * LANES + j]
+            s0, s1, s2 = lane[SLIDE + j], lane[SLIDE + LANES + j], lane[SLIDE + 2 * LANES + j]
+            share = lane[DEPTH + j] / lane[DEPTH + LANES + j]
             lift = e0 * n0 + e1 * n1 + e2 * n2
             e0, e1, e2 = e0 - lift * n0, e1 - lift * n1, e2 - lift * n2
             scale = 1.0 / max(math.sqrt(e0 * e0 + e1 * e1 + e2 * e2), 1e-9)
@@ -120,7 +120,7 @@ def rub(table: Floats, contacts: int, mu: tuple[float, float, float]) -> None:
                 share * load, along_m_s, across_m_s, mu, lane[STILL + j], load
             )
             lane[FORCE + j] = along_n * e0 + across_n * g0
-            lane[FORCE + 8 + j] = along_n * e1 + across_n * g1
-            lane[FORCE + 16 + j] = along_n * e2 + across_n * g2
+            lane[FORCE + LANES + j] = along_n * e1 + across_n * g1
+            lane[FORCE + 2 * LANES + j] = along_n * e2 + across_n * g2
             lane[LOSS + j] = along_n * along_m_s + across_n * across_m_s
             lane[SIDEWAYS + j] = abs(across_m_s) * share

@@ -179,20 +179,20 @@ def _line_up(
         p0, p1, p2 = reals[p], reals[p + 1], reals[p + 2]
         r0, r1, r2 = p0 - centre[i + 1, 0], p1 - centre[i + 1, 1], p2 - centre[i + 1, 2]
         w0, w1, w2 = w[i, 0], w[i, 1], w[i, 2]
-        table[row + PLACE], table[row + PLACE + 8], table[row + PLACE + 16] = p0, p1, p2
+        table[row + PLACE], table[row + PLACE + LANES], table[row + PLACE + 2 * LANES] = p0, p1, p2
         table[row + SLIDE] = v[i, 0] + w1 * r2 - w2 * r1
-        table[row + SLIDE + 8] = v[i, 1] + w2 * r0 - w0 * r2
-        table[row + SLIDE + 16] = v[i, 2] + w0 * r1 - w1 * r0
+        table[row + SLIDE + LANES] = v[i, 1] + w2 * r0 - w0 * r2
+        table[row + SLIDE + 2 * LANES] = v[i, 2] + w0 * r1 - w1 * r0
         table[row + NORMAL] = reals[n]
-        table[row + NORMAL + 8] = reals[n + 1]
-        table[row + NORMAL + 16] = reals[n + 2]
+        table[row + NORMAL + LANES] = reals[n + 1]
+        table[row + NORMAL + 2 * LANES] = reals[n + 2]
         table[row + AXIS] = rotation[i + 1, 0]
-        table[row + AXIS + 8] = rotation[i + 1, 3]
-        table[row + AXIS + 16] = rotation[i + 1, 6]
+        table[row + AXIS + LANES] = rotation[i + 1, 3]
+        table[row + AXIS + 2 * LANES] = rotation[i + 1, 6]
         table[row + DEPTH], table[row + LOAD] = deep, load[i]
         table[row + STILL] = still_n_s_m[i]
     for k in range(found):
-        table[k // LANES * ROWS + k % LANES + DEPTH + 8] = depth[of_link[k]]
+        table[k // LANES * ROWS + k % LANES + DEPTH + LANES] = depth[of_link[k]]
     return found
 
 
@@ -223,8 +223,8 @@ def _add_friction(
     wrench[:] = 0.0
     for k in range(count):
         i, row = of_link[k], k // LANES * ROWS + k % LANES
-        f0, f1, f2 = table[row + FORCE], table[row + FORCE + 8], table[row + FORCE + 16]
-        p0, p1, p2 = table[row + PLACE], table[row + PLACE + 8], table[row + PLACE + 16]
+        f0, f1, f2 = table[row + FORCE], table[row + FORCE + LANES], table[row + FORCE + 2 * LANES]
+        p0, p1, p2 = table[row + PLACE], table[row + PLACE + LANES], table[row + PLACE + 2 * LANES]
         totals[0] -= table[row + LOSS] * step_s
         totals[1] += table[row + SIDEWAYS] * mean_s
         wrench[i, 0] += f0

@@ -16,7 +16,7 @@ _ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)
 )
 """Signals that would end a program without a word; SIGQUIT is Ctrl-\\."""
-LEFT_OUT_OF_NUMPY = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR X86_V4"
+_LEFT_OUT = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR X86_V4"
 """What numpy, which is imported later, must do without on an x86-64: its sines and exponentials for
 these come from another library and differ in the last bit, and so would runs. A name that a version
 of numpy or a processor does not know is no fault."""
@@ -26,12 +26,17 @@ _INTERRUPTED = 130
 """Of Ctrl-C, which has been told."""
 
 
+def leave_out_avx512() -> None:
+    """Have numpy, which is not imported yet, do without what makes other last bits."""
+    os.environ.setdefault("NPY_DISABLE_CPU_FEATURES", _LEFT_OUT)
+
+
 def main() -> None:
     """Run the command line; bad input ends with exit code 2 and one line per fault."""
     # Pictures are drawn without a screen, by a context of our own; MuJoCo's import fails on a
     # choice that is not installed.
     os.environ["MUJOCO_GL"] = "disable"
-    os.environ.setdefault("NPY_DISABLE_CPU_FEATURES", LEFT_OUT_OF_NUMPY)
+    leave_out_avx512()
     # a script has what it starts beside itself ignore ^C and SIGQUIT, and it has to stop all the
     # same; nohup has SIGHUP ignored, and means it
     for number in _ENDING:

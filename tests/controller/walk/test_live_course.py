@@ -71,7 +71,7 @@ class Live:
         self.commands += commands
         for _ in range(count):
             at_m = self.walker.at_m
-            view = SimpleNamespace(link_m=at_m[None], headings_rad=np.zeros(3))
+            view = SimpleNamespace(link_m=at_m[None], heading_rad=0.0)
             self.motion.step(0.02, view)  # type: ignore[arg-type]
 
 
