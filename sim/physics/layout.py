@@ -49,6 +49,18 @@ class StepLayout:
     """Of the C function ``mj_step1(model, data)``: all that follows from position and velocity."""
     step2_address: int
     """Of ``mj_step2(model, data)``: forces, and the state after them."""
+    parena: int
+    """Bytes of the arena that are taken, the contacts first."""
+    parts: tuple[int, ...]
+    """Addresses of the ``STEP1_PARTS``; none where this MuJoCo has not all of them."""
+
+
+STEP1_PARTS = (
+    *("mj_checkPos", "mj_checkVel", "mj_comPos", "mj_makeM", "mj_factorM", "mj_collision"),
+    *("mj_makeConstraint", "mj_projectConstraint", "mj_fwdVelocity", "mj_addContact"),
+)
+"""Of ``mj_step1`` all that a chain without actuators, sensors and cameras needs; and what adds a
+contact. Left out is the search for islands: a chain is one."""
 
 
 @cache
@@ -70,6 +82,8 @@ def step_layout() -> StepLayout | None:
             kinematics_address=_address("mj_kinematics"),
             step1_address=_address("mj_step1"),
             step2_address=_address("mj_step2"),
+            parena=of_data.parena.offset,
+            parts=_parts(),
         )
     except (KeyError, AttributeError, OSError):
         return None
@@ -106,6 +120,13 @@ def _address(function: str) -> int:
     return address
 
 
+def _parts() -> tuple[int, ...]:
+    try:
+        return tuple(map(_address, STEP1_PARTS))
+    except AttributeError:
+        return ()
+
+
 def _verified(layout: StepLayout, of_data: type[ctypes.Structure]) -> bool:
     model = mujoco.MjModel.from_xml_string(_BALL)
     data = mujoco.MjData(model)
@@ -122,6 +143,7 @@ def _verified(layout: StepLayout, of_data: type[ctypes.Structure]) -> bool:
         and at(layout.time, ctypes.c_double) == data.time > 0.0
         and at(layout.ncon, ctypes.c_int) == data.ncon
         and at(layout.contact, ctypes.c_size_t) == contacts.dist.ctypes.data
+        and at(layout.parena, ctypes.c_size_t) >= data.ncon * layout.contact_size
         and at(layout.efc_force, ctypes.c_size_t) == data.efc_force.ctypes.data
         and at(stable[0], ctypes.c_size_t) == data.qpos.ctypes.data
         and at(stable[1], ctypes.c_size_t) == data.qvel.ctypes.data

@@ -1,7 +1,9 @@
 """The steps of a plant without Python between them: drive, friction and MuJoCo's step, compiled.
 
 ``mj_step1`` and ``mj_step2`` are called by address; drive and friction enter between the two as
-generalised forces. Friction acts at the present contacts under the load of the last step, which
+generalised forces. Of a chain on nothing but its ground ``mj_step1`` is called by parts, around
+contacts of our own (``sim.physics.belly_contacts``): the same bits for less. Friction acts at the
+present contacts under the load of the last step, which
 the contacts of a link share by depth. A link slides at the rate at which it *moved* in the last
 step. Its generalised velocity is not that rate: Euler's step moves the head along its velocity and
 leaves out the turning of the links within the step, which reads as 1 mm/s of phantom motion per
@@ -22,6 +24,12 @@ from numba.extending import intrinsic, register_jitable
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
+from snakewalk.sim.physics.belly_contacts import (
+    NO_CONTACTS,
+    BellyContacts,
+    links_near,
+    write_contacts,
+)
 from snakewalk.sim.physics.friction import (
     AXIS,
     DEPTH,
@@ -59,6 +67,8 @@ register_jitable(error_model="numpy")(make_lanes)
 
 register_jitable(error_model="numpy")(rub)
 
+register_jitable(error_model="numpy")(write_contacts)
+
 register_jitable(error_model="numpy")(stop_share)
 
 register_jitable(error_model="numpy")(shaft_torque)
@@ -68,6 +78,9 @@ register_jitable(error_model="numpy")(immersed)
 register_jitable(error_model="numpy")(add_water)
 
 
+_ARENA_USED, _CHECK_POS, _CHECK_VEL, _COM, _MASS, _FACTOR, _COLLISION = range(15, 22)
+_CONSTRAINT, _PROJECT, _VELOCITY, _ADD_CONTACT = range(22, 26)
+"""Places among the addresses: bytes of the arena that are taken, and ``layout.STEP1_PARTS``."""
 LEAST_FRICTION_N_M = 1e-9
 """A joint without any would have no constraint, and the others' would count otherwise."""
 
@@ -93,8 +106,20 @@ def _call(typing: Any, function: Any, model: Any, data: Any) -> Any:
     return types.none(types.int64, types.int64, types.int64), build
 
 
+def _call_with(typing: Any, function: Any, model: Any, data: Any, third: Any) -> Any:
+    """Call ``int function(void*, void*, void*)`` likewise."""
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.FunctionType(ir.IntType(32), [voidptr_t, voidptr_t, voidptr_t])
+        function = builder.inttoptr(args[0], kind.as_pointer())
+        return builder.call(function, [builder.inttoptr(each, voidptr_t) for each in args[1:]])
+
+    return types.int32(types.int64, types.int64, types.int64, types.int64), build
+
+
 pointer = intrinsic(_pointer)
 call = intrinsic(_call)
+call_with = intrinsic(_call_with)
 
 
 def _move(
@@ -254,6 +279,53 @@ def _weigh(
             load[geom_body[integers[2 * at[0] * c + at[4] + 1]] - 1] += force_n[row]
 
 
+def _step1(
+    where: NDArray[np.int64],
+    chain: tuple[Floats, ...],
+    ground: tuple[Any, ...],
+    bellies: tuple[Any, ...],
+) -> None:
+    """``mj_step1`` on planes that are laid anew; by parts where all contacts are of bellies."""
+    words, geoms, shapes_m, pairs, reach_m, axes = bellies
+    places, balls, ball_m, z_m, corner, planes, plane_m, plane_quat = ground
+    model, data, kinematics = where[2], where[3], where[13]
+    by_parts, tangent = len(words) > 0, len(balls) > 0
+    if by_parts:
+        call(where[_CHECK_POS], model, data)
+        call(where[_CHECK_VEL], model, data)
+    if by_parts or tangent:
+        call(kinematics, model, data)
+    if tangent:
+        lay_planes(places, balls, ball_m, z_m, corner, planes, plane_m, plane_quat)
+    if not by_parts:
+        call(where[0], model, data)
+        return
+    call(where[_COM], model, data)
+    call(where[_MASS], model, data)
+    call(where[_FACTOR], model, data)
+    count = -1
+    if not links_near(chain[0], pairs, reach_m):
+        ncon = carray(pointer(where[4]), (1,), np.int32)
+        ncon[0] = 0
+        call_with(where[_ADD_CONTACT], model, data, words.ctypes.data)  # drops those of before
+        first = carray(pointer(where[5]), (1,), np.int64)[0]
+        reals = carray(pointer(first), (words.size,), np.float64)
+        integers = carray(pointer(first), (words.size,), np.int64)
+        at = where[8] // 8, where[9] // 8, where[10] // 8
+        belly, plane_at_m = (words, geoms, shapes_m), plane_m if tangent else places
+        laid = plane_at_m, plane_quat, tangent
+        count = write_contacts(reals, integers, at, *belly, places, axes, *laid)
+        ncon[0] = max(count, 0)
+        carray(pointer(where[_ARENA_USED]), (1,), np.int64)[0] = max(count, 0) * where[7]
+    if count < 0:
+        if tangent:
+            call(kinematics, model, data)
+        call(where[_COLLISION], model, data)
+    call(where[_CONSTRAINT], model, data)
+    call(where[_PROJECT], model, data)
+    call(where[_VELOCITY], model, data)
+
+
 def _has_friction(gear: Floats) -> bool:
     """Whether any gearbox has other friction than a viscous one."""
     terms = 0.0
@@ -279,18 +351,18 @@ def _steps(
     mass_kg: Floats,
     water: Floats,
     spine: int,
+    bellies: tuple[Any, ...],
 ) -> None:
     """Advance: ``mj_step1``, drive, friction, ``mj_step2``, so often."""
     qpos, qvel, qfrc = state
     on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit = drive[:9]
     current, torque, pwm, drawn_j, returned_j, heat_j, work_j = drive[9:]
-    places, balls, ball_m, z_m, corner, planes, plane_m, plane_quat = ground
     gear, friction, bias, constraint = gears
     joints = len(goal)
     speed, ground_n_m = np.empty(joints), np.empty(joints)
     has_friction = _has_friction(gear)
     lanes, step_s = make_lanes(2 * joints), law[4]
-    step1, step2, model, data = where[0], where[1], where[2], where[3]
+    step2, model, data = where[1], where[2], where[3]
     at = (
         where[7] // 8,
         where[8] // 8,
@@ -303,10 +375,7 @@ def _steps(
     contact_list = carray(pointer(where[5]), (1,), np.int64)
     force_list = carray(pointer(where[6]), (1,), np.int64)
     for _ in range(steps):
-        if len(balls) > 0:
-            call(where[13], model, data)
-            lay_planes(places, balls, ball_m, z_m, corner, planes, plane_m, plane_quat)
-        call(step1, model, data)
+        _step1(where, chain, ground, bellies)
         qfrc[:] = 0.0
         for j in range(joints):
             speed[j] = qvel[6 + j]
@@ -435,9 +504,18 @@ def _run(
     water = carray(pointer(arrays[42]), (links, 7), np.float64)
     law = (constants[0], constants[1], constants[2], constants[3], constants[4])
     state = (at, rate, force)
+    contacts, words, pairs = sizes[7], sizes[8], sizes[9]
+    bellies = (
+        carray(pointer(arrays[46]), (contacts, words), np.int64),
+        carray(pointer(arrays[47]), (contacts, 2), np.int32),
+        carray(pointer(arrays[48]), (contacts, 3), np.float64),
+        carray(pointer(arrays[49]), (pairs, 2), np.int32),
+        carray(pointer(arrays[50]), (pairs,), np.float64),
+        carray(pointer(arrays[51]), (geom_count, 9), np.float64),
+    )
     _steps(
         *(steps, where, state, chain, work, geoms, ground, law, gears, drive, load, totals),
-        *(mass_kg, water, sizes[6]),
+        *(mass_kg, water, sizes[6], bellies),
     )
     return float(carray(pointer(where[14]), (1,), np.float64)[0])
 
@@ -451,6 +529,8 @@ register_jitable(error_model="numpy")(_line_up)
 register_jitable(error_model="numpy")(_add_friction)
 
 register_jitable(error_model="numpy", inline="always")(_weigh)
+
+register_jitable(error_model="numpy")(_step1)
 
 register_jitable(error_model="numpy")(_has_friction)
 
@@ -494,10 +574,14 @@ class CompiledSteps:
                 layout.contact_row,
                 layout.kinematics_address,
                 base + layout.time,
+                base + layout.parena,
+                *layout.parts,
             ],
             dtype=np.int64,
         )
         links = m.joint_count + 1
+        found = BellyContacts.of(m.model, m.planes, layout) if layout.parts else None
+        bellies = self._bellies = found or NO_CONTACTS
         self._arrays = (
             *(d.qpos, d.qvel, d.qfrc_applied),
             *(d.xipos, d.xmat, d.xanchor, d.xaxis),
@@ -513,6 +597,8 @@ class CompiledSteps:
             len(m.planes.balls),
             *m.planes.z_m.shape,
             m.spine_links,
+            *bellies.words.shape,
+            len(bellies.pairs),
         )
         self._sizes = np.array(sizes, dtype=np.int64)
         self._mu = m.mu
@@ -528,7 +614,12 @@ class CompiledSteps:
             motors = (*drive.columns(), m.gears)
             links = m.model.body_parentid, m.planes.radius_m, m.link_mass_kg, m.water
             joints = m.model.dof_frictionloss, m.data.qfrc_bias, m.data.qfrc_constraint
-            arrays = (*self._arrays, *motors, *links, *joints)
+            bellies = self._bellies
+            contacts = (
+                *(bellies.words, bellies.geoms, bellies.shapes_m, bellies.pairs, bellies.reach_m),
+                m.data.geom_xmat,
+            )
+            arrays = (*self._arrays, *motors, *links, *joints, *contacts)
             self._addresses = np.array([each.ctypes.data for each in arrays], dtype=np.int64)
         mu = self._m.mu
         if mu is not self._mu:

@@ -1,0 +1,216 @@
+"""Belly contacts: where bellies meet the ground, found and written into MuJoCo's list of contacts.
+
+MuJoCo looks for contacts among all geoms, bodies that may touch each other first. Of a chain on its
+ground nearly all of that is known: which belly meets which plane, under what parameters. What is
+left, depth, place and normal, is reckoned here as MuJoCo does, to the bit. Where links come near
+each other, MuJoCo looks for the contacts itself; so it does for whatever meets more than its
+ground, such as feet and obstacles.
+"""
+
+import copy
+import ctypes
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats
+from snakewalk.drivers.compiling import compiled, readonly_array
+from snakewalk.sim.physics.layout import StepLayout
+from snakewalk.sim.physics.tangent_planes import PLANES, TangentPlanes
+
+_WORD = 8
+_DEEP_M = 1e-3
+"""Of the contacts from which the constants are taken."""
+_SAFE = 1.0 + 1e-9
+"""Over the distance at which links can touch, against rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class BellyContacts:
+    """All contacts that the bellies of one model can have with its ground, in MuJoCo's order."""
+
+    words: NDArray[np.int64]
+    """(C, words of an ``mjContact``) what is the same in every step."""
+    geoms: NDArray[np.int32]
+    """(C, 2) plane and belly."""
+    shapes_m: Floats
+    """(C, 3) where on the belly's axis the ball lies that touches, its radius, and the margin."""
+    pairs: NDArray[np.int32]
+    """(P, 2) links that may touch each other."""
+    reach_m: Floats
+    """(P,) distance of their centres of mass from which on they do not."""
+
+    @classmethod
+    def of(
+        cls, model: mujoco.MjModel, planes: TangentPlanes, layout: StepLayout
+    ) -> "BellyContacts | None":
+        """Take the constants from MuJoCo; None where more than bellies meets more than ground."""
+        bellies = np.array([model.geom(k).name.startswith("belly") for k in range(model.ngeom)])
+        grounds = np.isin(np.arange(model.ngeom), planes.planes)
+        if not len(planes.planes):
+            grounds = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+        others = ~(bellies | grounds) & ((model.geom_contype | model.geom_conaffinity) != 0)
+        more = model.nu, model.neq, model.ntendon, model.nflex, model.nsensor, model.nplugin
+        if others.any() or any(more) or not bellies.any() or grounds.sum() == 0:
+            return None
+        if (not len(planes.planes) and grounds.sum() > 1) or model.body_rootid[1:].max() > 1:
+            return None
+        data = _sunk(model, planes)
+        count, capsule = data.ncon, model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE
+        each = PLANES if len(planes.planes) else 1
+        whole = (bellies.sum() + (bellies & capsule).sum()) * each
+        if count != whole or (data.contact.dim != 1).any():
+            return None
+        size = layout.contact_size
+        address = data.contact.dist.ctypes.data
+        memory = (ctypes.c_int64 * (count * size // _WORD)).from_address(address)
+        words = np.array(memory, np.int64).reshape(count, size // _WORD)
+        geoms = data.contact.geom.astype(np.int32)
+        is_capsule = capsule[geoms[:, 1]]
+        second = np.concatenate([[False], (geoms[1:] == geoms[:-1]).all(axis=1)])
+        along_m = np.where(is_capsule, model.geom_size[geoms[:, 1], 1], 0.0)
+        along_m[second] *= -1.0
+        shapes = along_m, model.geom_size[geoms[:, 1], 0], data.contact.includemargin
+        reach = _link_pairs(model, bellies)
+        return cls(words, geoms, np.stack(shapes, axis=1), *reach)
+
+
+NO_CONTACTS = BellyContacts(
+    np.zeros((0, 1), np.int64),
+    np.zeros((0, 2), np.int32),
+    np.zeros((0, 3)),
+    np.zeros((0, 2), np.int32),
+    np.zeros(0),
+)
+"""Of a model whose contacts MuJoCo looks for."""
+
+
+def _sunk(model: mujoco.MjModel, planes: TangentPlanes) -> mujoco.MjData:
+    """A body that lies straight, a little deep in its ground: it has all its contacts."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    if len(planes.planes):
+        model = copy.copy(model)
+        deep_m = planes.radius_m - _DEEP_M
+        for k in range(PLANES):
+            model.geom_pos[planes.planes[:, k]] = data.geom_xpos[planes.balls]
+            model.geom_pos[planes.planes[:, k], 2] -= deep_m
+            model.geom_quat[planes.planes[:, k]] = 1.0, 0.0, 0.0, 0.0
+    else:
+        bellies = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
+        over_m = data.geom_xpos[bellies, 2] - model.geom_size[bellies, 0]
+        data.qpos[2] -= over_m.max() + _DEEP_M
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_collision(model, data)
+    return data
+
+
+def _link_pairs(
+    model: mujoco.MjModel, bellies: NDArray[np.bool_]
+) -> tuple[NDArray[np.int32], Floats]:
+    """Pairs of bodies that MuJoCo lets touch each other, and from how far on they do not."""
+    reach_m = np.zeros(model.nbody)
+    for geom in np.flatnonzero(bellies):
+        body = int(model.geom_bodyid[geom])
+        away_m = float(np.linalg.norm(model.geom_pos[geom] - model.body_ipos[body]))
+        reach_m[body] = max(reach_m[body], away_m + model.geom_rbound[geom])
+    apart = {int(each) for each in model.exclude_signature}
+    pairs = [
+        (a, b)
+        for a in range(1, model.nbody)
+        for b in range(a + 1, model.nbody)
+        if reach_m[a] and reach_m[b] and a != model.body_parentid[b] and (a << 16) + b not in apart
+    ]
+    found = np.array(pairs, dtype=np.int32).reshape(-1, 2)
+    return found, reach_m[found].sum(axis=1) * _SAFE
+
+
+@compiled(
+    f"boolean({readonly_array(dimensions=2, layout='C')}, Array(int32, 2, 'C', readonly=True),"
+    f" {readonly_array(layout='C')})"
+)
+def links_near(centre_m: Floats, pairs: NDArray[np.int32], reach_m: Floats) -> bool:
+    """Whether any pair of links may touch.
+
+    Args:
+        centre_m: (bodies, 3) centres of mass in the world.
+        pairs: (P, 2) bodies.
+        reach_m: (P,) distance from which on they do not.
+
+    """
+    for k in range(len(pairs)):
+        a, b = pairs[k, 0], pairs[k, 1]
+        x, y = centre_m[a, 0] - centre_m[b, 0], centre_m[a, 1] - centre_m[b, 1]
+        z = centre_m[a, 2] - centre_m[b, 2]
+        if x * x + y * y + z * z <= reach_m[k] * reach_m[k]:
+            return True
+    return False
+
+
+def write_contacts(
+    reals: Floats,
+    integers: NDArray[np.int64],
+    at: tuple[int, int, int],
+    words: NDArray[np.int64],
+    geoms: NDArray[np.int32],
+    shapes_m: Floats,
+    place_m: Floats,
+    axes: Floats,
+    plane_m: Floats,
+    plane_quat: Floats,
+    tangent: bool,
+) -> int:
+    """Write all contacts of now one behind the other; their number, -1 for MuJoCo's own way.
+
+    Their frames get the normal alone: without friction nobody reads the rest.
+
+    Args:
+        reals: room for all contacts, as numbers.
+        integers: the same memory, as words.
+        at: where in a contact stand distance, place and normal, in words.
+        words: of ``BellyContacts``, and the two below.
+        geoms: likewise.
+        shapes_m: likewise.
+        place_m: (geoms, 3) centres.
+        axes: (geoms, 9) rows of their matrices.
+        plane_m: (geoms, 3) points of the planes.
+        plane_quat: (geoms, 4) how they lie, if ``tangent``; else that is in ``axes``.
+        tangent: whether they were just laid.
+
+    """
+    size, found = words.shape[1], 0
+    at_dist, at_place, at_normal = at
+    for c in range(len(words)):
+        plane, belly = geoms[c, 0], geoms[c, 1]
+        along, radius, margin = shapes_m[c, 0], shapes_m[c, 1], shapes_m[c, 2]
+        n0, n1, n2 = axes[plane, 2], axes[plane, 5], axes[plane, 8]
+        if tangent:
+            w, i, j, k = plane_quat[plane]
+            n0, n1, n2 = 2.0 * (i * k + w * j), 2.0 * (j * k - w * i), w * w - i * i - j * j + k * k
+        x = place_m[belly, 0] + axes[belly, 2] * along
+        y = place_m[belly, 1] + axes[belly, 5] * along
+        z = place_m[belly, 2] + axes[belly, 8] * along
+        away = (x - plane_m[plane, 0]) * n0 + (y - plane_m[plane, 1]) * n1
+        away = away + (z - plane_m[plane, 2]) * n2
+        if away > margin + radius:
+            continue
+        dist = away - radius
+        if dist >= margin:
+            return -1  # it touches and bears nothing: in MuJoCo's list, with a mark
+        base = size * found
+        for word in range(size):
+            integers[base + word] = words[c, word]
+        back = -dist / 2.0 - radius
+        length = 1.0 / np.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+        reals[base + at_dist] = dist
+        reals[base + at_place] = x + back * n0
+        reals[base + at_place + 1] = y + back * n1
+        reals[base + at_place + 2] = z + back * n2
+        reals[base + at_normal] = n0 * length
+        reals[base + at_normal + 1] = n1 * length
+        reals[base + at_normal + 2] = n2 * length
+        found += 1
+    return found
