@@ -18,12 +18,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools
+from snakewalk.drivers.bus.fast_path import FastPath, FastPathPort
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.bus.line_reservation import LineReservation
@@ -31,9 +31,6 @@ from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.port.byte_port import BytePort, DescriptorPort
 from snakewalk.drivers.protocol.frames import HEAD
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE, HEADER
-
-if TYPE_CHECKING:
-    from snakewalk.drivers.bus.serial_fast_path import SerialFastPath
 
 _IS_LINUX = sys.platform.startswith("linux")
 FAST_FAILURES = 3
@@ -98,7 +95,7 @@ class ControlCycle:
         """
         self._port = port
         self._goals = GroupWrite(ids, goal_address)
-        self._fast_path: SerialFastPath | None = None
+        self._fast_path: FastPath | None = None
         self._ids = tuple(ids)
         self._default_order = tuple(range(len(ids)))
         self._order = self._default_order
@@ -112,7 +109,10 @@ class ControlCycle:
         self._missed = np.zeros(len(ids), np.intp)
         self._line = line or LineReservation(port.clock, paced=port.paced)
         self._default_request = GroupReadRequest(ids, read_address, read_bytes, fast=fast)
-        if (
+        packets = self._goals, self._default_request, self._line
+        if isinstance(port, FastPathPort):
+            self._fast_path = port.fast_path(*packets, latency_s=latency_s)
+        elif (
             isinstance(port, DescriptorPort)
             and port.descriptor is not None
             and self._line.zero_s is not None
@@ -120,11 +120,8 @@ class ControlCycle:
         ):
             from snakewalk.drivers.bus.serial_fast_path import SerialFastPath  # noqa: PLC0415  its loops call Linux
 
-            packets = self._goals, self._default_request
-            self._fast_path = SerialFastPath(
-                port, *packets, self._line, latency_s=latency_s, spin_s=spin_s
-            )
-        self._awaited: tuple[GroupReadRequest, tuple[int, ...], SerialFastPath | float] = (
+            self._fast_path = SerialFastPath(port, *packets, latency_s=latency_s, spin_s=spin_s)
+        self._awaited: tuple[GroupReadRequest, tuple[int, ...], FastPath | float] = (
             *(self._default_request, self._default_order),
             port.clock.now_s(),
         )

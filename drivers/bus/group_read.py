@@ -82,7 +82,8 @@ class GroupReadRequest:
         heads = self._fast_head if fast else heads
         self.heads = np.frombuffer(heads, np.uint8).reshape(-1, HEAD).copy()
         """(N, 8) expected heads of the replies; (1, 8) if fast."""
-        self._id_bytes = np.array(self.ids, np.uint8)
+        self.id_bytes = np.array(self.ids, np.uint8)
+        """(N,) ``ids``."""
         self._error = np.zeros(count, np.uint8)
         self._all = _constant(np.ones(count, np.bool_))
         no_error = _constant(np.zeros(count, np.uint8))
@@ -125,7 +126,7 @@ class GroupReadRequest:
         """The reply if it is regular, else None."""
         data = np.empty((len(self.ids), self.length), np.uint8)
         if self.fast:
-            status = read_fast(raw, self.heads[0], self._id_bytes, data, self._error)
+            status = read_fast(raw, self.heads[0], self.id_bytes, data, self._error)
         else:
             status = read_plain(raw, self.heads, data, self._error)
         if status == IRREGULAR:

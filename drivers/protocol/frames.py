@@ -34,7 +34,7 @@ def crc_of(data: Bytes, start: int, stop: int, crc: int) -> int:
 
 
 @compiled(f"boolean({_RAW}, int64, int64)")
-def _header_in(data: Bytes, start: int, stop: int) -> bool:
+def header_in(data: Bytes, start: int, stop: int) -> bool:
     """Whether ``FF FF FD`` lies within ``start`` to ``stop``."""
     for k in range(start + 2, stop):
         if data[k] == 0xFD and data[k - 1] == 0xFF and data[k - 2] == 0xFF:
@@ -66,7 +66,7 @@ def read_plain(raw: Bytes, heads: Bytes, data: Bytes, error: Bytes) -> int:
                 return IRREGULAR
         if crc_of(raw, at, end - 2, 0) != int(raw[end - 2]) | int(raw[end - 1]) << 8:
             return IRREGULAR
-        if _header_in(raw, at + HEAD, end):
+        if header_in(raw, at + HEAD, end):
             return IRREGULAR
         error[servo] = raw[at + HEAD]
         if error[servo]:
@@ -111,4 +111,4 @@ def fill(frame: Bytes, values: NDArray[np.int32]) -> bool:
     end = len(frame) - 2
     crc = int(crc_of(frame, 0, end, 0))
     frame[end], frame[end + 1] = crc & 0xFF, crc >> 8
-    return not _header_in(frame, PARAMS_AT, end)
+    return not header_in(frame, PARAMS_AT, end)

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bytes
 from snakewalk.drivers.protocol.crc import crc16
-from snakewalk.drivers.protocol.frames import crc_of
+from snakewalk.drivers.protocol.frames import IRREGULAR
 from snakewalk.drivers.protocol.packet import HEADER, STATUS, Instruction, fast_head, stuff
 from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
 from snakewalk.sim.line.bus_contention import Reply
 from snakewalk.sim.line.instruction_handler import InstructionHandler
-from snakewalk.sim.servo.servo_loops import fill_replies
+from snakewalk.sim.servo.servo_loops import answer, fill_replies, is_intact
 
 MOTION = range(126, 136)
 """Present Current, Velocity and Position: refreshed alone where nothing else is read."""
@@ -41,6 +41,8 @@ class GroupRead(ABC):
     ) -> None:
         self.address, self.length = address, length
         self.motion = address in MOTION and address + length <= MOTION.stop
+        self.delay_s = delays_s[0]
+        """Until the first servo replies."""
         self._rows = rows
         self._block = np.array([address, length, status])
         self._delays_s = delays_s
@@ -54,6 +56,22 @@ class GroupRead(ABC):
         """Replies with the table's present bytes."""
         fill_replies(self._packet, self._shape, table, self._rows, self._block)
         return self._cut(self._packet.tobytes(), whole)
+
+    def decoded(self, table: Bytes, heads: Bytes, ids: Bytes, data: Bytes, error: Bytes) -> int:
+        """What ``drivers.protocol.frames`` finds in these replies, which come in one piece.
+
+        Args:
+            table: of the servos.
+            heads: (N, 8) that are expected, or (1, 8) of a fast read.
+            ids: (N,) that are expected.
+            data: (N, length) filled with what is read, unless the replies are irregular.
+            error: (N,) filled likewise.
+
+        """
+        if not self._gapless:
+            return IRREGULAR
+        template = self._packet, self._shape
+        return int(answer(*template, table, self._rows, self._block, heads, ids, data, error))
 
     @abstractmethod
     def _cut(self, raw: bytes, whole: bool) -> list[Reply]:
@@ -102,11 +120,12 @@ class FastRead(GroupRead):
         return [Reply(self._delays_s[0], raw)]
 
 
-_STUFFED = HEADER[:3]
-"""What is followed by a stuffed byte where it stands behind the head."""
+_GROUP_READS = (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ)
 _PREFIX = HEADER + b"\xfe"
-_GOALS = b"\x74\x00\x04\x00"
-"""Address 116 and length 4, as a sync write begins."""
+_GOALS = bytes((Instruction.SYNC_WRITE, 116, 0, 4, 0))
+"""Code, address and length of a sync write of goals."""
+_SHORTEST = 15
+"""A group instruction of one servo without data."""
 
 
 class GroupFastPath:
@@ -126,26 +145,34 @@ class GroupFastPath:
 
         ``whole`` joins packets that follow each other without a gap into one piece.
         """
+        read = self.read_of(raw)
+        if read is not None:
+            self.measure(read, now_s)
+            return read.replies(self._bank.table, whole)
+        if len(raw) >= _SHORTEST and raw[:5] == _PREFIX and raw[7:12] == _GOALS:
+            return self._write_goals(raw, now_s)
+        return None
+
+    def read_of(self, raw: bytes) -> GroupRead | None:
+        """The plain group read that ``raw`` is; None of any other packet."""
         if self._version != self._handler.version:
             self._version = self._handler.version
             self._reads.clear()
             self._goals = None
         read = self._reads.get(raw)
         if read is None:
-            if raw[:5] != _PREFIX or len(raw) < 15:
-                return None
-            if raw[7] == Instruction.SYNC_WRITE and raw[8:12] == _GOALS:
-                return self._write_goals(raw, now_s)
             read = self._plan(raw)
-            if read is None:
-                return None
-            self._reads[raw] = read
+            if read is not None:
+                self._reads[raw] = read
+        return read
+
+    def measure(self, read: GroupRead, now_s: float) -> None:
+        """Have the servos show in their tables what ``read`` asks for."""
         self._firmware.on_instruction(now_s)
         if read.motion:
             self._firmware.refresh_motion()
         else:
             self._firmware.refresh(read.address, read.length)
-        return read.replies(self._bank.table, whole)
 
     def _write_goals(self, raw: bytes, now_s: float) -> list[Reply] | None:
         head, ids = raw[:12], raw[12:-2:5]
@@ -156,16 +183,16 @@ class GroupFastPath:
                 return None
             known = self._goals = (head, ids, rows)
         packet = np.frombuffer(raw, np.uint8)
-        if not _intact(raw, packet):
+        if not is_intact(packet):
             return None
         self._firmware.on_instruction(now_s)
         self._firmware.write_goals(known[2], packet, 12)
         return []
 
     def _plan(self, raw: bytes) -> GroupRead | None:
-        if raw[7] not in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
+        if len(raw) < _SHORTEST or raw[:5] != _PREFIX or raw[7] not in _GROUP_READS:
             return None
-        if not _intact(raw, np.frombuffer(raw, np.uint8)):
+        if not is_intact(np.frombuffer(raw, np.uint8)):
             return None
         address, length = int.from_bytes(raw[8:10], "little"), int.from_bytes(raw[10:12], "little")
         ids = np.frombuffer(raw, np.uint8, len(raw) - 14, 12)
@@ -180,13 +207,3 @@ class GroupFastPath:
         fast = raw[7] == Instruction.FAST_SYNC_READ
         kind = FastRead if fast else PlainRead
         return kind(address, length, ids, rows, self._status_address, delays_s)
-
-
-def _intact(raw: bytes, packet: Bytes) -> bool:
-    """Whether a packet is whole, and not stuffed; given as bytes and as an array."""
-    size = len(raw)
-    return (
-        raw[5] | raw[6] << 8 == size - 7
-        and raw.find(_STUFFED, 8, -2) < 0
-        and crc_of(packet, 0, size - 2, 0) == raw[-2] | raw[-1] << 8
-    )

@@ -5,6 +5,11 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Bytes
+from snakewalk.drivers.bus.group_read import GroupReadRequest
+from snakewalk.drivers.bus.group_write import GroupWrite
+from snakewalk.drivers.bus.line_reservation import LineReservation
+from snakewalk.drivers.protocol.frames import IRREGULAR
 from snakewalk.drivers.protocol.packet import BROADCAST_ID, HEADER, Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.imu import Imu
@@ -13,6 +18,7 @@ from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.group_fast_path import GroupFastPath
 from snakewalk.sim.line.id_directory import IdDirectory
 from snakewalk.sim.line.instruction_handler import InstructionHandler
+from snakewalk.sim.line.line_fast_path import LineFastPath
 from snakewalk.sim.line.wire import Wire
 from snakewalk.sim.plant import Mounting, Plant
 from snakewalk.sim.servo.bank import ServoBank
@@ -23,6 +29,8 @@ from snakewalk.sim.servo.protection import SupplyAndAmbient
 Tamper = Callable[[bytes], Sequence[bytes]]
 """Changes one reply on the wire: returns the packets that arrive instead, in order."""
 _ID_AT, _CODE_AT = 4, 7
+_CALLS = [Wire.write, Wire.read_until, Wire.clearPort]
+"""What a fast path stands for."""
 
 
 class SimLine(Wire):
@@ -103,6 +111,62 @@ class SimLine(Wire):
         """(S,) values of a register as a read now would show them; a copy."""
         self.firmware.refresh()
         return self.bank[register].copy()
+
+    # for a control cycle
+
+    def fast_path(
+        self,
+        goals: GroupWrite,
+        request: GroupReadRequest,
+        line: LineReservation,
+        *,
+        latency_s: float,
+    ) -> LineFastPath | None:
+        """As ``drivers.bus.fast_path.FastPathPort``; None where a test has put calls in between."""
+        own = self.write, self.read_until, self.clearPort
+        if [getattr(each, "__func__", None) for each in own] != _CALLS:
+            return None
+        return LineFastPath(self, goals, request, line, latency_s=latency_s)
+
+    def finish(self, request: GroupReadRequest, data: Bytes, error: Bytes, limit_s: float) -> int:
+        """Receive the reply to the request of ``begin``; the clock moves to its end.
+
+        Args:
+            request: the group read.
+            data: (N, length) filled, unless the reply is irregular.
+            error: (N,) filled likewise.
+            limit_s: until when it is awaited.
+
+        Returns:
+            What ``drivers.protocol.frames`` finds; ``IRREGULAR`` where ``read_until`` has what
+            arrives.
+
+        """
+        sent, read = self._sent, self._group.read_of(request.packet)
+        if (
+            len(sent) != 1
+            or sent[0][1] is not request.packet
+            or read is None
+            or self.tamper is not None
+            or not self.is_plain
+        ):
+            return IRREGULAR
+        end_s = sent[0][0]
+        wire_s = request.reply_bytes * self._byte_s
+        due_s = end_s + read.delay_s + self.usb_latency_s + wire_s
+        if due_s > limit_s:
+            return IRREGULAR
+        sent.popleft()
+        self._arrive(end_s, len(request.packet))
+        self._group.measure(read, end_s)
+        found = read.decoded(self.bank.table, request.heads, request.id_bytes, data, error)
+        if found == IRREGULAR:
+            self._send_replies(end_s, read.replies(self.bank.table, whole=True))
+            return IRREGULAR
+        self.busy_s += wire_s
+        self._quiet_s = due_s - self.usb_latency_s
+        self.clock.sleep_until_s(due_s)
+        return found
 
     # the wire
 

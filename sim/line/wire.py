@@ -190,6 +190,30 @@ class Wire(ABC):
         self.busy_s += end_s - start_s
         self._sent_until_s = end_s
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether nothing but the servos can change what is on the wire, and nobody listens."""
+        return self.is_open and self._script is None and not self.taps
+
+    def begin(self, packet: bytes) -> bool:
+        """As ``clearPort`` and ``write``, of one packet on a line that carries nothing else.
+
+        False where both must be called: nothing was sent.
+        """
+        if not self.is_plain or self._rx_queue.packets:
+            return False
+        now_s = self.clock.now_s()
+        if self._sent:
+            self._deliver(now_s)
+        start_s = max(now_s, self._sent_until_s)
+        if self._sent or self._rx_queue.packets or self._quiet_s > start_s + INSTANT_S:
+            return False
+        end_s = start_s + len(packet) * self._byte_s
+        self._sent.append((end_s, packet))
+        self.busy_s += end_s - start_s
+        self._sent_until_s = end_s
+        return True
+
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Up to ``count`` bytes; the clock moves to the last of them, or to ``deadline_s``."""
         clock, rx_queue, sent = self.clock, self._rx_queue, self._sent
@@ -266,10 +290,7 @@ class Wire(ABC):
         sent = self._sent
         while sent and sent[0][0] <= until_s + INSTANT_S:
             end_s, data = sent.popleft()
-            self._advance(end_s)
-            if end_s - len(data) * self._byte_s > self._delivered_s + GAP_S:
-                self._reset_parser()
-            self._delivered_s = end_s
+            self._arrive(end_s, len(data))
             for tap in self.taps:
                 tap(end_s, True, data)
             replies = self._execute(data, end_s)
@@ -280,6 +301,13 @@ class Wire(ABC):
                 sent.clear()
                 continue
             self._send_replies(end_s, replies)
+
+    def _arrive(self, end_s: float, count: int) -> None:
+        """Bring the servos to the end of a packet of so many bytes."""
+        self._advance(end_s)
+        if end_s - count * self._byte_s > self._delivered_s + GAP_S:
+            self._reset_parser()
+        self._delivered_s = end_s
 
     def _send_replies(self, time_s: float, replies: Iterable[Reply]) -> None:
         for reply in replies:

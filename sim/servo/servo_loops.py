@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import AnyInts, Bytes, Floats, Indices, Ints
 from snakewalk.drivers.compiling import compiled, readonly_array
-from snakewalk.drivers.protocol.frames import crc_of
+from snakewalk.drivers.protocol.frames import (
+    PARAMS_AT,
+    crc_of,
+    header_in,
+    read_fast,
+    read_plain,
+)
 
 # as numba writes them; what is only read may be read-only, and a register's column has gaps
 _READ = readonly_array("uint8", layout="C")
@@ -94,6 +100,52 @@ def fill_replies(
         packet[end - 2] = crc & 0xFF
         packet[end - 1] = crc >> 8
         crc = crc_of(packet, end - 2, end, crc)
+
+
+@compiled(
+    f"int64(uint8[::1], {_PLACES}, {_TABLE}, {_PLACES}, {_PLACES}, {_TABLE}, uint8[::1],"
+    f" {_TABLE}, uint8[::1])"
+)
+def answer(
+    packet: Bytes,
+    shape: Ints,
+    table: Bytes,
+    rows: Indices,
+    block: Ints,
+    heads: Bytes,
+    ids: Bytes,
+    data: Bytes,
+    error: Bytes,
+) -> int:
+    """``fill_replies``, and what the host's frame reader finds in their bytes.
+
+    Args:
+        packet: of ``fill_replies``, as the four below.
+        shape: likewise.
+        table: likewise.
+        rows: likewise.
+        block: likewise.
+        heads: of ``read_plain``; (1, 8) where the answer is one packet, of ``read_fast``.
+        ids: (N,) of ``read_fast``.
+        data: (N, length) filled, unless the answer is irregular.
+        error: (N,) likewise.
+
+    """
+    fill_replies(packet, shape, table, rows, block)
+    if shape[0] > 0:
+        return int(read_fast(packet, heads[0], ids, data, error))
+    return int(read_plain(packet, heads, data, error))
+
+
+@compiled(f"boolean({_READ})")
+def is_intact(raw: Bytes) -> bool:
+    """Whether an instruction packet is whole, and nothing in it is stuffed."""
+    end = len(raw) - 2
+    return bool(
+        int(raw[5]) | int(raw[6]) << 8 == end - 5
+        and not header_in(raw, PARAMS_AT, end)
+        and crc_of(raw, 0, end, 0) == int(raw[end]) | int(raw[end + 1]) << 8
+    )
 
 
 @compiled(

@@ -1,0 +1,87 @@
+"""The regular control cycle on a simulated line: a group read without queues and parsers.
+
+The bytes are those of the wire, checked by the servos and by the host as always. What is not plain,
+such as faults, taps, stuffing or two packets under way, is left to the wire.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Bytes
+from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
+from snakewalk.drivers.bus.group_write import GroupWrite
+from snakewalk.drivers.bus.line_reservation import LineReservation
+from snakewalk.drivers.clock import Clock
+from snakewalk.drivers.protocol.frames import IRREGULAR
+from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
+
+
+class ReadableLine(Protocol):
+    """A line that a group read begins on, and ends on; ``sim.line.sim_line`` describes it."""
+
+    @property
+    def clock(self) -> Clock:
+        """As of a ``BytePort``."""
+        ...
+
+    def begin(self, packet: bytes) -> bool:
+        """Send a packet on a line that carries nothing else."""
+        ...
+
+    def finish(self, request: GroupReadRequest, data: Bytes, error: Bytes, limit_s: float) -> int:
+        """Receive the reply."""
+        ...
+
+    def getBaudRate(self) -> int:  # noqa: N802  the SDK's name
+        """Method of ``SdkPort``."""
+        ...
+
+
+class LineFastPath:
+    """A ``drivers.bus.fast_path.FastPath`` of a simulated line."""
+
+    def __init__(
+        self,
+        wire: ReadableLine,
+        goals: GroupWrite,
+        request: GroupReadRequest,
+        line: LineReservation,
+        *,
+        latency_s: float,
+    ) -> None:
+        self._wire, self._goals, self._request, self._line = wire, goals, request, line
+        self._latency_s = latency_s
+        self._shape = len(request.ids), request.length
+        self._error = np.zeros(len(request.ids), np.uint8)
+        self._limit_s = 0.0
+
+    @property
+    def remaining_s(self) -> float:
+        """How long the reply to the last request is awaited yet."""
+        return self._limit_s - self._wire.clock.now_s()
+
+    def write(self, goals: NDArray[np.int32]) -> int:
+        """Send goals (N,); how many bytes were taken, 0 where the port must send them."""
+        packet = self._goals.encode(goals)
+        if not self._wire.begin(packet):
+            return 0
+        self._line.reserve(len(packet) * BITS_PER_BYTE / self._wire.getBaudRate())
+        return len(packet)
+
+    def begin(self, goals: NDArray[np.int32] | None) -> bool:
+        """Send the request; False, and nothing sent, behind ``goals`` or where more is sent."""
+        request, wire = self._request, self._wire
+        if goals is not None or not wire.begin(request.packet):
+            return False
+        byte_s = BITS_PER_BYTE / wire.getBaudRate()
+        free_s = self._line.reserve(len(request.packet) * byte_s)
+        self._limit_s = free_s + request.reply_bytes * byte_s + self._latency_s
+        return True
+
+    def finish(self) -> GroupReadReply | bytes:
+        """Receive the reply to the request of ``begin``; empty where ``read_until`` has it."""
+        data = np.empty(self._shape, np.uint8)
+        found = self._wire.finish(self._request, data, self._error, self._limit_s)
+        return b"" if found == IRREGULAR else self._request.regular(found, data, self._error)
