@@ -19,7 +19,11 @@ def readonly_array(number: str = "float64", dimensions: int = 1, layout: str = "
 
 
 def compiled(
-    signature: Any, *, nogil: bool = False, divides_by_zero: bool = False
+    signature: Any,
+    *,
+    nogil: bool = False,
+    divides_by_zero: bool = False,
+    makes_arrays: bool = True,
 ) -> Callable[[F], F]:
     """Compile a function for ``signature``; the function as written is its ``py_func``.
 
@@ -31,6 +35,9 @@ def compiled(
         nogil: release Python's lock meanwhile; worth its cost for a loop that waits.
         divides_by_zero: a division by zero is infinite, not an error; without the question for it
             a loop is made for several numbers at once.
+        makes_arrays: False of a loop that only reads and writes what it is given: none of it is
+            counted then, which takes as long as a short loop over it. What makes an array all the
+            same is not compiled. Of numba's options the one without a page.
 
     """
 
@@ -42,7 +49,9 @@ def compiled(
                 raise
             return function
         model = "numpy" if divides_by_zero else "python"
-        made: F = njit(signature, nogil=nogil, error_model=model, cache=True)(function)
+        made: F = njit(signature, nogil=nogil, error_model=model, cache=True, _nrt=makes_arrays)(
+            function
+        )
         return made
 
     return decorate

@@ -145,7 +145,8 @@ def _spine(
 @compiled(
     f"void({readonly_array('boolean')}, {readonly_array(dimensions=2)}, {readonly_array()},"
     f" {readonly_array()}, {readonly_array()}, {readonly_array()}, float64[:, :, ::1],"
-    " float64[:, ::1])"
+    " float64[:, ::1])",
+    makes_arrays=False,
 )
 def _forward(
     yaws: Bools,
@@ -208,7 +209,8 @@ def mean_heading_rad(robot: RobotConfig, joint_rad: Floats) -> float:
 
 @compiled(
     f"float64({readonly_array(dimensions=2)}, {readonly_array(dimensions=2)},"
-    f" {readonly_array(dimensions=3)})"
+    f" {readonly_array(dimensions=3)})",
+    makes_arrays=False,
 )
 def _mean_advance_m(before_m: Floats, here_m: Floats, rotation: Floats) -> float:
     """Mean way from ``before_m`` (L, 3) to ``here_m`` along the links."""

@@ -60,7 +60,7 @@ def body_roll_rad(view: BodyView) -> float:
     return _mean_roll_rad(view.rotation)
 
 
-@compiled("float64(float64[:, :, ::1])")
+@compiled("float64(float64[:, :, ::1])", makes_arrays=False)
 def _mean_roll_rad(rotation: Floats) -> float:
     """Direction of the sum of unit vectors, each that of a link's up seen along the link."""
     left_up = up = 0.0

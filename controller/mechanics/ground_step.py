@@ -109,7 +109,7 @@ class GroundStep:
         return GroundedSkeleton(points, pitch, gap)
 
 
-@compiled(f"UniTuple(float64, 3)({FIELD}, float64, float64)")
+@compiled(f"UniTuple(float64, 3)({FIELD}, float64, float64)", makes_arrays=False)
 def plane(
     z: Floats, x0: float, y0: float, spacing: float, x: float, y: float
 ) -> tuple[float, float, float]:

@@ -170,7 +170,9 @@ def _minimise(
     )
 
 
-@compiled("void(float64[::1], int64, int64, float64, float64[::1], float64[:, ::1])")
+@compiled(
+    "void(float64[::1], int64, int64, float64, float64[::1], float64[:, ::1])", makes_arrays=False
+)
 def add_inertia(
     table: Floats, rows: int, links: int, step_s: float, linear: Floats, quadratic: Floats
 ) -> None:
@@ -209,7 +211,7 @@ def _wrench(points_m: Floats, force: Floats) -> Floats:
     return np.array([px.sum(), py.sum(), x @ py - y @ px])
 
 
-@compiled("void(float64[::1], int64, float64, float64)")
+@compiled("void(float64[::1], int64, float64, float64)", makes_arrays=False)
 def _set_up(table: Floats, rows: int, along: float, across: float) -> None:
     """Write the rows that ``_power`` reads, weighted by load and friction.
 
@@ -242,6 +244,7 @@ def _set_up(table: Floats, rows: int, along: float, across: float) -> None:
     f"UniTuple(float64, 2)(float64[::1], int64, int64, float64, {readonly_array(layout='C')},"
     f" {readonly_array(dimensions=2, layout='C')}, float64[::1], float64[::1], float64[:, ::1])",
     divides_by_zero=True,
+    makes_arrays=False,
 )
 def _power(
     table: Floats,
@@ -313,7 +316,9 @@ def _power(
     return power, rigid
 
 
-@compiled("void(float64[:, ::1], float64[::1], float64[::1])", divides_by_zero=True)
+@compiled(
+    "void(float64[:, ::1], float64[::1], float64[::1])", divides_by_zero=True, makes_arrays=False
+)
 def _solve(hessian: Floats, gradient: Floats, step: Floats) -> None:
     """Solve for Newton's step (3,) by Cholesky without roots; no loops, as it is asked so often."""
     d0 = 1.0 / hessian[0, 0]
@@ -330,7 +335,8 @@ def _solve(hessian: Floats, gradient: Floats, step: Floats) -> None:
 
 @compiled(
     "boolean(float64[::1], int64, int64, float64, float64, float64[::1], float64[:, ::1],"
-    " float64[::1], float64[:, ::1])"
+    " float64[::1], float64[:, ::1])",
+    makes_arrays=False,
 )
 def balance(
     table: Floats,

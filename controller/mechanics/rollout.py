@@ -344,7 +344,7 @@ def _sine_cosine(x: float) -> tuple[float, float]:
     return sign * ((1.0 - side) * s + side * c), sign * ((1.0 - side) * c - side * s)
 
 
-@compiled("float64(float64[::1], float64[::1], float64)")
+@compiled("float64(float64[::1], float64[::1], float64)", makes_arrays=False)
 def _area(total: Floats, track: Floats, at: float) -> float:
     """Integral of the track's angles from its start to a place."""
     k = min(max(int(at), 0), len(track) - 1)
@@ -353,7 +353,8 @@ def _area(total: Floats, track: Floats, at: float) -> float:
 
 @compiled(
     "void(float64[::1], float64[::1], float64, float64[::1], int64[::1], float64[::1],"
-    " float64[::1])"
+    " float64[::1])",
+    makes_arrays=False,
 )
 def _lay(
     total: Floats,
@@ -397,7 +398,7 @@ def _lay(
             link[_NEXT_Y + j] -= centre_y
 
 
-@compiled("void(float64[::1], float64[::1], boolean)")
+@compiled("void(float64[::1], float64[::1], boolean)", makes_arrays=False)
 def _keep(table: Floats, moving: Floats, out: bool) -> None:
     """Copy how the links move out of a table, or into it."""
     for g in range(len(table) // _ROWS):
@@ -409,7 +410,7 @@ def _keep(table: Floats, moving: Floats, out: bool) -> None:
                 link[MOVING_X + j] = kept[j]
 
 
-@compiled("void(float64[::1])")
+@compiled("void(float64[::1])", makes_arrays=False)
 def _stand_there(table: Floats) -> None:
     """Make of the body after the step the one before the next."""
     for g in range(len(table) // _ROWS):
@@ -418,7 +419,7 @@ def _stand_there(table: Floats) -> None:
             link[_HERE + j] = link[_NEXT + j]
 
 
-@compiled("UniTuple(float64, 2)(float64[:, ::1], int64, float64, float64)")
+@compiled("UniTuple(float64, 2)(float64[:, ::1], int64, float64, float64)", makes_arrays=False)
 def _nearest(path: Floats, at: int, x: float, y: float) -> tuple[float, float]:
     """Place on the path near ``at``, and the signed distance there, positive to its left."""
     last = len(path) - 2
@@ -434,7 +435,10 @@ def _nearest(path: Floats, at: int, x: float, y: float) -> tuple[float, float]:
     return float(best), (1.0 if side >= 0.0 else -1.0) * np.sqrt(least)
 
 
-@compiled("void(float64[::1], float64[:, ::1], float64[::1], float64, float64, float64)")
+@compiled(
+    "void(float64[::1], float64[:, ::1], float64[::1], float64, float64, float64)",
+    makes_arrays=False,
+)
 def _note(state: Floats, path: Floats, waypoint: Floats, x: float, y: float, dt: float) -> None:
     """Take into a state (11,) that its body has come to (x, y) within ``dt``."""
     state[0], state[1] = x, y
@@ -445,7 +449,9 @@ def _note(state: Floats, path: Floats, waypoint: Floats, x: float, y: float, dt:
     state[10] = min(state[10], dx * dx + dy * dy)
 
 
-@compiled("float64(float64[::1], int64, float64, float64)", divides_by_zero=True)
+@compiled(
+    "float64(float64[::1], int64, float64, float64)", divides_by_zero=True, makes_arrays=False
+)
 def _turned(table: Floats, links: int, offset_rad: float, step_s: float) -> float:
     """Write the body between two steps in the world, and how its links move; its mean heading."""
     s, c = _sine_cosine(offset_rad)
@@ -468,7 +474,7 @@ def _turned(table: Floats, links: int, offset_rad: float, step_s: float) -> floa
     return float(offset_rad + 0.5 * mean / links)
 
 
-@compiled("float64(float64[::1], float64[::1], float64, float64, float64)")
+@compiled("float64(float64[::1], float64[::1], float64, float64, float64)", makes_arrays=False)
 def _pulse_rate(
     here_rad: Floats, next_rad: Floats, step: float, cruise: float, limit_rad_s: float
 ) -> float:
@@ -481,7 +487,7 @@ def _pulse_rate(
     return rate
 
 
-@compiled(f"void({FIELD}, float64, float64, float64[::1], int64, float64[::1])")
+@compiled(f"void({FIELD}, float64, float64, float64[::1], int64, float64[::1])", makes_arrays=False)
 def _pull(
     z_m: Floats,
     x0: float,
@@ -507,7 +513,8 @@ def _pull(
 
 
 @compiled(
-    "void(float64[::1], int64, float64[::1], float64[::1], float64, float64[::1], float64[:, ::1])"
+    "void(float64[::1], int64, float64[::1], float64[::1], float64, float64[::1], float64[:, ::1])",
+    makes_arrays=False,
 )
 def _slide(
     table: Floats,
@@ -538,7 +545,8 @@ def _slide(
 
 @compiled(
     "void(float64[::1], int64, float64, float64, float64, float64[:, ::1], int64, float64,"
-    " float64[::1])"
+    " float64[::1])",
+    makes_arrays=False,
 )
 def _write_result(
     state: Floats,
@@ -570,7 +578,7 @@ def _write_result(
     row[ALONG], row[TIME] = PATH_STEP_M * (place - path_at), state[6]
 
 
-@compiled("UniTuple(int64, 2)(float64[:, ::1], int64)")
+@compiled("UniTuple(int64, 2)(float64[:, ::1], int64)", makes_arrays=False)
 def _alike(pieces: Floats, piece: int) -> tuple[int, int]:
     """Which earlier piece begins like a piece for longest, and for how many samples; -1 is none.
 

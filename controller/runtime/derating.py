@@ -112,7 +112,8 @@ def _lag_limits_rad(safety: SafetyConfig, robot: RobotConfig) -> Floats:
 
 @compiled(
     f"boolean(float64[::1], float64[::1], {', '.join([readonly_array()] * 3)}, float64,"
-    f" {', '.join([readonly_array()] * 3)}, float64, float64, float64)"
+    f" {', '.join([readonly_array()] * 3)}, float64, float64, float64)",
+    makes_arrays=False,
 )
 def _is_unlimited(
     mean_a: Floats,

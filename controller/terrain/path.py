@@ -109,7 +109,8 @@ class SplinePath:
 
 
 @compiled(
-    "void(float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64)"
+    "void(float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64)",
+    makes_arrays=False,
 )
 def _project(
     marks_m: Floats, xy_m: Floats, points_m: Floats, s_m: Floats, gap_m: Floats, window_m: float

@@ -111,7 +111,7 @@ def _bends(q: Floats, slope: Floats, turn: Floats) -> None:
             turn[near] = max(turn[near], bend)
 
 
-@compiled("void(float64[:, ::1], float64, float64[::1])")
+@compiled("void(float64[:, ::1], float64, float64[::1])", makes_arrays=False)
 def _spline(q: Floats, at: float, goal: Floats) -> None:
     """Quadratic B-spline through the table ``q`` (n, J) at place ``at`` into ``goal`` (J,)."""
     last = len(q) - 1

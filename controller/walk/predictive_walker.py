@@ -359,7 +359,9 @@ class PredictiveWalker:
         return rough
 
 
-@compiled("void(float64[:, ::1], float64[::1], float64[:, ::1], float64, int64)")
+@compiled(
+    "void(float64[:, ::1], float64[::1], float64[:, ::1], float64, int64)", makes_arrays=False
+)
 def _bend(
     pieces_rad: Floats, bases_rad: Floats, bends: Floats, limit_rad: float, points: int
 ) -> None:

@@ -115,7 +115,8 @@ def _limit_at(allowed: Floats, at: float) -> float:
 
 
 @compiled(
-    "UniTuple(float64, 2)(float64, float64, float64, float64, float64, float64[::1], float64[::1])"
+    "UniTuple(float64, 2)(float64, float64, float64, float64, float64, float64[::1], float64[::1])",
+    makes_arrays=False,
 )
 def _moved(
     at: float,

@@ -25,7 +25,7 @@ _RAW = readonly_array("uint8", layout="C")
 _ROW, _ROWS = "uint8[::1]", "uint8[:, ::1]"
 
 
-@compiled(f"int64({_RAW}, int64, int64, int64)")
+@compiled(f"int64({_RAW}, int64, int64, int64)", makes_arrays=False)
 def crc_of(data: Bytes, start: int, stop: int, crc: int) -> int:
     """CRC of a part of ``data``, continued from ``crc``."""
     for k in range(start, stop):
@@ -33,7 +33,7 @@ def crc_of(data: Bytes, start: int, stop: int, crc: int) -> int:
     return crc
 
 
-@compiled(f"boolean({_RAW}, int64, int64)")
+@compiled(f"boolean({_RAW}, int64, int64)", makes_arrays=False)
 def header_in(data: Bytes, start: int, stop: int) -> bool:
     """Whether ``FF FF FD`` lies within ``start`` to ``stop``."""
     for k in range(start + 2, stop):
@@ -42,7 +42,7 @@ def header_in(data: Bytes, start: int, stop: int) -> bool:
     return False
 
 
-@compiled(f"int64({_RAW}, {_ROWS}, {_ROWS}, {_ROW})")
+@compiled(f"int64({_RAW}, {_ROWS}, {_ROWS}, {_ROW})", makes_arrays=False)
 def read_plain(raw: Bytes, heads: Bytes, data: Bytes, error: Bytes) -> int:
     """Decode N status packets, none of them stuffed.
 
@@ -76,7 +76,7 @@ def read_plain(raw: Bytes, heads: Bytes, data: Bytes, error: Bytes) -> int:
     return found
 
 
-@compiled(f"int64({_RAW}, {_ROW}, {_ROW}, {_ROWS}, {_ROW})")
+@compiled(f"int64({_RAW}, {_ROW}, {_ROW}, {_ROWS}, {_ROW})", makes_arrays=False)
 def read_fast(raw: Bytes, head: Bytes, ids: Bytes, data: Bytes, error: Bytes) -> int:
     """Decode the reply to a fast read: ``head`` (8,), then the parts of ``ids`` (N,)."""
     count, length = data.shape
@@ -101,7 +101,7 @@ def read_fast(raw: Bytes, head: Bytes, ids: Bytes, data: Bytes, error: Bytes) ->
     return found
 
 
-@compiled(f"boolean({_ROW}, int32[::1])")
+@compiled(f"boolean({_ROW}, int32[::1])", makes_arrays=False)
 def fill(frame: Bytes, values: NDArray[np.int32]) -> bool:
     """Write ``values`` (N,) and the CRC into a sync write; False if it must be stuffed first."""
     for servo in range(len(values)):

@@ -50,7 +50,8 @@ class FollowingError:
 
 @compiled(
     f"int64({_FLOATS}, {_FLOATS}, {_FLOATS}, {readonly_array('boolean')}, float64, {_FLOATS},"
-    f" {_FLOATS}, float64[::1])"
+    f" {_FLOATS}, float64[::1])",
+    makes_arrays=False,
 )
 def _longest(
     goal_rad: Floats,

@@ -80,7 +80,8 @@ class MeasuredSteps:
 
 @compiled(
     f"boolean({_FLOATS}, {_FLOATS}, {readonly_array('boolean')}, float64, {_FLOATS}, {_FLOATS},"
-    " float64, float64, float64)"
+    " float64, float64, float64)",
+    makes_arrays=False,
 )
 def _is_all_believable(
     position_rad: Floats,

@@ -238,7 +238,8 @@ def _age_max_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> f
 
 @compiled(
     f"float64({', '.join([_FLOATS] * 7)}, {_BYTES}, {_BYTES}, {_FLOATS},"
-    " float64, float64, float64, float64, float64, float64)"
+    " float64, float64, float64, float64, float64, float64)",
+    makes_arrays=False,
 )
 def _quick_check(
     position_rad: Floats,
@@ -279,7 +280,8 @@ def _quick_check(
 
 @compiled(
     f"int64({_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS}, float64, float64,"
-    " float64[::1], boolean[::1])"
+    " float64[::1], boolean[::1])",
+    makes_arrays=False,
 )
 def _clamp(
     requested_rad: Floats,

@@ -145,26 +145,29 @@ class GroupFastPath:
 
         ``whole`` joins packets that follow each other without a gap into one piece.
         """
-        read = self.read_of(raw)
-        if read is not None:
-            self.measure(read, now_s)
-            return read.replies(self._bank.table, whole)
-        if len(raw) >= _SHORTEST and raw[:5] == _PREFIX and raw[7:12] == _GOALS:
+        if raw[7:12] == _GOALS:
             return self._write_goals(raw, now_s)
-        return None
+        read = self.read_of(raw)
+        if read is None:
+            return None
+        self.measure(read, now_s)
+        return read.replies(self._bank.table, whole)
 
     def read_of(self, raw: bytes) -> GroupRead | None:
         """The plain group read that ``raw`` is; None of any other packet."""
-        if self._version != self._handler.version:
-            self._version = self._handler.version
-            self._reads.clear()
-            self._goals = None
+        self._forget_what_changed()
         read = self._reads.get(raw)
         if read is None:
             read = self._plan(raw)
             if read is not None:
                 self._reads[raw] = read
         return read
+
+    def _forget_what_changed(self) -> None:
+        if self._version != self._handler.version:
+            self._version = self._handler.version
+            self._reads.clear()
+            self._goals = None
 
     def measure(self, read: GroupRead, now_s: float) -> None:
         """Have the servos show in their tables what ``read`` asks for."""
@@ -175,9 +178,12 @@ class GroupFastPath:
             self._firmware.refresh(read.address, read.length)
 
     def _write_goals(self, raw: bytes, now_s: float) -> list[Reply] | None:
+        self._forget_what_changed()
         head, ids = raw[:12], raw[12:-2:5]
         known = self._goals
         if known is None or known[0] != head or known[1] != ids:
+            if len(raw) < _SHORTEST or raw[:5] != _PREFIX:
+                return None
             rows = self._handler.directory.rows[np.frombuffer(ids, np.uint8)]
             if (len(raw) - 14) % 5 or (rows < 0).any() or len(np.unique(rows)) != len(rows):
                 return None

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
 from snakewalk.drivers.compiling import compiled, readonly_array
+from snakewalk.sim.physics.addresses import copy_words
 from snakewalk.sim.physics.layout import StepLayout
 from snakewalk.sim.physics.tangent_planes import PLANES, TangentPlanes
 
@@ -33,6 +34,8 @@ class BellyContacts:
 
     words: NDArray[np.int64]
     """(C, words of an ``mjContact``) what is the same in every step."""
+    hessian: tuple[int, int]
+    """Words among them that stay as they are: a contact without friction has no use for them."""
     geoms: NDArray[np.int32]
     """(C, 2) plane and belly."""
     shapes_m: Floats
@@ -74,11 +77,13 @@ class BellyContacts:
         along_m[second] *= -1.0
         shapes = along_m, model.geom_size[geoms[:, 1], 0], data.contact.includemargin
         reach = _link_pairs(model, bellies)
-        return cls(words, geoms, np.stack(shapes, axis=1), *reach)
+        first, last = (offset // _WORD for offset in layout.contact_hessian)
+        return cls(words, (first, last), geoms, np.stack(shapes, axis=1), *reach)
 
 
 NO_CONTACTS = BellyContacts(
     np.zeros((0, 1), np.int64),
+    (0, 0),
     np.zeros((0, 2), np.int32),
     np.zeros((0, 3)),
     np.zeros((0, 2), np.int32),
@@ -130,7 +135,8 @@ def _link_pairs(
 
 @compiled(
     f"boolean({readonly_array(dimensions=2, layout='C')}, Array(int32, 2, 'C', readonly=True),"
-    f" {readonly_array(layout='C')})"
+    f" {readonly_array(layout='C')})",
+    makes_arrays=False,
 )
 def links_near(centre_m: Floats, pairs: NDArray[np.int32], reach_m: Floats) -> bool:
     """Whether any pair of links may touch.
@@ -152,8 +158,7 @@ def links_near(centre_m: Floats, pairs: NDArray[np.int32], reach_m: Floats) -> b
 
 def write_contacts(
     reals: Floats,
-    integers: NDArray[np.int64],
-    at: tuple[int, int, int],
+    at: tuple[int, int, int, int, int],
     words: NDArray[np.int64],
     geoms: NDArray[np.int32],
     shapes_m: Floats,
@@ -169,8 +174,7 @@ def write_contacts(
 
     Args:
         reals: room for all contacts, as numbers.
-        integers: the same memory, as words.
-        at: where in a contact stand distance, place and normal, in words.
+        at: where in a contact stand distance, place and normal, in words, and ``hessian``.
         words: of ``BellyContacts``, and the two below.
         geoms: likewise.
         shapes_m: likewise.
@@ -182,7 +186,8 @@ def write_contacts(
 
     """
     size, found = words.shape[1], 0
-    at_dist, at_place, at_normal = at
+    room, constants = reals.ctypes.data, words.ctypes.data
+    at_dist, at_place, at_normal, first, last = at
     for c in range(len(words)):
         plane, belly = geoms[c, 0], geoms[c, 1]
         along, radius, margin = shapes_m[c, 0], shapes_m[c, 1], shapes_m[c, 2]
@@ -201,8 +206,9 @@ def write_contacts(
         if dist >= margin:
             return -1  # it touches and bears nothing: in MuJoCo's list, with a mark
         base = size * found
-        for word in range(size):
-            integers[base + word] = words[c, word]
+        to, source = room + base * _WORD, constants + c * size * _WORD
+        copy_words(to, source, first)
+        copy_words(to + last * _WORD, source + last * _WORD, size - last)
         back = -dist / 2.0 - radius
         length = 1.0 / np.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
         reals[base + at_dist] = dist

@@ -43,6 +43,8 @@ class StepLayout:
     contact_geom: int
     contact_row: int
     """Of a contact's first row in ``efc_force``, -1 for none."""
+    contact_hessian: tuple[int, int]
+    """Begin and end of what the solver notes of a contact with friction."""
     kinematics_address: int
     """Of ``mj_kinematics(model, data)``: where everything is."""
     step1_address: int
@@ -79,6 +81,7 @@ def step_layout() -> StepLayout | None:
             contact_normal=of_contact.frame.offset,
             contact_geom=of_contact.geom.offset,
             contact_row=of_contact.efc_address.offset,
+            contact_hessian=(of_contact.H.offset, of_contact.H.offset + of_contact.H.size),
             kinematics_address=_address("mj_kinematics"),
             step1_address=_address("mj_step1"),
             step2_address=_address("mj_step2"),

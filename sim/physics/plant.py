@@ -29,7 +29,7 @@ FIELD_STEP_S = 0.001
 off, 1 ms 0.1 to 2 % (``python -m benchmarks step_length``)."""
 
 
-@compiled("void(float64[::1], float64[:, ::1])")
+@compiled("void(float64[::1], float64[:, ::1])", makes_arrays=False)
 def _pose(place: Floats, pose: Floats) -> None:
     """Place and unit quaternion (7,) to place, and below it the matrix of axes as columns."""
     w, x, y, z = place[3], place[4], place[5], place[6]

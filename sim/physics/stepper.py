@@ -17,13 +17,12 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from llvmlite import ir
-from numba import carray, njit, types
-from numba.core.cgutils import voidptr_t
-from numba.extending import intrinsic, register_jitable
+from numba import carray, njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
+from snakewalk.sim.physics.addresses import call, call_with, pointer
 from snakewalk.sim.physics.belly_contacts import (
     NO_CONTACTS,
     BellyContacts,
@@ -83,43 +82,6 @@ _CONSTRAINT, _PROJECT, _VELOCITY, _ADD_CONTACT = range(22, 26)
 """Places among the addresses: bytes of the arena that are taken, and ``layout.STEP1_PARTS``."""
 LEAST_FRICTION_N_M = 1e-9
 """A joint without any would have no constraint, and the others' would count otherwise."""
-
-
-def _pointer(typing: Any, address: Any) -> Any:
-    """Turn an integer into a pointer."""
-
-    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.inttoptr(args[0], voidptr_t)
-
-    return types.voidptr(types.int64), build
-
-
-def _call(typing: Any, function: Any, model: Any, data: Any) -> Any:
-    """Call ``void function(void*, void*)`` by its address: the caller stays cacheable."""
-
-    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        kind = ir.FunctionType(ir.VoidType(), [voidptr_t, voidptr_t])
-        function = builder.inttoptr(args[0], kind.as_pointer())
-        builder.call(function, [builder.inttoptr(each, voidptr_t) for each in args[1:]])
-        return context.get_dummy_value()
-
-    return types.none(types.int64, types.int64, types.int64), build
-
-
-def _call_with(typing: Any, function: Any, model: Any, data: Any, third: Any) -> Any:
-    """Call ``int function(void*, void*, void*)`` likewise."""
-
-    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        kind = ir.FunctionType(ir.IntType(32), [voidptr_t, voidptr_t, voidptr_t])
-        function = builder.inttoptr(args[0], kind.as_pointer())
-        return builder.call(function, [builder.inttoptr(each, voidptr_t) for each in args[1:]])
-
-    return types.int32(types.int64, types.int64, types.int64, types.int64), build
-
-
-pointer = intrinsic(_pointer)
-call = intrinsic(_call)
-call_with = intrinsic(_call_with)
 
 
 def _move(
@@ -286,7 +248,7 @@ def _step1(
     bellies: tuple[Any, ...],
 ) -> None:
     """``mj_step1`` on planes that are laid anew; by parts where all contacts are of bellies."""
-    words, geoms, shapes_m, pairs, reach_m, axes = bellies
+    words, geoms, shapes_m, pairs, reach_m, axes, first, last = bellies
     places, balls, ball_m, z_m, corner, planes, plane_m, plane_quat = ground
     model, data, kinematics = where[2], where[3], where[13]
     by_parts, tangent = len(words) > 0, len(balls) > 0
@@ -308,13 +270,12 @@ def _step1(
         ncon = carray(pointer(where[4]), (1,), np.int32)
         ncon[0] = 0
         call_with(where[_ADD_CONTACT], model, data, words.ctypes.data)  # drops those of before
-        first = carray(pointer(where[5]), (1,), np.int64)[0]
-        reals = carray(pointer(first), (words.size,), np.float64)
-        integers = carray(pointer(first), (words.size,), np.int64)
-        at = where[8] // 8, where[9] // 8, where[10] // 8
+        list_at = carray(pointer(where[5]), (1,), np.int64)[0]
+        reals = carray(pointer(list_at), (words.size,), np.float64)
+        at = where[8] // 8, where[9] // 8, where[10] // 8, first, last
         belly, plane_at_m = (words, geoms, shapes_m), plane_m if tangent else places
         laid = plane_at_m, plane_quat, tangent
-        count = write_contacts(reals, integers, at, *belly, places, axes, *laid)
+        count = write_contacts(reals, at, *belly, places, axes, *laid)
         ncon[0] = max(count, 0)
         carray(pointer(where[_ARENA_USED]), (1,), np.int64)[0] = max(count, 0) * where[7]
     if count < 0:
@@ -512,6 +473,7 @@ def _run(
         carray(pointer(arrays[49]), (pairs, 2), np.int32),
         carray(pointer(arrays[50]), (pairs,), np.float64),
         carray(pointer(arrays[51]), (geom_count, 9), np.float64),
+        *(sizes[10], sizes[11]),
     )
     _steps(
         *(steps, where, state, chain, work, geoms, ground, law, gears, drive, load, totals),
@@ -599,6 +561,7 @@ class CompiledSteps:
             m.spine_links,
             *bellies.words.shape,
             len(bellies.pairs),
+            *bellies.hessian,
         )
         self._sizes = np.array(sizes, dtype=np.int64)
         self._mu = m.mu

@@ -28,13 +28,13 @@ class MotorOutput:
         """Whether the mode of any servo limits its current."""
         self.current_a: Callable[[], Floats] = blocked_shaft.current_a
         """(S,) as measured."""
-        self._heat_j = drive.heat_j.copy()
+        self._heat_j, self._since_j = drive.heat_j.copy(), np.zeros_like(drive.heat_j)
 
     def take_heat_j(self, seconds: float) -> Floats:
-        """(S,) heat of the windings since the last call, ``seconds`` ago."""
-        drive, before_j = self._drive, self._heat_j
-        self._heat_j = drive.heat_j.copy()
-        since_j = self._heat_j - before_j
+        """(S,) heat of the windings since the last call, ``seconds`` ago; kept until the next."""
+        drive = self._drive
+        since_j = np.subtract(drive.heat_j, self._heat_j, out=self._since_j)
+        self._heat_j[:] = drive.heat_j
         if not self._blocked_shaft.any:
             return since_j
         stall_j = drive.resistance_ohm * self.current_a() ** 2 * seconds

@@ -25,14 +25,17 @@ _SEEN = readonly_array(layout="C")
 _FRAME = readonly_array(dimensions=2, layout="C")
 
 
-@compiled("void(uint8[::1], int64, int64, int64)")
+@compiled("void(uint8[::1], int64, int64, int64)", makes_arrays=False)
 def write_le(data: Bytes, at: int, value: int, size: int) -> None:
     """Write a signed number, little-endian."""
     for k in range(size):
         data[at + k] = (value >> (8 * k)) & 0xFF
 
 
-@compiled(f"void({_TABLE}, {_PLACES}, {_SEEN}, {_SEEN}, {_SEEN}, {_FRAME}, {_FRAME}, {_SEEN})")
+@compiled(
+    f"void({_TABLE}, {_PLACES}, {_SEEN}, {_SEEN}, {_SEEN}, {_FRAME}, {_FRAME}, {_SEEN})",
+    makes_arrays=False,
+)
 def write_motion(
     table: Bytes,
     places: Ints,
@@ -68,7 +71,7 @@ def write_motion(
         write_le(table[row], at_position, int(ticks), 4)
 
 
-@compiled(f"void(uint8[::1], {_PLACES}, {_TABLE}, {_PLACES}, {_PLACES})")
+@compiled(f"void(uint8[::1], {_PLACES}, {_TABLE}, {_PLACES}, {_PLACES})", makes_arrays=False)
 def fill_replies(
     packet: Bytes,
     shape: Ints,
@@ -104,7 +107,8 @@ def fill_replies(
 
 @compiled(
     f"int64(uint8[::1], {_PLACES}, {_TABLE}, {_PLACES}, {_PLACES}, {_TABLE}, uint8[::1],"
-    f" {_TABLE}, uint8[::1])"
+    f" {_TABLE}, uint8[::1])",
+    makes_arrays=False,
 )
 def answer(
     packet: Bytes,
@@ -137,7 +141,7 @@ def answer(
     return int(read_plain(packet, heads, data, error))
 
 
-@compiled(f"boolean({_READ})")
+@compiled(f"boolean({_READ})", makes_arrays=False)
 def is_intact(raw: Bytes) -> bool:
     """Whether an instruction packet is whole, and nothing in it is stuffed."""
     end = len(raw) - 2
@@ -150,7 +154,8 @@ def is_intact(raw: Bytes) -> bool:
 
 @compiled(
     f"void({_READ}, {_PLACES}, {_TABLE}, int64, int64, {readonly_array('int64', 2, 'C')},"
-    f" {_FRAME}, float64, float64[::1], boolean[::1])"
+    f" {_FRAME}, float64, float64[::1], boolean[::1])",
+    makes_arrays=False,
 )
 def accept_goals(
     raw: Bytes,
@@ -193,7 +198,7 @@ def accept_goals(
             taken[row] = True
 
 
-@compiled(f"void(float64[::1], float64[::1], float64, float64, {_FRAME})")
+@compiled(f"void(float64[::1], float64[::1], float64, float64, {_FRAME})", makes_arrays=False)
 def warm_up(
     temperature_c: Floats, heat_j: Floats, slice_s: float, ambient_c: float, thermal: Floats
 ) -> None:
@@ -214,7 +219,8 @@ def warm_up(
 
 @compiled(
     f"boolean({_SEEN}, {readonly_array('uint8')}, {_SEEN}, {readonly_array('uint16')},"
-    f" {readonly_array('uint16')})"
+    f" {readonly_array('uint16')})",
+    makes_arrays=False,
 )
 def out_of_range(
     temperature_c: Floats,
@@ -233,7 +239,7 @@ def out_of_range(
     return False
 
 
-@compiled(f"float64({_SEEN}, {_SEEN})")
+@compiled(f"float64({_SEEN}, {_SEEN})", makes_arrays=False)
 def supply_current_a(pwm: Floats, current_a: Floats) -> float:
     """Current that the bridges take from the supply, A."""
     sum_a = 0.0
@@ -242,7 +248,10 @@ def supply_current_a(pwm: Floats, current_a: Floats) -> float:
     return sum_a
 
 
-@compiled(f"float64(float64[::1], float64, {_SEEN}, {_SEEN}, {_SEEN}, {_SEEN}, {_SEEN})")
+@compiled(
+    f"float64(float64[::1], float64, {_SEEN}, {_SEEN}, {_SEEN}, {_SEEN}, {_SEEN})",
+    makes_arrays=False,
+)
 def count_blocked(
     blocked_s: Floats,
     slice_s: float,

@@ -39,7 +39,7 @@ class Supply:
 
     def feed(self, supply_v: Floats, drop_v: Floats | float = 0.0) -> None:
         """Set ``supply_v`` (S,), where the cable takes ``drop_v`` from the chain's voltage."""
-        supply_v[:] = self._volts - drop_v
+        np.subtract(self._volts, drop_v, out=supply_v)
         if self._overridden:
             own = ~np.isnan(self._override_v)
             supply_v[own] = self._override_v[own]
