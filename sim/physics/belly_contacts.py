@@ -21,6 +21,7 @@ from snakewalk.sim.physics.addresses import copy_words
 from snakewalk.sim.physics.layout import StepLayout
 from snakewalk.sim.physics.tangent_planes import PLANES, TangentPlanes
 
+_ROWS = readonly_array(dimensions=2, layout="C")
 _WORD = 8
 _DEEP_M = 1e-3
 """Of the contacts from which the constants are taken."""
@@ -40,10 +41,9 @@ class BellyContacts:
     """(C, 2) plane and belly."""
     shapes_m: Floats
     """(C, 3) where on the belly's axis the ball lies that touches, its radius, and the margin."""
-    pairs: NDArray[np.int32]
-    """(P, 2) links that may touch each other."""
-    reach_m: Floats
-    """(P,) distance of their centres of mass from which on they do not."""
+    reach_m2: Floats
+    """(bodies, bodies) square of the distance of two centres of mass from which on the bodies do
+    not touch each other, above the diagonal; negative where they never do."""
 
     @classmethod
     def of(
@@ -76,9 +76,8 @@ class BellyContacts:
         along_m = np.where(is_capsule, model.geom_size[geoms[:, 1], 1], 0.0)
         along_m[second] *= -1.0
         shapes = along_m, model.geom_size[geoms[:, 1], 0], data.contact.includemargin
-        reach = _link_pairs(model, bellies)
         first, last = (offset // _WORD for offset in layout.contact_hessian)
-        return cls(words, (first, last), geoms, np.stack(shapes, axis=1), *reach)
+        return cls(words, (first, last), geoms, np.stack(shapes, axis=1), _reach_m2(model, bellies))
 
 
 NO_CONTACTS = BellyContacts(
@@ -86,8 +85,7 @@ NO_CONTACTS = BellyContacts(
     (0, 0),
     np.zeros((0, 2), np.int32),
     np.zeros((0, 3)),
-    np.zeros((0, 2), np.int32),
-    np.zeros(0),
+    np.zeros((0, 0)),
 )
 """Of a model whose contacts MuJoCo looks for."""
 
@@ -113,47 +111,42 @@ def _sunk(model: mujoco.MjModel, planes: TangentPlanes) -> mujoco.MjData:
     return data
 
 
-def _link_pairs(
-    model: mujoco.MjModel, bellies: NDArray[np.bool_]
-) -> tuple[NDArray[np.int32], Floats]:
-    """Pairs of bodies that MuJoCo lets touch each other, and from how far on they do not."""
+def _reach_m2(model: mujoco.MjModel, bellies: NDArray[np.bool_]) -> Floats:
+    """``BellyContacts.reach_m2``, of pairs that MuJoCo lets touch each other."""
     reach_m = np.zeros(model.nbody)
     for geom in np.flatnonzero(bellies):
         body = int(model.geom_bodyid[geom])
         away_m = float(np.linalg.norm(model.geom_pos[geom] - model.body_ipos[body]))
         reach_m[body] = max(reach_m[body], away_m + model.geom_rbound[geom])
     apart = {int(each) for each in model.exclude_signature}
-    pairs = [
-        (a, b)
-        for a in range(1, model.nbody)
-        for b in range(a + 1, model.nbody)
-        if reach_m[a] and reach_m[b] and a != model.body_parentid[b] and (a << 16) + b not in apart
-    ]
-    found = np.array(pairs, dtype=np.int32).reshape(-1, 2)
-    return found, reach_m[found].sum(axis=1) * _SAFE
+    squares = np.full((model.nbody, model.nbody), -1.0)
+    for a in range(1, model.nbody):
+        for b in range(a + 1, model.nbody):
+            mate = a == model.body_parentid[b] or (a << 16) + b in apart
+            if reach_m[a] and reach_m[b] and not mate:
+                squares[a, b] = ((reach_m[a] + reach_m[b]) * _SAFE) ** 2
+    return squares
 
 
-@compiled(
-    f"boolean({readonly_array(dimensions=2, layout='C')}, Array(int32, 2, 'C', readonly=True),"
-    f" {readonly_array(layout='C')})",
-    makes_arrays=False,
-)
-def links_near(centre_m: Floats, pairs: NDArray[np.int32], reach_m: Floats) -> bool:
+@compiled(f"boolean({_ROWS}, {_ROWS}, float64[:, ::1])", makes_arrays=False)
+def links_near(centre_m: Floats, reach_m2: Floats, work: Floats) -> bool:
     """Whether any pair of links may touch.
 
     Args:
         centre_m: (bodies, 3) centres of mass in the world.
-        pairs: (P, 2) bodies.
-        reach_m: (P,) distance from which on they do not.
+        reach_m2: (bodies, bodies) of ``BellyContacts``.
+        work: (3, bodies) overwritten.
 
     """
-    for k in range(len(pairs)):
-        a, b = pairs[k, 0], pairs[k, 1]
-        x, y = centre_m[a, 0] - centre_m[b, 0], centre_m[a, 1] - centre_m[b, 1]
-        z = centre_m[a, 2] - centre_m[b, 2]
-        if x * x + y * y + z * z <= reach_m[k] * reach_m[k]:
-            return True
-    return False
+    count, near = len(centre_m), 0
+    x, y, z = work[0], work[1], work[2]
+    for a in range(count):
+        x[a], y[a], z[a] = centre_m[a, 0], centre_m[a, 1], centre_m[a, 2]
+    for a in range(1, count):
+        for b in range(a + 1, count):
+            dx, dy, dz = x[b] - x[a], y[b] - y[a], z[b] - z[a]
+            near += dx * dx + dy * dy + dz * dz <= reach_m2[a, b]
+    return near > 0
 
 
 def write_contacts(
@@ -167,6 +160,7 @@ def write_contacts(
     plane_m: Floats,
     plane_quat: Floats,
     tangent: bool,
+    held: NDArray[np.int64],
 ) -> int:
     """Write all contacts of now one behind the other; their number, -1 for MuJoCo's own way.
 
@@ -183,6 +177,8 @@ def write_contacts(
         plane_m: (geoms, 3) points of the planes.
         plane_quat: (geoms, 4) how they lie, if ``tangent``; else that is in ``axes``.
         tangent: whether they were just laid.
+        held: (C,) whose constants stand at each place of the list already, from the step before;
+            -1 for none.
 
     """
     size, found = words.shape[1], 0
@@ -206,9 +202,11 @@ def write_contacts(
         if dist >= margin:
             return -1  # it touches and bears nothing: in MuJoCo's list, with a mark
         base = size * found
-        to, source = room + base * _WORD, constants + c * size * _WORD
-        copy_words(to, source, first)
-        copy_words(to + last * _WORD, source + last * _WORD, size - last)
+        if held[found] != c:
+            held[found] = c
+            to, source = room + base * _WORD, constants + c * size * _WORD
+            copy_words(to, source, first)
+            copy_words(to + last * _WORD, source + last * _WORD, size - last)
         back = -dist / 2.0 - radius
         length = 1.0 / np.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
         reals[base + at_dist] = dist
@@ -219,4 +217,5 @@ def write_contacts(
         reals[base + at_normal + 1] = n1 * length
         reals[base + at_normal + 2] = n2 * length
         found += 1
+    held[found:] = -1  # what stands behind the contacts is written over
     return found

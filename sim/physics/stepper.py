@@ -248,7 +248,7 @@ def _step1(
     bellies: tuple[Any, ...],
 ) -> None:
     """``mj_step1`` on planes that are laid anew; by parts where all contacts are of bellies."""
-    words, geoms, shapes_m, pairs, reach_m, axes, first, last = bellies
+    words, geoms, shapes_m, reach_m2, work, axes, held, first, last = bellies
     places, balls, ball_m, z_m, corner, planes, plane_m, plane_quat = ground
     model, data, kinematics = where[2], where[3], where[13]
     by_parts, tangent = len(words) > 0, len(balls) > 0
@@ -266,19 +266,21 @@ def _step1(
     call(where[_MASS], model, data)
     call(where[_FACTOR], model, data)
     count = -1
-    if not links_near(chain[0], pairs, reach_m):
+    if not links_near(chain[0], reach_m2, work):
         ncon = carray(pointer(where[4]), (1,), np.int32)
         ncon[0] = 0
         call_with(where[_ADD_CONTACT], model, data, words.ctypes.data)  # drops those of before
+        held[0] = 0
         list_at = carray(pointer(where[5]), (1,), np.int64)[0]
         reals = carray(pointer(list_at), (words.size,), np.float64)
         at = where[8] // 8, where[9] // 8, where[10] // 8, first, last
         belly, plane_at_m = (words, geoms, shapes_m), plane_m if tangent else places
         laid = plane_at_m, plane_quat, tangent
-        count = write_contacts(reals, at, *belly, places, axes, *laid)
+        count = write_contacts(reals, at, *belly, places, axes, *laid, held)
         ncon[0] = max(count, 0)
         carray(pointer(where[_ARENA_USED]), (1,), np.int64)[0] = max(count, 0) * where[7]
     if count < 0:
+        held[:] = -1
         if tangent:
             call(kinematics, model, data)
         call(where[_COLLISION], model, data)
@@ -465,15 +467,18 @@ def _run(
     water = carray(pointer(arrays[42]), (links, 7), np.float64)
     law = (constants[0], constants[1], constants[2], constants[3], constants[4])
     state = (at, rate, force)
-    contacts, words, pairs = sizes[7], sizes[8], sizes[9]
+    contacts, words = sizes[7], sizes[8]
+    held = carray(pointer(arrays[52]), (contacts,), np.int64)
+    held[:] = -1  # others may have been at the memory since the last run
     bellies = (
         carray(pointer(arrays[46]), (contacts, words), np.int64),
         carray(pointer(arrays[47]), (contacts, 2), np.int32),
         carray(pointer(arrays[48]), (contacts, 3), np.float64),
-        carray(pointer(arrays[49]), (pairs, 2), np.int32),
-        carray(pointer(arrays[50]), (pairs,), np.float64),
+        carray(pointer(arrays[49]), (bodies, bodies), np.float64),
+        carray(pointer(arrays[50]), (3, bodies), np.float64),
         carray(pointer(arrays[51]), (geom_count, 9), np.float64),
-        *(sizes[10], sizes[11]),
+        held,
+        *(sizes[9], sizes[10]),
     )
     _steps(
         *(steps, where, state, chain, work, geoms, ground, law, gears, drive, load, totals),
@@ -544,6 +549,8 @@ class CompiledSteps:
         links = m.joint_count + 1
         found = BellyContacts.of(m.model, m.planes, layout) if layout.parts else None
         bellies = self._bellies = found or NO_CONTACTS
+        self._work = np.zeros((3, m.model.nbody))
+        self._held = np.zeros(len(bellies.words), np.int64)
         self._arrays = (
             *(d.qpos, d.qvel, d.qfrc_applied),
             *(d.xipos, d.xmat, d.xanchor, d.xaxis),
@@ -560,7 +567,6 @@ class CompiledSteps:
             *m.planes.z_m.shape,
             m.spine_links,
             *bellies.words.shape,
-            len(bellies.pairs),
             *bellies.hessian,
         )
         self._sizes = np.array(sizes, dtype=np.int64)
@@ -579,8 +585,8 @@ class CompiledSteps:
             joints = m.model.dof_frictionloss, m.data.qfrc_bias, m.data.qfrc_constraint
             bellies = self._bellies
             contacts = (
-                *(bellies.words, bellies.geoms, bellies.shapes_m, bellies.pairs, bellies.reach_m),
-                m.data.geom_xmat,
+                *(bellies.words, bellies.geoms, bellies.shapes_m, bellies.reach_m2, self._work),
+                *(m.data.geom_xmat, self._held),
             )
             arrays = (*self._arrays, *motors, *links, *joints, *contacts)
             self._addresses = np.array([each.ctypes.data for each in arrays], dtype=np.int64)
