@@ -34,7 +34,7 @@ TITLE = "Simulated loop against bare mj_step: 16 servos, 50 Hz, 2 ms"
 
 SECONDS = 15.0
 """Of simulated time in a round."""
-ROUNDS = 8
+ROUNDS = 20
 LIMIT = 2.0
 
 Floats = NDArray[np.float64]
