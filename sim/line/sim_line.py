@@ -158,6 +158,9 @@ class SimLine(Wire):
             return IRREGULAR
         sent.popleft()
         self._arrive(end_s, len(request.packet))
+        if self._group.read_of(request.packet) is not read:  # something has happened to a servo
+            self._send_replies(end_s, self._execute(request.packet, end_s))
+            return IRREGULAR
         self._group.measure(read, end_s)
         found = read.decoded(self.bank.table, request.heads, request.id_bytes, data, error)
         if found == IRREGULAR:

@@ -92,6 +92,26 @@ def silence(line: SimLine, k: int) -> None:
         line.refresh_ids()
 
 
+def silence_meanwhile(line: SimLine, k: int) -> None:
+    """While the request is on the wire."""
+
+    def fall_silent() -> None:
+        line.mute(np.array([1]), k == 6)
+        line.refresh_ids()
+
+    if k in (6, 14):
+        line.firmware.events.schedule(line.clock.now_s() + 1e-4, fall_silent)
+
+
+def other_ids_meanwhile(line: SimLine, k: int) -> None:
+    def exchange() -> None:
+        line.bank["ID"][:2] = line.bank["ID"][1::-1].copy()
+        line.refresh_ids()
+
+    if k == 9:
+        line.firmware.events.schedule(line.clock.now_s() + 1e-4, exchange)
+
+
 def a_header(line: SimLine, k: int) -> None:
     block = bytes((0xFF, 0xFF, 0xFD, 0x00)) if k % 3 == 1 else bytes(4)
     line.bank.table[0, 84:88] = np.frombuffer(block, np.uint8)
@@ -100,7 +120,10 @@ def a_header(line: SimLine, k: int) -> None:
 @pytest.mark.parametrize("fast", [True, False], ids=["fast", "plain"])
 @pytest.mark.parametrize(
     "between",
-    [nothing, alarm, another_packet, another_reply, part_of_a_packet, reboot, silence],
+    [
+        *(nothing, alarm, another_packet, another_reply, part_of_a_packet),
+        *(reboot, silence, silence_meanwhile, other_ids_meanwhile),
+    ],
     ids=lambda each: each.__name__,
 )
 def test_cycles_are_those_of_the_calls_to_the_bit(between: Between, fast: bool) -> None:
