@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bytes
+from snakewalk.drivers.bus.group_read import GroupReadRequest
 from snakewalk.drivers.protocol.crc import crc16
 from snakewalk.drivers.protocol.frames import IRREGULAR
 from snakewalk.drivers.protocol.packet import HEADER, STATUS, Instruction, fast_head, stuff
@@ -57,21 +58,20 @@ class GroupRead(ABC):
         fill_replies(self._packet, self._shape, table, self._rows, self._block)
         return self._cut(self._packet.tobytes(), whole)
 
-    def decoded(self, table: Bytes, heads: Bytes, ids: Bytes, data: Bytes, error: Bytes) -> int:
+    def decoded(self, table: Bytes, request: GroupReadRequest, data: Bytes, error: Bytes) -> int:
         """What ``drivers.protocol.frames`` finds in these replies, which come in one piece.
 
         Args:
             table: of the servos.
-            heads: (N, 8) that are expected, or (1, 8) of a fast read.
-            ids: (N,) that are expected.
+            request: what the host expects.
             data: (N, length) filled with what is read, unless the replies are irregular.
             error: (N,) filled likewise.
 
         """
         if not self._gapless:
             return IRREGULAR
-        template = self._packet, self._shape
-        return int(answer(*template, table, self._rows, self._block, heads, ids, data, error))
+        replies = self._packet, self._shape, table, self._rows, self._block
+        return int(answer(*replies, request.heads, request.id_bytes, data, error))
 
     @abstractmethod
     def _cut(self, raw: bytes, whole: bool) -> list[Reply]:

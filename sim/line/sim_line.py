@@ -114,6 +114,11 @@ class SimLine(Wire):
 
     # for a control cycle
 
+    @property
+    def is_plain(self) -> bool:
+        """As of a ``Wire``, and that no test changes the replies."""
+        return self.tamper is None and super().is_plain
+
     def fast_path(
         self,
         goals: GroupWrite,
@@ -143,13 +148,7 @@ class SimLine(Wire):
 
         """
         sent, read = self._sent, self._group.read_of(request.packet)
-        if (
-            len(sent) != 1
-            or sent[0][1] is not request.packet
-            or read is None
-            or self.tamper is not None
-            or not self.is_plain
-        ):
+        if len(sent) != 1 or sent[0][1] is not request.packet or read is None or not self.is_plain:
             return IRREGULAR
         end_s = sent[0][0]
         wire_s = request.reply_bytes * self._byte_s
@@ -158,13 +157,12 @@ class SimLine(Wire):
             return IRREGULAR
         sent.popleft()
         self._arrive(end_s, len(request.packet))
-        if self._group.read_of(request.packet) is not read:  # something has happened to a servo
-            self._send_replies(end_s, self._execute(request.packet, end_s))
-            return IRREGULAR
-        self._group.measure(read, end_s)
-        found = read.decoded(self.bank.table, request.heads, request.id_bytes, data, error)
+        found = IRREGULAR
+        if self._group.read_of(request.packet) is read:  # nothing has happened to the servos
+            self._group.measure(read, end_s)
+            found = read.decoded(self.bank.table, request, data, error)
         if found == IRREGULAR:
-            self._send_replies(end_s, read.replies(self.bank.table, whole=True))
+            self._send_replies(end_s, self._execute(request.packet, end_s))
             return IRREGULAR
         self.busy_s += wire_s
         self._quiet_s = due_s - self.usb_latency_s

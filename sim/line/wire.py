@@ -182,13 +182,7 @@ class Wire(ABC):
         clear = self._quiet_s <= start_s + INSTANT_S
         if not clear:
             self._cut_replies(start_s)
-        end_s = start_s
-        for frame in self._split(data):
-            end_s += len(frame) * self._byte_s
-            if clear:
-                self._sent.append((end_s, frame))
-        self.busy_s += end_s - start_s
-        self._sent_until_s = end_s
+        self._transmit(start_s, self._split(data), arrives=clear)
 
     @property
     def is_plain(self) -> bool:
@@ -208,10 +202,7 @@ class Wire(ABC):
         start_s = max(now_s, self._sent_until_s)
         if self._sent or self._rx_queue.packets or self._quiet_s > start_s + INSTANT_S:
             return False
-        end_s = start_s + len(packet) * self._byte_s
-        self._sent.append((end_s, packet))
-        self.busy_s += end_s - start_s
-        self._sent_until_s = end_s
+        self._transmit(start_s, (packet,), arrives=True)
         return True
 
     def read_until(self, count: int, deadline_s: float) -> bytes:
@@ -284,6 +275,16 @@ class Wire(ABC):
         """When the next packet ends or the next byte arrives; None while nothing is under way."""
         times = [self._rx_queue.due_s(1), self._sent[0][0] if self._sent else None]
         return min((time_s for time_s in times if time_s is not None), default=None)
+
+    def _transmit(self, start_s: float, packets: Iterable[bytes], *, arrives: bool) -> None:
+        """Put packets on the wire, back to back from ``start_s`` on."""
+        end_s = start_s
+        for packet in packets:
+            end_s += len(packet) * self._byte_s
+            if arrives:
+                self._sent.append((end_s, packet))
+        self.busy_s += end_s - start_s
+        self._sent_until_s = end_s
 
     def _deliver(self, until_s: float) -> None:
         """Deliver to the servos the packets whose last byte has arrived by ``until_s``."""

@@ -19,6 +19,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.sim.physics.addresses import copy_words
 from snakewalk.sim.physics.layout import StepLayout
+from snakewalk.sim.physics.mechanics import GROUND, Mechanics
 from snakewalk.sim.physics.tangent_planes import PLANES, TangentPlanes
 
 _ROWS = readonly_array(dimensions=2, layout="C")
@@ -46,21 +47,16 @@ class BellyContacts:
     not touch each other, above the diagonal; negative where they never do."""
 
     @classmethod
-    def of(
-        cls, model: mujoco.MjModel, planes: TangentPlanes, layout: StepLayout
-    ) -> "BellyContacts | None":
+    def of(cls, mechanics: Mechanics, layout: StepLayout) -> "BellyContacts | None":
         """Take the constants from MuJoCo; None where more than bellies meets more than ground."""
+        model, planes = mechanics.model, mechanics.planes
         bellies = np.array([model.geom(k).name.startswith("belly") for k in range(model.ngeom)])
-        grounds = np.isin(np.arange(model.ngeom), planes.planes)
-        if not len(planes.planes):
-            grounds = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
-        others = ~(bellies | grounds) & ((model.geom_contype | model.geom_conaffinity) != 0)
+        known = bellies | (mechanics.contact_role == GROUND)
+        others = ~known & ((model.geom_contype | model.geom_conaffinity) != 0)
         more = model.nu, model.neq, model.ntendon, model.nflex, model.nsensor, model.nplugin
-        if others.any() or any(more) or not bellies.any() or grounds.sum() == 0:
+        if not bellies.any() or others.any() or any(more) or model.body_rootid[1:].max() > 1:
             return None
-        if (not len(planes.planes) and grounds.sum() > 1) or model.body_rootid[1:].max() > 1:
-            return None
-        data = _sunk(model, planes)
+        data = _sunk(model, planes, bellies)
         count, capsule = data.ncon, model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE
         each = PLANES if len(planes.planes) else 1
         whole = (bellies.sum() + (bellies & capsule).sum()) * each
@@ -90,7 +86,9 @@ NO_CONTACTS = BellyContacts(
 """Of a model whose contacts MuJoCo looks for."""
 
 
-def _sunk(model: mujoco.MjModel, planes: TangentPlanes) -> mujoco.MjData:
+def _sunk(
+    model: mujoco.MjModel, planes: TangentPlanes, bellies: NDArray[np.bool_]
+) -> mujoco.MjData:
     """A body that lies straight, a little deep in its ground: it has all its contacts."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -102,7 +100,6 @@ def _sunk(model: mujoco.MjModel, planes: TangentPlanes) -> mujoco.MjData:
             model.geom_pos[planes.planes[:, k], 2] -= deep_m
             model.geom_quat[planes.planes[:, k]] = 1.0, 0.0, 0.0, 0.0
     else:
-        bellies = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
         over_m = data.geom_xpos[bellies, 2] - model.geom_size[bellies, 0]
         data.qpos[2] -= over_m.max() + _DEEP_M
     mujoco.mj_kinematics(model, data)

@@ -3,11 +3,11 @@
 ``mj_step1`` and ``mj_step2`` are called by address; drive and friction enter between the two as
 generalised forces. Of a chain on nothing but its ground ``mj_step1`` is called by parts, around
 contacts of our own (``sim.physics.belly_contacts``): the same bits for less. Friction acts at the
-present contacts under the load of the last step, which
-the contacts of a link share by depth. A link slides at the rate at which it *moved* in the last
-step. Its generalised velocity is not that rate: Euler's step moves the head along its velocity and
-leaves out the turning of the links within the step, which reads as 1 mm/s of phantom motion per
-millisecond of step, and as a loss of 6 % of speed under isotropic friction at 2 ms.
+present contacts under the load of the last step, which the contacts of a link share by depth. A
+link slides at the rate at which it *moved* in the last step. Its generalised velocity is not that
+rate: Euler's step moves the head along its velocity and leaves out the turning of the links within
+the step, which reads as 1 mm/s of phantom motion per millisecond of step, and as a loss of 6 % of
+speed under isotropic friction at 2 ms.
 
 Where a robot's file has friction of the gears, MuJoCo holds the joints by as much as torque and
 load of the last step make it (``dof_frictionloss``: BAM's own simulation does the same).
@@ -77,9 +77,13 @@ register_jitable(error_model="numpy")(immersed)
 register_jitable(error_model="numpy")(add_water)
 
 
-_ARENA_USED, _CHECK_POS, _CHECK_VEL, _COM, _MASS, _FACTOR, _COLLISION = range(15, 22)
+_STEP1, _STEP2, _MODEL, _DATA, _NCON, _CONTACTS, _FORCES = range(7)
+_SIZE, _DIST_AT, _PLACE_AT, _NORMAL_AT, _GEOM_AT, _ROW_AT = range(7, 13)
+_KINEMATICS, _TIME, _ARENA_USED = range(13, 16)
+_CHECK_POS, _CHECK_VEL, _COM, _MASS, _FACTOR, _COLLISION = range(16, 22)
 _CONSTRAINT, _PROJECT, _VELOCITY, _ADD_CONTACT = range(22, 26)
-"""Places among the addresses: bytes of the arena that are taken, and ``layout.STEP1_PARTS``."""
+"""Places in ``where``: addresses of functions and of fields of ``mjData``; the second row is of a
+contact, in bytes; the last two are ``layout.STEP1_PARTS``."""
 LEAST_FRICTION_N_M = 1e-9
 """A joint without any would have no constraint, and the others' would count otherwise."""
 
@@ -250,7 +254,7 @@ def _step1(
     """``mj_step1`` on planes that are laid anew; by parts where all contacts are of bellies."""
     words, geoms, shapes_m, reach_m2, work, axes, held, first, last = bellies
     places, balls, ball_m, z_m, corner, planes, plane_m, plane_quat = ground
-    model, data, kinematics = where[2], where[3], where[13]
+    model, data, kinematics = where[_MODEL], where[_DATA], where[_KINEMATICS]
     by_parts, tangent = len(words) > 0, len(balls) > 0
     if by_parts:
         call(where[_CHECK_POS], model, data)
@@ -260,25 +264,25 @@ def _step1(
     if tangent:
         lay_planes(places, balls, ball_m, z_m, corner, planes, plane_m, plane_quat)
     if not by_parts:
-        call(where[0], model, data)
+        call(where[_STEP1], model, data)
         return
     call(where[_COM], model, data)
     call(where[_MASS], model, data)
     call(where[_FACTOR], model, data)
     count = -1
     if not links_near(chain[0], reach_m2, work):
-        ncon = carray(pointer(where[4]), (1,), np.int32)
+        ncon = carray(pointer(where[_NCON]), (1,), np.int32)
         ncon[0] = 0
         call_with(where[_ADD_CONTACT], model, data, words.ctypes.data)  # drops those of before
         held[0] = 0
-        list_at = carray(pointer(where[5]), (1,), np.int64)[0]
+        list_at = carray(pointer(where[_CONTACTS]), (1,), np.int64)[0]
         reals = carray(pointer(list_at), (words.size,), np.float64)
-        at = where[8] // 8, where[9] // 8, where[10] // 8, first, last
+        at = where[_DIST_AT] // 8, where[_PLACE_AT] // 8, where[_NORMAL_AT] // 8, first, last
         belly, plane_at_m = (words, geoms, shapes_m), plane_m if tangent else places
         laid = plane_at_m, plane_quat, tangent
         count = write_contacts(reals, at, *belly, places, axes, *laid, held)
         ncon[0] = max(count, 0)
-        carray(pointer(where[_ARENA_USED]), (1,), np.int64)[0] = max(count, 0) * where[7]
+        carray(pointer(where[_ARENA_USED]), (1,), np.int64)[0] = max(count, 0) * where[_SIZE]
     if count < 0:
         held[:] = -1
         if tangent:
@@ -325,18 +329,18 @@ def _steps(
     speed, ground_n_m = np.empty(joints), np.empty(joints)
     has_friction = _has_friction(gear)
     lanes, step_s = make_lanes(2 * joints), law[4]
-    step2, model, data = where[1], where[2], where[3]
+    step2, model, data = where[_STEP2], where[_MODEL], where[_DATA]
     at = (
-        where[7] // 8,
-        where[8] // 8,
-        where[9] // 8,
-        where[10] // 8,
-        where[11] // 4,
-        where[12] // 4,
+        where[_SIZE] // 8,
+        where[_DIST_AT] // 8,
+        where[_PLACE_AT] // 8,
+        where[_NORMAL_AT] // 8,
+        where[_GEOM_AT] // 4,
+        where[_ROW_AT] // 4,
     )
-    ncon = carray(pointer(where[4]), (1,), np.int32)
-    contact_list = carray(pointer(where[5]), (1,), np.int64)
-    force_list = carray(pointer(where[6]), (1,), np.int64)
+    ncon = carray(pointer(where[_NCON]), (1,), np.int32)
+    contact_list = carray(pointer(where[_CONTACTS]), (1,), np.int64)
+    force_list = carray(pointer(where[_FORCES]), (1,), np.int64)
     for _ in range(steps):
         _step1(where, chain, ground, bellies)
         qfrc[:] = 0.0
@@ -484,7 +488,7 @@ def _run(
         *(steps, where, state, chain, work, geoms, ground, law, gears, drive, load, totals),
         *(mass_kg, water, sizes[6], bellies),
     )
-    return float(carray(pointer(where[14]), (1,), np.float64)[0])
+    return float(carray(pointer(where[_TIME]), (1,), np.float64)[0])
 
 
 register_jitable(error_model="numpy", inline="always")(_move)
@@ -547,7 +551,7 @@ class CompiledSteps:
             dtype=np.int64,
         )
         links = m.joint_count + 1
-        found = BellyContacts.of(m.model, m.planes, layout) if layout.parts else None
+        found = BellyContacts.of(m, layout) if layout.parts else None
         bellies = self._bellies = found or NO_CONTACTS
         self._work = np.zeros((3, m.model.nbody))
         self._held = np.zeros(len(bellies.words), np.int64)

@@ -98,13 +98,12 @@ class Protection:
         self._slow_rad_s = SLOW * motor.no_load_rad_s
         self._drop_v = np.zeros(len(bank))
         volts = self._supply.usual_v
-        self._cables: list[tuple[NDArray[np.intp] | slice, float]] = [
+        several = [np.flatnonzero(volts == each) for each in np.unique(volts)]
+        self._cables = [
             (rows, sum(amps * count for amps, count in Counter(motor.standby_a[rows]).items()))
-            for rows in (np.flatnonzero(volts == each) for each in np.unique(volts))
+            for rows in (several if len(several) > 1 else [slice(None)])
         ]
         """Rows of the servos on a cable, and what they draw at rest, A."""
-        if len(self._cables) == 1:
-            self._cables = [(slice(None), self._cables[0][1])]
         self._standby_a = motor.standby_a
 
     def alarms(self, row: int) -> Mapping[str, int]:

@@ -48,8 +48,7 @@ def wave(robot: RobotConfig, time_s: float) -> Floats:
 
 
 def contacts_of(robot: RobotConfig, ground: HeightField | None) -> BellyContacts | None:
-    mechanics = MujocoPlant(robot, FLAT, ground).mechanics
-    return BellyContacts.of(mechanics.model, mechanics.planes, LAYOUT)
+    return BellyContacts.of(MujocoPlant(robot, FLAT, ground).mechanics, LAYOUT)
 
 
 def assert_as_mujoco(m: Mechanics, qpos: Floats) -> None:
@@ -122,8 +121,7 @@ def test_feet_and_obstacles_are_left_to_mujoco() -> None:
     assert contacts_of(load_robot("salamander"), None) is None
     assert contacts_of(load_robot("salamander"), HILLS) is None
     for name in ("pegs", "corridor"):
-        mechanics = MujocoPlant(ROBOT, load_world(name)).mechanics
-        assert BellyContacts.of(mechanics.model, mechanics.planes, LAYOUT) is None
+        assert BellyContacts.of(MujocoPlant(ROBOT, load_world(name)).mechanics, LAYOUT) is None
 
 
 def test_a_mujoco_without_the_parts_is_stepped_as_a_whole(mocker: MockerFixture) -> None:
