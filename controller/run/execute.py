@@ -18,8 +18,8 @@ from snakewalk.controller.console.result_files import LOG, clear_run, refuse_ano
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
-from snakewalk.controller.pose.pose_provider import PoseProvider, pose_faults, pose_provider
-from snakewalk.controller.report.artifacts import write_summary
+from snakewalk.controller.run.pose_provider import PoseProvider, pose_faults, pose_provider
+from snakewalk.controller.run.summary_file import write_summary
 from snakewalk.controller.run.backend import (
     Backend,
     is_split,
@@ -41,8 +41,6 @@ from snakewalk.controller.runtime.friction_monitor import (
     OnTwin,
     SlideModel,
 )
-from snakewalk.controller.studies.shadow.diagnosis import check_level
-from snakewalk.controller.studies.shadow.run_shadow import RunShadow
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
 from snakewalk.controller.walk.pilot import UsesFriction

@@ -12,6 +12,7 @@ from typing import Final
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import plugin
 from snakewalk.controller.run.watcher import WatcherProcess
 from snakewalk.controller.view.dead_man import DeadMan
 
@@ -75,12 +76,10 @@ class LiveView(WatcherProcess):
             self._picture = json.dumps({"time_s": time_s, "jpeg": shown}).encode()
 
 
+@plugin("observer", "page")
 @contextmanager
-def open_view(view: bool, at: str) -> Iterator[LiveView | None]:
-    """Serve the page of a run where it is asked for, and print its address."""
-    if not view:
-        yield None
-        return
+def open_page(at: str) -> Iterator[LiveView]:
+    """Live web page of a run, with a stop button."""
     with LiveView(at) as page:
         print(f"page: {page.url}", file=sys.stderr, flush=True)
         yield page

@@ -51,9 +51,9 @@ PENDING: Final[dict[str, frozenset[str]]] = {
         {"controller.report.artifacts", "controller.run.execute"}
     ),
     "controller.images.mesh_files": frozenset({"controller.animals.mesh.mesh"}),
-    "controller.learning.commands.policy": frozenset({"controller.cli.watchers"}),
+    "controller.learning.commands.policy": frozenset({"controller.run.watchers"}),
     "controller.learning.policy_trials": frozenset({"controller.studies.sweep_measure"}),
-    "controller.pose.pose_provider": frozenset(
+    "controller.run.pose_provider": frozenset(
         {
             "controller.cameras.camera_pose",
             "controller.cameras.device_camera",
@@ -62,24 +62,24 @@ PENDING: Final[dict[str, frozenset[str]]] = {
             "controller.run.prepared_run",
         }
     ),
-    "controller.repertoire.commands.playback": frozenset({"controller.cli.watchers"}),
-    "controller.repertoire.commands.repertoire": frozenset({"controller.cli.watchers"}),
+    "controller.repertoire.commands.playback": frozenset({"controller.run.watchers"}),
+    "controller.repertoire.commands.repertoire": frozenset({"controller.run.watchers"}),
     "controller.report.artifacts": frozenset({"controller.animals.mesh.body_look"}),
     "controller.report.commands.report": frozenset({"controller.animals.mesh.body_look"}),
-    "controller.report.film": frozenset({"controller.animals.mesh.bone_motion"}),
+    "controller.report.film": frozenset({"controller.track.bone_motion"}),
     "controller.ros.commands.ros": frozenset(
-        {"controller.cli.watchers", "controller.exchange.body_frames", "controller.view.live_view"}
+        {"controller.run.watchers", "controller.exchange.body_frames", "controller.view.live_view"}
     ),
     "controller.ros.ros_node": frozenset({"controller.exchange.ros_messages"}),
     "controller.run.commands.gait_run": frozenset(
-        {"controller.cli.watchers", "controller.view.live_view"}
+        {"controller.run.watchers", "controller.view.live_view"}
     ),
     "controller.run.commands.plan": frozenset(
         {"controller.repertoire.commands.repertoire", "controller.repertoire.repertoire_planning"}
     ),
-    "controller.run.commands.play": frozenset({"controller.cli.watchers"}),
+    "controller.run.commands.play": frozenset({"controller.run.watchers"}),
     "controller.run.commands.run": frozenset(
-        {"controller.animals.mesh.body_look", "controller.cli.watchers"}
+        {"controller.animals.mesh.body_look", "controller.run.watchers"}
     ),
     "controller.run.execute": frozenset(
         {

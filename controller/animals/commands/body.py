@@ -11,6 +11,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
@@ -24,12 +25,17 @@ if TYPE_CHECKING:
 
     from snakewalk.controller.animals.mesh.body_model import BodyModel
     from snakewalk.controller.animals.mesh.body_skin import BodySkin
-    from snakewalk.controller.animals.mesh.mesh import Mesh
+    from snakewalk.controller.images.mesh import Mesh
 
     Floats = NDArray[np.float64]
     Image = NDArray[np.uint8]
 
 
+@command(
+    "body",
+    group=RECORDINGS,
+    examples=("body worm-like -o worm.glb", "body TRACK.npz --image 0.png -o b.obj"),
+)
 def body(
     track: Annotated[
         str,

@@ -8,6 +8,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
@@ -29,6 +30,10 @@ _Rate = Annotated[float | None, typer.Option(help="frames a second, instead of w
 _Picture = Annotated[Path | None, typer.Option(help="draw here (.png, .svg, .pdf)")]
 
 
+@command(
+    "fish film",
+    examples=("fish film tank --side", "fish film eel --motion MIDLINES.csv --build eel"),
+)
 def film(
     folder: Annotated[Path, typer.Argument(help="folder to write frames and truth.npz into")],
     motion: Annotated[
@@ -71,6 +76,13 @@ def film(
     show(found, as_json)
 
 
+@command(
+    "fish match",
+    examples=(
+        "fish match top.mp4 --side side.mp4 -o postures.npz",
+        "fish match tank/top --background tank/top-background.png --picture match.png",
+    ),
+)
 def match(
     footage: Annotated[
         Path, typer.Argument(help="video or folder of images from above; or tracked midlines")
@@ -135,6 +147,13 @@ def match(
     show(facts | {"postures": str(output)}, as_json)
 
 
+@command(
+    "fish synthesise",
+    examples=(
+        "fish synthesise postures.npz --seconds 30 --seed 1 -o track.npz",
+        "fish synthesise postures.npz --through 3,0 --through 5,3 --mirror",
+    ),
+)
 def synthesise(
     postures: Annotated[Path, typer.Argument(help="postures.npz of snakewalk fish match")],
     through: Annotated[

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import (
     Force,
     Individual,
@@ -22,6 +23,14 @@ from snakewalk.controller.console.result_files import (
 )
 
 
+@command(
+    "stride",
+    group=RECORDINGS,
+    examples=(
+        "stride TRACKED.h5 --spine nose,neck,hip,tail --girdles neck,hip --feet FL,FR,HL,HR -o mine.toml --picture stride.png",
+        "synthesise jacksboro-traverse --animal mine.toml --film",
+    ),
+)
 def stride(
     keypoints: Annotated[
         Path, typer.Argument(help="SLEAP, DeepLabCut, QTM or C3D, seen from above")

@@ -8,6 +8,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
     Force,
@@ -35,6 +36,15 @@ _ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
 """Of the files, by what is in them."""
 
 
+@command(
+    "synthesise",
+    group=MOTION,
+    examples=(
+        "synthesise -o motion",
+        "synthesise my-run.toml --seed 3 --json",
+        "synthesise jacksboro-traverse --animal lizard -o lizard --film",
+    ),
+)
 def synthesise(
     run: RunName = DEFAULT_RUN,
     output: Annotated[

@@ -25,7 +25,7 @@ from snakewalk.controller.animals.mesh.cross_sections import (
     ellipses,
     skin_model,
 )
-from snakewalk.controller.animals.mesh.mesh import Mesh
+from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.animals.mesh.patches import Tube, fins
 from snakewalk.controller.animals.mesh.skin import Skin, carried, pde_skin
 from snakewalk.controller.animals.mesh.skin_texture import ACROSS, ALONG, painted

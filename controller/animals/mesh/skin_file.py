@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.errors import InputError
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
+from snakewalk.controller.track.bone_motion import BoneMotion
 from snakewalk.controller.animals.mesh.rig import Rig
 from snakewalk.controller.images.mesh_files import SKIN_RGB
 

@@ -11,8 +11,8 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.controller.animals.mesh.body_model import BodyModel
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
-from snakewalk.controller.animals.mesh.mesh import Mesh
+from snakewalk.controller.track.bone_motion import BoneMotion
+from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin
 from snakewalk.controller.console.result_files import check_picture

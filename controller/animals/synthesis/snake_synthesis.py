@@ -10,7 +10,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.synthesis import Along, Curve, SynthesisConfig, along_body, curve_at
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion, from_points
+from snakewalk.controller.track.bone_motion import BoneMotion, from_points
 from snakewalk.controller.animals.synthesis.graph_motion import graph_angles, graph_motion
 from snakewalk.controller.animals.synthesis.synthesis import (
     Behaviour,

@@ -11,7 +11,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.animals.mesh.body_look import ANIMAL, animal, rig_look
 from snakewalk.controller.animals.mesh.body_motion import robot_skin
 from snakewalk.controller.animals.mesh.body_skin import BodySkin, body_skin
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
+from snakewalk.controller.track.bone_motion import BoneMotion
 from snakewalk.controller.animals.mesh.rig import spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin
 from snakewalk.controller.animals.synthesis.snake_synthesis import SynthesisedWalk

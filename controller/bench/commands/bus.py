@@ -18,6 +18,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import ChainPort, Force, Json, console, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
@@ -45,6 +46,10 @@ LATE_SHARE = 0.05
 """Of the time served: who left more of it out is told so at the end."""
 
 
+@command(
+    "bus serve",
+    examples=("bus serve --servos 1-16", "bus serve --robot yaw16 --faults faults.toml --pace 0.5"),
+)
 def serve(
     servos: Annotated[
         str | None,
@@ -171,6 +176,7 @@ def _tell_what_was_lost(late_share: float, output_flushes: int) -> None:
         )
 
 
+@command("bus sniff", examples=("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))
 def sniff(
     source: Annotated[
         Path, typer.Argument(help="a recording (JSON lines, hex text, raw), or a serial device")
@@ -369,6 +375,13 @@ def _converse(server: "PtyServer", console: "Console", stopped: "Callable[[], bo
             print(console.execute(text), flush=True)
 
 
+@command(
+    "bus set",
+    examples=(
+        "bus set --id 1 --baud 57600 --new-id 7 --new-baud 1000000 --dry-run",
+        "bus set --id 7 --return-delay 0 --yes",
+    ),
+)
 def bus_set(
     servo_id: Annotated[int, typer.Option("--id", help="the servo, 0 to 252")],
     port: ChainPort = None,
@@ -430,6 +443,9 @@ _Ids = Annotated[list[int], typer.Option("--id", help="a servo, 0 to 252; may be
 _Baud = Annotated[int, typer.Option(help="at which the servos answer")]
 
 
+@command(
+    "bus backup", examples=("bus backup -o servos.json", "bus backup --baud 57600 -o one.json")
+)
 def backup(
     out: Annotated[Path, typer.Option("--out", "-o", help="file (.json)")],
     port: ChainPort = None,
@@ -449,6 +465,7 @@ def backup(
     show({"servos": [each.id for each in found.servos], "backup": str(out)}, as_json)
 
 
+@command("bus identify", examples=("bus identify", "bus identify --baud 1000000 -o mine.toml"))
 def bus_identify(
     port: ChainPort = None,
     baud: Annotated[
@@ -511,6 +528,10 @@ def bus_identify(
         console.print(f"robot {out}: say the axes, then: snakewalk calibrate --robot {out}")
 
 
+@command(
+    "bus restore",
+    examples=("bus restore servos.json --dry-run", "bus restore servos.json --id 7 --yes"),
+)
 def restore(
     file: Annotated[Path, typer.Argument(help="of `snakewalk bus backup`", dir_okay=False)],
     servo_id: Annotated[
@@ -558,6 +579,7 @@ def restore(
         console.print("written and read back" if written else "nothing written")
 
 
+@command("bus reboot", examples=("bus reboot --id 3 --id 4",))
 def reboot(
     servo_id: _Ids,
     port: ChainPort = None,
@@ -583,6 +605,7 @@ def reboot(
     show(facts or {"rebooted": "none"}, as_json)
 
 
+@command("bus blink", examples=("bus blink --id 7 --times 10",))
 def blink(
     servo_id: _Ids,
     port: ChainPort = None,

@@ -5,11 +5,13 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Json, console, show
-from snakewalk.controller.exchange.commands.listing import RobotName
+from snakewalk.controller.console.options import RobotName
 
 
+@command("robot power", examples=("robot power alternating16", "robot power my.toml --current 0.5"))
 def power(
     name: RobotName,
     current: Annotated[

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import BUS, command
 from snakewalk.controller.console.options import Force, Json, Port, console, show
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from snakewalk.controller.bench.homing_offset import HomingOffset
 
 
+@command("calibrate", group=BUS, examples=("calibrate --robot alternating16 -o my-robot.toml",))
 def calibrate(
     out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
     robot: Annotated[

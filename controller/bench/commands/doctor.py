@@ -5,11 +5,15 @@ from typing import Annotated
 import typer
 
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import BUS, command
 from snakewalk.controller.console.findings_table import show_findings
 from snakewalk.controller.console.messages import stderr_console
 from snakewalk.controller.console.options import DEFAULT_RUN, Json, Robot
 
 
+@command(
+    "doctor", group=BUS, examples=("doctor", "doctor --port /dev/ttyUSB0 --robot alternating16")
+)
 def doctor(
     port: Annotated[
         str | None,

@@ -6,10 +6,12 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.controller.console.command import BUS, command
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.console.options import ChainPort, Json, console
 
 
+@command("scan", group=BUS, examples=("scan", "scan --port /dev/ttyUSB0 --baud 57600 --json"))
 def scan(
     port: ChainPort = None,
     baud: Annotated[

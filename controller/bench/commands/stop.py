@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import stderr_console
 from snakewalk.controller.console.options import Json, console
 
@@ -15,6 +16,11 @@ if TYPE_CHECKING:
     from snakewalk.controller.bench.emergency_stop import StopOutcome
 
 
+@command(
+    "stop",
+    group=JOB,
+    examples=("stop", "stop --port /dev/ttyUSB0 --json", "stop runs/flat-square-walk-seed0"),
+)
 def stop(
     run: Annotated[
         str | None,

@@ -7,6 +7,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 
 if TYPE_CHECKING:
@@ -32,6 +33,10 @@ def read_squares(text: str) -> tuple[int, int]:
     return int(across), int(down)
 
 
+@command(
+    "camera board",
+    examples=("camera board -o board.pdf", "camera board -o a3.pdf --squares 9x6 --square 42"),
+)
 def board(
     out: Annotated[Path, typer.Option("--out", "-o", help="a .pdf in its true size, or a .png")],
     pattern: Pattern = "charuco",

@@ -7,10 +7,15 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.findings_table import show_findings
 from snakewalk.controller.console.options import VIEW_AT, Json, RunName, RunPort, Set, key_values
 
 
+@command(
+    "camera check",
+    examples=("camera check flat-square", "camera check my-run.toml --port /dev/ttyUSB0 --view"),
+)
 def check(
     run: RunName = "flat-square",
     port: RunPort = None,
@@ -34,7 +39,7 @@ def check(
 
     from snakewalk.controller.cameras.camera_findings import camera_findings  # noqa: PLC0415
     from snakewalk.controller.cameras.camera_watch import CameraWatch, nobody  # noqa: PLC0415
-    from snakewalk.controller.pose.pose_provider import pose_faults  # noqa: PLC0415
+    from snakewalk.controller.run.pose_provider import pose_faults  # noqa: PLC0415
     from snakewalk.controller.run.factory import prepare_job  # noqa: PLC0415
 
     prepared = prepare_job(run, keys=key_values("--set", set_))

@@ -14,6 +14,7 @@ from snakewalk.controller.cameras.commands.board import (
     Squares,
     read_squares,
 )
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 
 if TYPE_CHECKING:
@@ -25,6 +26,13 @@ _PAUSE_S = 0.7
 """Between pictures of a device: time to move the board."""
 
 
+@command(
+    "camera calibrate",
+    examples=(
+        "camera calibrate pictures -o lens.yml",
+        "camera calibrate 0 -o lens.yml --size 1280x720",
+    ),
+)
 def calibrate_camera(
     source: Annotated[str, typer.Argument(help="folder of pictures, a film, or a device's number")],
     out: Annotated[Path, typer.Option("--out", "-o", help="the lens's file (.yml, .json)")],

@@ -8,9 +8,14 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.cameras.commands.board import DOTS, check_print, write_print
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 
 
+@command(
+    "camera markers",
+    examples=("camera markers -o markers.pdf", "camera markers -o a3.pdf --side 250 --count 4"),
+)
 def markers(
     out: Annotated[Path, typer.Option("--out", "-o", help="a .pdf in its true size, or a .png")],
     count: Annotated[int, typer.Option(min=1, max=50, help="markers, a page each")] = 6,

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import (
     Individual,
     Json,
@@ -21,6 +22,9 @@ from snakewalk.controller.console.options import (
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
 
 
+@command(
+    "analyse", group=RECORDINGS, examples=("analyse worm-like", "analyse MIDLINES.csv --picture .")
+)
 def analyse(
     recordings: Annotated[
         list[str],

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import (
     Force,
     GivenRobot,
@@ -31,6 +32,11 @@ from snakewalk.controller.console.result_files import (
 )
 
 
+@command(
+    "track",
+    group=RECORDINGS,
+    examples=("track", "track MIDLINES.csv --rate 60 --picture track.png"),
+)
 def track(
     recordings: Annotated[
         list[str] | None,

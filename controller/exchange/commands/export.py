@@ -10,11 +10,21 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 
 
+@command(
+    "export",
+    group=JOB,
+    examples=(
+        "export runs/flat-square-walk-seed0/log.mcap --csv tables",
+        "export LOG --parquet tables --foxglove body.mcap",
+        "export LOG --ros2 bag.mcap --json",
+    ),
+)
 def export(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
     csv: Annotated[

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import Force, Json, console, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 
@@ -17,6 +18,7 @@ RobotName = Annotated[
 ]
 
 
+@command("list", group=JOB, examples=("list --json",))
 def list_(as_json: Json = False) -> None:
     """List what is shipped: runs, robots, worlds, recordings, policies, sets of gait parameters."""
     from snakewalk.config.loader import load_gait, load_robot, load_run, load_world, shipped  # noqa: PLC0415  --help stays quick
@@ -44,6 +46,7 @@ def list_(as_json: Json = False) -> None:
     console.print("all gaits: snakewalk gait list")
 
 
+@command("robot show", examples=("robot show alternating16", "robot show my.toml"))
 def show_robot(name: RobotName, as_json: Json = False) -> None:
     """Show a robot: its links, and servo, sign, zero and limit of each joint."""
     from snakewalk.config.loader import load_robot  # noqa: PLC0415  --help stays quick
@@ -96,6 +99,13 @@ def show_robot(name: RobotName, as_json: Json = False) -> None:
             console.print(table)
 
 
+@command(
+    "robot import",
+    examples=(
+        "robot import snake.urdf -o snake.toml",
+        "robot import swimmer.xml -o swimmer.toml --scale 0.1 --servo XL330-M288",
+    ),
+)
 def import_robot(
     file: Annotated[Path, typer.Argument(help="MuJoCo model (.xml) or URDF of a chain")],
     out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
@@ -138,6 +148,7 @@ def import_robot(
         console.print(f"- {note}", markup=False)
 
 
+@command("robot export", examples=("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml",))
 def export_robot(
     name: RobotName,
     urdf: Annotated[Path | None, typer.Option(help="write a URDF here")] = None,

@@ -13,27 +13,9 @@ from rich.table import Table
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.options import (
-    VIEW_AT,
-    Film,
-    FirstSeed,
-    Force,
-    GivenRobot,
-    GivenWorld,
-    Json,
-    Robot,
-    Ros,
-    RunFolder,
-    RunPort,
-    Set,
-    Shadow,
-    View,
-    ViewAt,
-    World,
-    console,
-    key_values,
-    show_run,
-)
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import (VIEW_AT, Film, FirstSeed, Force, GivenRobot, GivenWorld, Json, Robot, Ros, RunFolder, RunPort, Set, Shadow, View, ViewAt, World, console, key_values)
+from snakewalk.controller.run.finish import show_run
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite, run_folder
 
 if TYPE_CHECKING:
@@ -45,6 +27,7 @@ Name = Annotated[
 ]
 
 
+@command("policy list", examples=("policy list --json",))
 def list_policies(as_json: Json = False) -> None:
     """List the shipped policies, and how each was learnt."""
     from snakewalk.config.loader import shipped  # noqa: PLC0415  --help stays quick
@@ -76,6 +59,14 @@ def list_policies(as_json: Json = False) -> None:
     console.print(table)
 
 
+@command(
+    "policy run",
+    examples=(
+        "policy run wave-cma --seconds 10",
+        "policy run mine.toml --set world.friction.across=0.3 --json",
+        "policy run wave-ppo --port /dev/ttyUSB0",
+    ),
+)
 def run_policy(
     name: Name,
     robot: Robot = None,
@@ -96,7 +87,7 @@ def run_policy(
     as_json: Json = False,
 ) -> None:
     """Run a learnt policy on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
+    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.run.factory import prepare_policy  # noqa: PLC0415
@@ -132,6 +123,10 @@ def run_policy(
     show_run(finished, folder, result, as_json, film=film)
 
 
+@command(
+    "policy learn",
+    examples=("policy learn -o mine.toml", "policy learn --seed 1 --workers 8 -o one.toml"),
+)
 def learn_policy(
     out: Annotated[Path, typer.Option("--out", "-o", help="the policy (.toml)")],
     robot: GivenRobot = "yaw16",
@@ -171,6 +166,13 @@ def learn_policy(
     console.print(f"{out}: {policy.origin.steps} steps; snakewalk policy run {out}")
 
 
+@command(
+    "policy trials",
+    examples=(
+        "policy trials wave-cma wave-ppo lateral-undulation --first-seed 1000",
+        "policy trials mine.toml wave-cma --world flat --world flat-friction-3 --json",
+    ),
+)
 def policy_trials(
     motions: Annotated[
         list[str],

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
@@ -32,6 +33,14 @@ _LEAST, _MOST = 1e-6, 1e6
 """Of lengths, m, and of factors: what is beyond is in another unit (ours)."""
 
 
+@command(
+    "terrain from",
+    examples=(
+        "terrain from dem.tif --scale 0.002 -o hill.toml --picture hill.png",
+        "terrain from scan.pcd --crop 20,50,80,150 --scale 0.05 --fill 0.3 -o slope.toml",
+        "terrain from heights.png --cell 0.05 --height-step 0.001 -o garden.toml",
+    ),
+)
 def elevation(
     file: Annotated[
         Path,

@@ -9,6 +9,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json
 from snakewalk.controller.mapping.commands.elevation import (
     Fill,
@@ -24,6 +25,13 @@ if TYPE_CHECKING:
     from snakewalk.config.arrays import Image
 
 
+@command(
+    "terrain from-stereo",
+    examples=(
+        "terrain from-stereo left.png right.png --calibration stereo.yml -o yard.toml",
+        "terrain from-stereo l.png r.png --calibration c.yml --height 0.5 --tilt 30 -o yard.toml",
+    ),
+)
 def stereo(
     left: Annotated[Path, typer.Argument(help="picture of the left camera")],
     right: Annotated[Path, typer.Argument(help="picture of the right camera, of the same moment")],

@@ -6,10 +6,14 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 
 
+@command(
+    "repertoire crowd", examples=("repertoire crowd", "repertoire crowd --bodies 300 -o herd.mp4")
+)
 def crowd(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
     world: Annotated[

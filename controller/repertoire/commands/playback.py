@@ -6,25 +6,19 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.options import (
-    VIEW_AT,
-    Film,
-    Force,
-    Json,
-    Robot,
-    Ros,
-    RunFolder,
-    RunPort,
-    Set,
-    View,
-    ViewAt,
-    World,
-    key_values,
-    show_run,
-)
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import (VIEW_AT, Film, Force, Json, Robot, Ros, RunFolder, RunPort, Set, View, ViewAt, World, key_values)
+from snakewalk.controller.run.finish import show_run
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite, run_folder
 
 
+@command(
+    "repertoire play",
+    examples=(
+        "repertoire play --speed 0.6 --turn 0.3",
+        "repertoire play repertoire-yaw16-flat.npz --schedule wanted.toml --picture wanted.png",
+    ),
+)
 def play_actions(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
     speed: Annotated[
@@ -66,7 +60,7 @@ def play_actions(
     import numpy as np  # noqa: PLC0415  --help stays quick
 
     from snakewalk.config.playback import ScheduleConfig  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
+    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.repertoire.schedule_run import ScheduleMotion, read_schedule  # noqa: PLC0415
     from snakewalk.controller.run.execute import execute  # noqa: PLC0415

@@ -9,21 +9,9 @@ from rich.table import Table
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.options import (
-    VIEW_AT,
-    Film,
-    Force,
-    GivenRobot,
-    Json,
-    Ros,
-    RunFolder,
-    RunPort,
-    View,
-    ViewAt,
-    console,
-    show,
-    write_artifacts,
-)
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import (VIEW_AT, Film, Force, GivenRobot, Json, Ros, RunFolder, RunPort, View, ViewAt, console, show)
+from snakewalk.controller.run.finish import write_artifacts
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
@@ -32,13 +20,16 @@ from snakewalk.controller.console.result_files import (
 )
 
 if TYPE_CHECKING:
-    from snakewalk.controller.cli.watchers import Watchers
+    from snakewalk.controller.run.watchers import Watchers
     from snakewalk.controller.repertoire.repertoire import Repertoire
     from snakewalk.controller.repertoire.repertoire_run import RepertoireRun
 
 Picture = Annotated[Path | None, typer.Option(help="draw the actions' ways here")]
 
 
+@command(
+    "repertoire record", examples=("repertoire record", "repertoire record -o yaw16.npz --json")
+)
 def record(
     robot: GivenRobot = "yaw16",
     world: Annotated[
@@ -85,6 +76,7 @@ def record(
     _show_actions(file, repertoire, as_json)
 
 
+@command("repertoire show", examples=("repertoire show repertoire-yaw16-flat.npz",))
 def show_file(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
     picture: Picture = None,
@@ -105,6 +97,10 @@ def show_file(
     _show_actions(file, repertoire, as_json)
 
 
+@command(
+    "repertoire run",
+    examples=("repertoire run plan.json", "repertoire run plan.json --open-loop --json"),
+)
 def run_plan(
     plan: Annotated[Path, typer.Argument(help="made by: snakewalk plan --with repertoire -o")],
     port: RunPort = None,
@@ -123,7 +119,7 @@ def run_plan(
     """Run a plan on servos or in the simulator, and compare predicted with measured poses."""
     refuse_to_overwrite([picture], force)
 
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
+    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.repertoire.repertoire_planning import load_plan  # noqa: PLC0415  heavy
 
     job = load_plan(plan, replan=not open_loop)

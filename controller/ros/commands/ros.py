@@ -7,26 +7,24 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.options import (
-    VIEW_AT,
-    Force,
-    Json,
-    Robot,
-    RunFolder,
-    RunPort,
-    Set,
-    View,
-    ViewAt,
-    World,
-    key_values,
-    show_run,
-)
+from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.options import (VIEW_AT, Force, Json, Robot, RunFolder, RunPort, Set, View, ViewAt, World, key_values)
+from snakewalk.controller.run.finish import show_run
 from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.run.commands.gait import Param, parameters
 
 _WEEK_S = 604_800.0
 
 
+@command(
+    "ros",
+    group=JOB,
+    examples=(
+        "ros",
+        "ros --robot my.toml --port /dev/ttyUSB0 --domain 7 --namespace snake",
+        "ros --robot alternating16 --gait rolling --network",
+    ),
+)
 def ros(
     robot: Robot = None,
     world: World = None,
@@ -66,7 +64,7 @@ def ros(
     as_json: Json = False,
 ) -> None:
     """Hold a robot, and let a ROS 2 graph command, watch and stop it; servos or the simulator."""
-    from snakewalk.controller.cli.watchers import Watchers  # noqa: PLC0415  heavy
+    from snakewalk.controller.run.watchers import Watchers  # noqa: PLC0415  heavy
     from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.exchange.body_frames import joint_names  # noqa: PLC0415  --help stays quick
     from snakewalk.controller.motion.commanded import Commanded  # noqa: PLC0415

@@ -8,6 +8,7 @@ import typer
 from rich.table import Table
 
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Robot, console, key_values, show
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
 
@@ -25,6 +26,7 @@ Param = Annotated[
 ]
 
 
+@command("gait list", examples=("gait list --json",))
 def list_gaits(as_json: Json = False) -> None:
     """List the gaits, what joints they need, and the shipped sets of their parameters."""
     from snakewalk.config.loader import load_gait, shipped  # noqa: PLC0415
@@ -54,6 +56,7 @@ def list_gaits(as_json: Json = False) -> None:
         console.print(table)
 
 
+@command("gait show", examples=("gait show sidewinding", "gait show rolling --picture rolling.png"))
 def show_gait(
     name: Name,
     robot: Robot = None,

@@ -9,6 +9,7 @@ import typer
 
 from snakewalk.config.archive import why_no_file
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Robot, show
 from snakewalk.controller.console.result_files import check_picture
 
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
 COLUMNS = ("x_m", "y_m", "z_m")
 
 
+@command(
+    "gait fit",
+    examples=("gait fit CURVE.csv --picture fit.png", "gait fit CURVE.csv -o joints.npz"),
+)
 def fit_gait(
     curve: Annotated[
         Path, typer.Argument(help="table with the columns x_m, y_m, z_m: a curve, head first")

@@ -12,24 +12,9 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.options import (
-    VIEW_AT,
-    Compliant,
-    Film,
-    Force,
-    Json,
-    Robot,
-    Ros,
-    RunFolder,
-    RunPort,
-    Set,
-    Shadow,
-    View,
-    ViewAt,
-    World,
-    key_values,
-    show_run,
-)
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import (VIEW_AT, Compliant, Film, Force, Json, Robot, Ros, RunFolder, RunPort, Set, Shadow, View, ViewAt, World, key_values)
+from snakewalk.controller.run.finish import show_run
 from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.run.commands.gait import Name, Param, parameters
 
@@ -44,6 +29,14 @@ if TYPE_CHECKING:
     from snakewalk.controller.view.live_view import LiveView
 
 
+@command(
+    "gait run",
+    examples=(
+        "gait run sidewinding --param lift_rad=0.15 --seconds 10",
+        "gait run lateral-undulation --robot yaw16 --live",
+        "gait run rolling --port /dev/ttyUSB0",
+    ),
+)
 def run_gait(
     name: Name,
     robot: Robot = None,
@@ -88,7 +81,7 @@ def run_gait(
     as_json: Json = False,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
+    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.metrics.displacement import gait_displacement  # noqa: PLC0415
     from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick

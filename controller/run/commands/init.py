@@ -8,6 +8,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import Force, Json, Robot, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 
@@ -26,6 +27,11 @@ _WORLD = """The world: what the robot moves on.
 A line behind # shows a key with its default. Another ground: replace the table [ground]."""
 
 
+@command(
+    "init",
+    group=JOB,
+    examples=("init mine", "init mine --robot xl330-16", "init mine --from ramp-10-up"),
+)
 def init(
     folder: Annotated[
         Path, typer.Argument(file_okay=False, help="it is made if it is not there")

@@ -8,6 +8,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
     Force,
@@ -26,6 +27,15 @@ from snakewalk.controller.console.options import (
 from snakewalk.controller.console.result_files import refuse_to_overwrite
 
 
+@command(
+    "plan",
+    group=JOB,
+    examples=(
+        "plan",
+        "plan flat-slalom --motion serpenoid --json",
+        "plan flat-slalom --with repertoire -o plan.json --run",
+    ),
+)
 def plan(
     run: RunName = DEFAULT_RUN,
     robot: Robot = None,

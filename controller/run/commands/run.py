@@ -9,34 +9,17 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.options import (
-    DEFAULT_RUN,
-    VIEW_AT,
-    Compliant,
-    Film,
-    Force,
-    Json,
-    Look,
-    Motion,
-    Robot,
-    Ros,
-    RunFolder,
-    RunName,
-    RunPort,
-    Seed,
-    Set,
-    Shadow,
-    TrackFile,
-    View,
-    ViewAt,
-    World,
-    key_values,
-    show,
-    write_artifacts,
-)
+from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.options import (DEFAULT_RUN, VIEW_AT, Compliant, Film, Force, Json, Look, Motion, Robot, Ros, RunFolder, RunName, RunPort, Seed, Set, Shadow, TrackFile, View, ViewAt, World, key_values, show)
+from snakewalk.controller.run.finish import write_artifacts
 from snakewalk.controller.console.result_files import run_folder
 
 
+@command(
+    "run",
+    group=JOB,
+    examples=("run", "run flat-slalom --seed 3", "run my-run.toml --port /dev/ttyUSB0"),
+)
 def run(
     run: RunName = DEFAULT_RUN,
     port: RunPort = None,
@@ -82,8 +65,8 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.animals.mesh.body_look import check_look  # noqa: PLC0415
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
+    from snakewalk.controller.run.film_look import check_look  # noqa: PLC0415
+    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.console.progress import PathBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.run.factory import (  # noqa: PLC0415

@@ -8,6 +8,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import Force
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 
@@ -22,6 +23,7 @@ KINDS: Final = (
 """Of ``models``, known before they are built."""
 
 
+@command("schema", group=JOB, examples=("schema run", "schema robot -o robot.json"))
 def schema(
     kind: Annotated[
         str,

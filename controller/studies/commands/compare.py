@@ -8,6 +8,7 @@ import typer
 from rich.table import Column, Table
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
@@ -19,6 +20,14 @@ _LONGEST = 44
 """Characters of a value in the table."""
 
 
+@command(
+    "compare",
+    group=JOB,
+    examples=(
+        "compare runs/flat-square-walk-seed0/log.mcap runs/flat-square-walk-seed1/log.mcap",
+        "compare runs/*/log.mcap --picture compared.png --json",
+    ),
+)
 def compare(
     logs: Annotated[list[Path], typer.Argument(help="log.mcap of two runs or more")],
     picture: Annotated[

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import BUS, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, Robot, World, check_files, console
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
@@ -40,6 +41,17 @@ class _Outs(NamedTuple):
     robot: Path | None
 
 
+@command(
+    "identify",
+    group=BUS,
+    examples=(
+        "identify kp200.json kp800.json -o xl330.json",
+        "identify kp200.json kp800.json --robot xl330-16 --robot-out mine.toml",
+        "identify kp400.json --start xl330.json --no-fit --json",
+        "identify runs/flat-slalom-walk-seed0/log.mcap -o found.toml",
+        "identify runs/NAME/log.mcap -o found.toml --robot-out mine.toml",
+    ),
+)
 def identify(
     logs: Annotated[
         list[Path],

@@ -9,11 +9,13 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import refuse_to_overwrite
 
 
+@command("replay", group=JOB, examples=("replay runs/flat-square-walk-seed0/log.mcap --json",))
 def replay(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, simulated or on metal")],
     tolerance_rad: Annotated[

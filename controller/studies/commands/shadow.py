@@ -7,10 +7,19 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Json, World, check_files, console
 
 
+@command(
+    "shadow",
+    group=JOB,
+    examples=(
+        "shadow runs/gait-lateral-undulation-yaw16/log.mcap",
+        "gait run lateral-undulation --port /dev/ttyUSB0 --shadow",
+    ),
+)
 def shadow(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, on metal or simulated")],
     world: World = None,

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, Set, console, key_values
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
@@ -30,6 +31,14 @@ _HEADS = {
 """Columns of the printed table, units under the names; the JSON has them all."""
 
 
+@command(
+    "sweep",
+    group=MOTION,
+    examples=(
+        "sweep sidewinding rolling --points 30 -o sweep.csv --picture sweep.png",
+        "sweep --dask tcp://cluster:8786 --points 500",
+    ),
+)
 def sweep(
     gaits: Annotated[
         list[str] | None,

@@ -13,6 +13,7 @@ from rich.table import Table
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
@@ -52,6 +53,11 @@ _HEADS = {
 _TEXT = {"run", "robot", "world", "motion", "compliance", "why"}
 
 
+@command(
+    "trials",
+    group=JOB,
+    examples=("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json",),
+)
 def trials(
     runs: Annotated[
         list[str] | None,

@@ -9,10 +9,16 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.options import Json, Robot, Set, key_values, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 
 
+@command(
+    "tune",
+    group=MOTION,
+    examples=("tune sidewinding --for speed --out mine.toml", "gait run mine.toml"),
+)
 def tune(
     gait: Annotated[
         str, typer.Argument(help="one of: snakewalk gait list", autocompletion=completion.GAITS)

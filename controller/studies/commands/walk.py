@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
 
@@ -14,6 +15,11 @@ if TYPE_CHECKING:
     from snakewalk.controller.studies.graph_study import StudyResult
 
 
+@command(
+    "walk",
+    group=MOTION,
+    examples=("walk", "walk --graph er:1000:9 --rule snake --rule stack --repeats 30 --json"),
+)
 def walk(
     graph: Annotated[
         list[str] | None,

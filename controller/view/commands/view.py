@@ -7,12 +7,18 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import VIEW_AT, ViewAt
 
 _MOST = 2
 
 
+@command(
+    "view",
+    group=JOB,
+    examples=("view runs/flat-square-walk-seed0/log.mcap", "gait run sidewinding --view"),
+)
 def view(
     logs: Annotated[
         list[Path],

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.mesh.body_model import spindle
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion, even_points, from_points
+from snakewalk.controller.track.bone_motion import BoneMotion, even_points, from_points
 from snakewalk.controller.animals.mesh.cross_sections import ellipses
 from snakewalk.controller.animals.mesh.patches import Tube
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
