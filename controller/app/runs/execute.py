@@ -7,7 +7,6 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
@@ -27,7 +26,7 @@ from snakewalk.controller.app.runs.backend import (
 )
 from snakewalk.controller.app.runs.map_provider import MapProvider, map_faults, map_provider
 from snakewalk.controller.app.runs.pose_provider import PoseProvider, pose_faults, pose_provider
-from snakewalk.controller.app.runs.prepared_run import PathRun, PreparedRun, pose_with
+from snakewalk.controller.app.runs.prepared_run import PathRun, PreparedRun
 from snakewalk.controller.app.shadow.diagnosis import check_level
 from snakewalk.controller.app.shadow.run_shadow import RunShadow
 from snakewalk.controller.metrics.summary import RunSummary, summary
@@ -183,7 +182,8 @@ def execute(
                 lambda: stop_requested() or (None if button is None else button.pressed()),
                 lambda text: warn("safety", text),
             )
-            beside = _shadow(prepared, initial_pose, log, on_event) if shadow else None
+            start = initial_pose if port is None else None
+            beside = _shadow(prepared, start, log, on_event) if shadow else None
             drive = Drive(
                 link=link,
                 clock=clock,
@@ -306,17 +306,10 @@ def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:
 
 
 def _shadow(
-    prepared: PreparedRun, initial_pose: InitialPose | None, log: RunLog, on_event: OnEvent
+    prepared: PreparedRun, start: InitialPose | None, log: RunLog, on_event: OnEvent
 ) -> RunShadow:
-    """Return the shadow of a run; on servos it begins at the angles that are measured first."""
-
-    def pose(measured_rad: Floats) -> InitialPose:
-        if initial_pose is not None:
-            return initial_pose
-        return pose_with(prepared.robot, prepared.start_heading_rad, measured_rad)
-
     run, robot, world = prepared.run, prepared.robot, prepared.world
-    return RunShadow(run, robot, world, prepared.ground, pose, log, on_event)
+    return RunShadow(run, robot, world, prepared.ground, start, log, on_event)
 
 
 def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
