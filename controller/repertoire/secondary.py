@@ -11,7 +11,7 @@ _ALIKE: Final = 0.1
 """Turns that differ by less than this share of the largest one count as equal (ours)."""
 _FAR: Final = 0.25
 """A speed or turn that is off by more than this share of the largest one is far (ours)."""
-_WAYS: Final = {1: "goes forward", -1: "goes backward", 0: "rests"}
+_DIRECTIONS: Final = {1: "goes forward", -1: "goes backward", 0: "rests"}
 _SIDES: Final = {1: " and turns left", -1: " and turns right", 0: ""}
 
 
@@ -52,12 +52,12 @@ class SecondaryController:
         self._speed_m_s = scale * np.array([segment.speed_m_s for segment in segments])
         self._turn_rad_s = np.array([segment.turn_rad_s for segment in segments])
         moves = self._kinds != "rest"
-        self._way = np.where(moves, np.sign(self._speed_m_s), 0.0).astype(int)
+        self._direction = np.where(moves, np.sign(self._speed_m_s), 0.0).astype(int)
         turns = np.isin(self._kinds, ["left", "right"])
         self._side = np.where(turns, np.sign(self._turn_rad_s), 0.0).astype(int)
         steady_m_s = self._speed_m_s[self._steady]
-        self._slowest_m_s = float(steady_m_s[self._way[self._steady] > 0].min())
-        back_m_s = -steady_m_s[self._way[self._steady] < 0]
+        self._slowest_m_s = float(steady_m_s[self._direction[self._steady] > 0].min())
+        back_m_s = -steady_m_s[self._direction[self._steady] < 0]
         self._slowest_back_m_s = float(back_m_s.min(initial=np.inf))
         self._fastest_m_s = float(np.abs(steady_m_s).max())
         self._least_turn_rad_s = float(np.abs(self._turn_rad_s[turns]).min(initial=np.inf))
@@ -69,7 +69,7 @@ class SecondaryController:
 
     def nearest(self, speed_m_s: float, turn_rad_s: float = 0.0) -> int:
         """Return the nearest segment in the direction of the speed: by turn, then by speed."""
-        options = self._going(self._requested_way(speed_m_s))
+        options = self._going(self._requested_direction(speed_m_s))
         off = np.abs(self._turn_rad_s[options] - turn_rad_s)
         near = options[off <= off.min() + _ALIKE * self._most_turn_rad_s]
         return int(near[np.argmin(np.abs(self._speed_m_s[near] - speed_m_s))])
@@ -81,13 +81,17 @@ class SecondaryController:
         """
         chosen = self.nearest(speed_m_s, turn_rad_s)
         if self._kinds[chosen] == "rest":
-            # a brake goes forward: after another direction it would carry the body the wrong way
+            # a brake goes forward, also after an action that does not
             last = self._last
-            forward = last is not None and self._way[last] > 0 and self._kinds[last] != "brake"
+            forward = (
+                last is not None and self._direction[last] > 0 and self._kinds[last] != "brake"
+            )
             if forward and self._brake is not None:
                 chosen = self._brake
         elif chosen == self._last and self._patience is not None:
-            alike = (self._kinds == self._kinds[chosen]) & (self._way == self._way[chosen])
+            alike = (self._kinds == self._kinds[chosen]) & (
+                self._direction == self._direction[chosen]
+            )
             others = np.flatnonzero(alike)
             others = others[others != chosen]
             if self._repeats >= self._patience and len(others):
@@ -98,9 +102,9 @@ class SecondaryController:
 
     def missing(self, speed_m_s: float, turn_rad_s: float) -> str:
         """Return the motion that is requested and that no segment has; empty if one has it."""
-        way, side = self._requested_way(speed_m_s), self._requested_side(turn_rad_s)
-        has = (self._way == way) & (self._side == side)
-        return "" if has[self._steady].any() else _WAYS[way] + _SIDES[side]
+        direction, side = self._requested_direction(speed_m_s), self._requested_side(turn_rad_s)
+        has = (self._direction == direction) & (self._side == side)
+        return "" if has[self._steady].any() else _DIRECTIONS[direction] + _SIDES[side]
 
     def is_far(self, speed_m_s: float, turn_rad_s: float) -> bool:
         """Return whether speed or turn of the nearest segment differs much from the requested."""
@@ -120,9 +124,9 @@ class SecondaryController:
 
     def available(self) -> str:
         """Return all segments that can be selected, for a message."""
-        return ", ".join(self.text(segment) for segment in self._steady)
+        return ", ".join(self.text(int(segment)) for segment in self._steady)
 
-    def _requested_way(self, speed_m_s: float) -> int:
+    def _requested_direction(self, speed_m_s: float) -> int:
         """Return 1 forward, -1 backward, 0 at rest."""
         back_m_s = self._slowest_back_m_s
         if back_m_s == np.inf:  # none is recorded: as slow as forward
@@ -139,10 +143,10 @@ class SecondaryController:
         turns = turn_rad_s != 0.0 and abs(turn_rad_s) >= 0.5 * least_rad_s
         return int(np.sign(turn_rad_s)) if turns else 0
 
-    def _going(self, way: int) -> Indices:
+    def _going(self, direction: int) -> Indices:
         """Return the segments of a direction; else those that rest, else the slowest."""
-        for wanted in (way, 0):
-            options = self._steady[self._way[self._steady] == wanted]
+        for wanted in (direction, 0):
+            options = self._steady[self._direction[self._steady] == wanted]
             if len(options):
                 return np.asarray(options)
         slowest = np.abs(self._speed_m_s[self._steady]).argmin()
