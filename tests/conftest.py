@@ -9,7 +9,7 @@ import pytest
 from dynamixel_sdk import PortHandler
 from hypothesis import settings
 
-from snakewalk.controller.app.cli.main import leave_out_avx512
+from snakewalk.controller.cli.main import leave_out_avx512
 
 # numpy is not imported yet: tests and the programs that they start compute the same bits, on a
 # processor with AVX-512, too
