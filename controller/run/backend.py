@@ -51,6 +51,8 @@ class Backend:
     """What the motors have taken in and done so far."""
     twin: Callable[[], Twin] | None = None
     """Makes a second body, on which motion is tried; None where time does not wait for it."""
+    lay_down: Callable[[InitialPose], None] | None = None
+    """Puts a simulated body elsewhere on its level floor, where its servos hold it; else None."""
 
 
 def simulated(
@@ -102,6 +104,13 @@ def simulated(
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
     )
+
+    def lay_down(pose: InitialPose) -> None:
+        line.settle()
+        shaft_rad = deviation.shaft_rad(pose.joint_rad)
+        plant.lay_down(run.start_m, pose.heading_rad, shaft_rad)
+        line.firmware.hold_position()
+
     drive = line.firmware.drive
     if deviation.torque is not None:
         drive.torque_constant_n_m_a[:] *= deviation.torque
@@ -114,6 +123,7 @@ def simulated(
         lambda: line.busy_s,
         lambda: MotorEnergy(float(drive.drawn_j.sum()), float(drive.work_j.sum())),
         lambda: PlantTwin(robot, world, ground),
+        lay_down,
     )
 
 

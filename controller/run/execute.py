@@ -7,7 +7,6 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
@@ -30,7 +29,7 @@ from snakewalk.controller.run.backend import (
     split,
 )
 from snakewalk.controller.run.map_provider import MapProvider, map_faults, map_provider
-from snakewalk.controller.run.prepared_run import PathRun, PreparedRun, pose_with
+from snakewalk.controller.run.prepared_run import PathRun, PreparedRun
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import InitialPose, RunRecord, Winding
 from snakewalk.controller.runlog.writer import RunLog
@@ -181,7 +180,8 @@ def execute(
                 lambda: stop_requested() or (None if button is None else button.pressed()),
                 lambda text: warn("safety", text),
             )
-            beside = _shadow(prepared, initial_pose, log, on_event) if shadow else None
+            start = initial_pose if port is None else None
+            beside = _shadow(prepared, start, log, on_event) if shadow else None
             drive = Drive(
                 link=link,
                 clock=clock,
@@ -304,17 +304,10 @@ def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:
 
 
 def _shadow(
-    prepared: PreparedRun, initial_pose: InitialPose | None, log: RunLog, on_event: OnEvent
+    prepared: PreparedRun, start: InitialPose | None, log: RunLog, on_event: OnEvent
 ) -> RunShadow:
-    """Return the shadow of a run; on servos it begins at the angles that are measured first."""
-
-    def pose(measured_rad: Floats) -> InitialPose:
-        if initial_pose is not None:
-            return initial_pose
-        return pose_with(prepared.robot, prepared.start_heading_rad, measured_rad)
-
     run, robot, world = prepared.run, prepared.robot, prepared.world
-    return RunShadow(run, robot, world, prepared.ground, pose, log, on_event)
+    return RunShadow(run, robot, world, prepared.ground, start, log, on_event)
 
 
 def check_compliance(run: RunConfig, robot: RobotConfig) -> None:

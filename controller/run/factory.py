@@ -24,6 +24,7 @@ from snakewalk.config.playback import ScheduleConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.gaits.gait import Gait, fitting_robot
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.motion.policy import load_policy
@@ -409,7 +410,8 @@ def prepare_schedule(
     Robot and world are by default those of the recording.
 
     Raises:
-        InputError: no repertoire, or one of other joints; a ground that is not flat.
+        InputError: no repertoire, or one of other joints; a ground that is not flat; no action for
+            a requested direction.
 
     """
     keys = _checked_keys(keys, _OF_A_SCHEDULE)
@@ -428,6 +430,9 @@ def prepare_schedule(
     _check_servos(run, body)
     prepared = ScheduleRun(run, body, with_keys_of("world", load_world(run.world), keys))
     prepared.check_plan()
+    remark = prepared.remark()
+    if remark is not None:
+        LOGGER.warning("%s", remark)
     return prepared
 
 
