@@ -1,6 +1,6 @@
 """Schemas of cameras: one above a level floor, and a stereo pair on the robot."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 

@@ -9,4 +9,6 @@ PLUGINS = (
     ("command", "fish synthesise", "Put segments of a film together anew, at random or through control points.", "snakewalk.controller.animals.commands.fish:synthesise", ""),
     ("command", "stride", "Measure one cycle of a tracked animal with legs ([KP] 4.2.2): contacts, phases, bends.", "snakewalk.controller.animals.commands.stride:stride", "Recordings"),
     ("command", "synthesise", "Make an animal's motion over a world: a snake's by states ([PT]), or that of legs ([KP]).", "snakewalk.controller.animals.commands.synthesise:synthesise", "Motion"),
+    ("look", "animal", "The animal of the run's recording, or a plain snake.", "snakewalk.controller.animals.mesh.body_look:AnimalLook", ""),
+    ("look", "body", "The skin of a named body, or of a body's file.", "snakewalk.controller.animals.mesh.body_look:BodyLook", ""),
 )

@@ -7,4 +7,5 @@ PLUGINS = (
     ("command", "camera calibrate", "Find a camera's lens from pictures of the board of `camera board`, by OpenCV's calibration.", "snakewalk.controller.cameras.commands.lens:calibrate_camera", ""),
     ("command", "camera check", "Look through a run's camera, or the simulator's: markers, frame rate, latency, light.", "snakewalk.controller.cameras.commands.check:check", ""),
     ("command", "camera markers", "Draw markers for the floor under the camera; print them without scaling.", "snakewalk.controller.cameras.commands.markers:markers", ""),
+    ("pose", "camera", "A camera that looks down on a level floor.", "snakewalk.controller.cameras.camera_source:OverheadCameraPose", ""),
 )

@@ -78,12 +78,20 @@ class CommandGroup(TyperGroup):
         finally:
             self._is_listing = False
 
-    def main(self, *args: Any, standalone_mode: bool = True, **options: Any) -> Any:
+    def main(
+        self,
+        args: Any = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        *more: Any,
+        **options: Any,
+    ) -> Any:
         """Run the command line of a process; wrong words end it with one line and exit code 2."""
         if not standalone_mode:
-            return super().main(*args, standalone_mode=False, **options)
+            return super().main(args, prog_name, complete_var, False, *more, **options)
         try:
-            code = super().main(*args, standalone_mode=False, **options)
+            code = super().main(args, prog_name, complete_var, False, *more, **options)
         except Exception as error:
             if hasattr(error, "format_message"):  # an error of typer's or click's
                 _print_fault(error)

@@ -253,6 +253,7 @@ def _text(value: object) -> str:
         return ", ".join(_text(one) for one in value) or "-"
     return "-" if value is None else str(value)
 
+
 RobotName = Annotated[
     str, typer.Argument(help="shipped robot, or a TOML file", autocompletion=completion.ROBOTS)
 ]

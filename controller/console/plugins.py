@@ -16,7 +16,6 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, Final
 
-import snakewalk.controller
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.messages import LOGGER
 
@@ -118,8 +117,7 @@ def unknown(option: str, name: str, valid: Iterable[str]) -> str:
 @cache
 def own_plugins() -> tuple[Plugin, ...]:
     """Return the plug-ins of snakewalk's own packages."""
-    folders = [Path(place) for place in snakewalk.controller.__path__]
-    manifests = sorted(file for folder in folders for file in folder.glob("*/manifest.py"))
+    manifests = sorted(Path(__file__).parents[1].glob("*/manifest.py"))
     return tuple(
         plugin
         for file in manifests

@@ -8,4 +8,6 @@ PLUGINS = (
     ("command", "repertoire record", "Run forward, left and right actions on the physics and keep a settled cycle of each.", "snakewalk.controller.repertoire.commands.repertoire:record", ""),
     ("command", "repertoire run", "Run a plan on servos or in the simulator, and compare predicted with measured poses.", "snakewalk.controller.repertoire.commands.repertoire:run_plan", ""),
     ("command", "repertoire show", "Show the actions of a repertoire: speed, turn and closure error of a cycle.", "snakewalk.controller.repertoire.commands.repertoire:show_file", ""),
+    ("planner", "repertoire", "Search over recorded actions; show, and where asked save, time on the physics, and run.", "snakewalk.controller.repertoire.commands.plan_route:plan_with_repertoire", ""),
+    ("run", "repertoire", "Recorded actions played by a schedule of speeds and turns.", "snakewalk.controller.repertoire.prepare_schedule:prepare_repertoire", ""),
 )

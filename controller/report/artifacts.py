@@ -5,9 +5,6 @@ from pathlib import Path
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.run.film_look import SERVOS, film_look
-from snakewalk.controller.run.finish import Artifacts
-from snakewalk.controller.run.summary_file import write_summary
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.progress import ProgressBar
@@ -15,6 +12,9 @@ from snakewalk.controller.console.result_files import FILM, LOG, REPORT, SUMMARY
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.report.film import film_run, film_times
 from snakewalk.controller.report.page import Section, film_html, page
+from snakewalk.controller.run.film_look import SERVOS, film_look
+from snakewalk.controller.run.finish import Artifacts
+from snakewalk.controller.run.summary_file import write_summary
 from snakewalk.controller.runlog.record import RunRecord
 
 

@@ -5,7 +5,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
@@ -13,12 +13,11 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import DeviationConfig, RunConfig
 from snakewalk.config.world import FlatGround, WaterGround
 from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.plugins import require
 from snakewalk.controller.console.result_files import LOG, clear_run, refuse_another_run
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
-from snakewalk.controller.run.pose_provider import PoseProvider, pose_faults, pose_provider
-from snakewalk.controller.run.summary_file import write_summary
 from snakewalk.controller.run.backend import (
     Backend,
     is_split,
@@ -29,11 +28,14 @@ from snakewalk.controller.run.backend import (
     split,
 )
 from snakewalk.controller.run.map_provider import MapProvider, map_faults, map_provider
+from snakewalk.controller.run.pose_provider import PoseProvider, pose_faults, pose_provider
 from snakewalk.controller.run.prepared_run import PathRun, PreparedRun
+from snakewalk.controller.run.summary_file import write_summary
+from snakewalk.controller.run.watchers import SHADOW
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import InitialPose, RunRecord, Winding
 from snakewalk.controller.runlog.writer import RunLog
-from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outcome
+from snakewalk.controller.runtime.drive import CycleObserver, Drive, OnEvent, OnProgress, Outcome
 from snakewalk.controller.runtime.friction_monitor import (
     FrictionMonitor,
     OnPaper,
@@ -54,6 +56,14 @@ from snakewalk.drivers.safety.stop_button import StopButton
 
 if TYPE_CHECKING:
     from snakewalk.controller.run.watcher import Watcher
+
+
+class RunObserver(CycleObserver, Protocol):
+    """An observer of every cycle, which also says something at the end of the run."""
+
+    def end(self, time_s: float) -> None:
+        """Report; torque is off."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,14 +310,21 @@ def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:
     check_compliance(prepared.run, prepared.robot)
     if shadow:
         require_extra("a shadow needs", "mujoco")
-        check_level(prepared.world)
+        _shadow_plugin().check(prepared.world)
 
 
 def _shadow(
     prepared: PreparedRun, start: InitialPose | None, log: RunLog, on_event: OnEvent
-) -> RunShadow:
+) -> RunObserver:
     run, robot, world = prepared.run, prepared.robot, prepared.world
-    return RunShadow(run, robot, world, prepared.ground, start, log, on_event)
+    observer: RunObserver = _shadow_plugin()(
+        run, robot, world, prepared.ground, start, log, on_event
+    )
+    return observer
+
+
+def _shadow_plugin() -> Any:
+    return require("observer", SHADOW, "--shadow").load()
 
 
 def check_compliance(run: RunConfig, robot: RobotConfig) -> None:

@@ -52,7 +52,7 @@ def write_artifacts(
 ) -> Artifacts:
     """Make the report and the film of a run; print on standard error what could not be made."""
     try:
-        made = require("results", "report", "--film").load()(
+        made: Artifacts = require("results", "report", "--film").load()(
             record, folder, numbers, film=film, fine=fine, look=look, made=_what_made_it()
         )
     except KeyboardInterrupt as stop:

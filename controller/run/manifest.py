@@ -8,8 +8,12 @@ PLUGINS = (
     ("command", "gait run", "Run a gait on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.run.commands.gait_run:run_gait", ""),
     ("command", "gait show", "Show a gait's parameters with ranges and units, its source, and how fast joints must be.", "snakewalk.controller.run.commands.gait:show_gait", ""),
     ("command", "init", "Write run.toml, robot.toml and world.toml to change, with their schemas for editors.", "snakewalk.controller.run.commands.init:init", "The job"),
+    ("command", "list", "List what is shipped and installed: runs, robots, worlds, recordings, policies, plug-ins.", "snakewalk.controller.run.commands.list:list_", "The job"),
     ("command", "plan", "Judge a run on paper: library, path and joint limits, with no servo and no simulator.", "snakewalk.controller.run.commands.plan:plan", "The job"),
     ("command", "play", "Play a recording on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.run.commands.play:play", "Motion"),
     ("command", "run", "Run a job on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.run.commands.run:run", "The job"),
     ("command", "schema", "Print the JSON Schema of a TOML file, with which editors complete and check it.", "snakewalk.controller.run.commands.schema:schema", "The job"),
+    ("pose", "imu", "Dead reckoning from the joint angles and the heading of the robot's IMU.", "snakewalk.controller.run.pose_provider:ImuPose", ""),
+    ("pose", "joints", "Dead reckoning from the joint angles alone.", "snakewalk.controller.run.pose_provider:JointsPose", ""),
+    ("pose", "simulator", "The true pose of the simulated body.", "snakewalk.controller.run.pose_provider:SimulatorPose", ""),
 )

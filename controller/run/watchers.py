@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
@@ -14,10 +14,31 @@ PAGE, ROS, SHADOW = "page", "ros", "shadow"
 """Observers that have an option of their own."""
 
 
+class PageControls(Watcher, Protocol):
+    """The page of a run, which may also command it."""
+
+    @property
+    def held(self) -> bool:
+        """Whether the dead man's button is held; True without one."""
+        ...
+
+    def pressed(self) -> list[str]:
+        """Return what was set in the page since the last call."""
+        ...
+
+    def on_gait(self, name: str, parameters: dict[str, float]) -> None:
+        """Show the gait that an operator runs."""
+        ...
+
+    def on_course(self) -> None:
+        """Accept waypoints by clicks."""
+        ...
+
+
 class Watchers:
     """A ``Watcher`` that passes on what it receives."""
 
-    def __init__(self, page: Any, *others: Watcher | None) -> None:
+    def __init__(self, page: PageControls | None, *others: Watcher | None) -> None:
         self.page = page
         """The page of the run, which may also command it; None without a page."""
         self._watchers: list[Watcher] = [one for one in (page, *others) if one is not None]

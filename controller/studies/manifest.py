@@ -11,4 +11,5 @@ PLUGINS = (
     ("command", "trials", "Simulate runs or gaits over seeds; tabulate what was reached, and why not.", "snakewalk.controller.studies.commands.trials:trials", "The job"),
     ("command", "tune", "Search a gait's parameters for speed or efficiency, and compare with the defaults.", "snakewalk.controller.studies.commands.tune:tune", "Motion"),
     ("command", "walk", "Walk graphs of states until all are seen: how many steps, and how soon states come again.", "snakewalk.controller.studies.commands.walk:walk", "Motion"),
+    ("observer", "shadow", "The shadow of a run: logs each cycle, raises the alarm, and names the cause at the end.", "snakewalk.controller.studies.shadow.run_shadow:RunShadow", ""),
 )

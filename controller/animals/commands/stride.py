@@ -27,7 +27,8 @@ from snakewalk.controller.console.result_files import (
     "stride",
     group=RECORDINGS,
     examples=(
-        "stride TRACKED.h5 --spine nose,neck,hip,tail --girdles neck,hip --feet FL,FR,HL,HR -o mine.toml --picture stride.png",
+        "stride TRACKED.h5 --spine nose,neck,hip,tail --girdles neck,hip "
+        "--feet FL,FR,HL,HR -o mine.toml --picture stride.png",
         "synthesise jacksboro-traverse --animal mine.toml --film",
     ),
 )

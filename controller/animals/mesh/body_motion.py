@@ -12,12 +12,6 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import Water
 from snakewalk.controller.animals.fish.postures import holds_postures, load_postures
-from snakewalk.controller.track.bone_motion import (
-    BoneMotion,
-    even_points,
-    from_points,
-    swimming,
-)
 from snakewalk.controller.animals.mesh.skin import Skin
 from snakewalk.controller.console.result_files import LOG
 from snakewalk.controller.gaits.registry import GAITS, SPINE_GAITS
@@ -26,6 +20,12 @@ from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.report.film import body_qpos
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.track.bone_motion import (
+    BoneMotion,
+    even_points,
+    from_points,
+    swimming,
+)
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.drivers.types import BodyPose
 
@@ -51,7 +51,9 @@ def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, B
     if source in GAITS:
         gait = GAITS[source]
         if not issubclass(gait, SpineGait):
-            raise InputError(f"{source}: moves a robot, not a spine; spines: {', '.join(SPINE_GAITS)}")
+            raise InputError(
+                f"{source}: moves a robot, not a spine; spines: {', '.join(SPINE_GAITS)}"
+            )
         if fps is not None:
             raise InputError(f"{source}: a cycle has 24 frames; fps is for recordings and logs")
         return skin, swimming(gait(), skin.length_m)

@@ -7,8 +7,7 @@ from rich.table import Table
 
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Json, console, show
-from snakewalk.controller.console.options import RobotName
+from snakewalk.controller.console.options import Json, RobotName, console, show
 
 
 @command("robot power", examples=("robot power alternating16", "robot power my.toml --current 0.5"))

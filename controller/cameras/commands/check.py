@@ -35,17 +35,15 @@ def check(
     With --port the joints are read, never moved: turn one by hand, unevenly, for the latency.
     """
     require_extra("a camera's check needs", "cv2", "skimage")
-    from dataclasses import replace  # noqa: PLC0415  --help stays quick
-
     from snakewalk.controller.cameras.camera_findings import camera_findings  # noqa: PLC0415
     from snakewalk.controller.cameras.camera_watch import CameraWatch, nobody  # noqa: PLC0415
+    from snakewalk.controller.run.factory import changed, prepare_job  # noqa: PLC0415
     from snakewalk.controller.run.pose_provider import pose_faults  # noqa: PLC0415
-    from snakewalk.controller.run.factory import prepare_job  # noqa: PLC0415
 
     prepared = prepare_job(run, keys=key_values("--set", set_))
     if device is not None:
         camera = prepared.run.camera.model_copy(update={"device": device})
-        prepared = replace(prepared, run=prepared.run.model_copy(update={"camera": camera}))
+        prepared = changed(prepared, run=prepared.run.model_copy(update={"camera": camera}))
     watch = CameraWatch(prepared, port)
     if watch.name == "simulated":
         job = prepared.run.model_copy(update={"pose": "camera"})

@@ -14,9 +14,28 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import (VIEW_AT, Film, FirstSeed, Force, GivenRobot, GivenWorld, Json, Robot, Ros, RunFolder, RunPort, Set, Shadow, View, ViewAt, World, console, key_values)
-from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.console.options import (
+    VIEW_AT,
+    Film,
+    FirstSeed,
+    Force,
+    GivenRobot,
+    GivenWorld,
+    Json,
+    Robot,
+    Ros,
+    RunFolder,
+    RunPort,
+    Set,
+    Shadow,
+    View,
+    ViewAt,
+    World,
+    console,
+    key_values,
+)
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite, run_folder
+from snakewalk.controller.run.finish import show_run
 
 if TYPE_CHECKING:
     from snakewalk.controller.learning.policy_trials import PolicyTrial, PolicyTrialResult
@@ -87,10 +106,10 @@ def run_policy(
     as_json: Json = False,
 ) -> None:
     """Run a learnt policy on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.run.factory import prepare_policy  # noqa: PLC0415
+    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
 
     keys = key_values("--set", set_)
     prepared = prepare_policy(name, robot=robot, world=world, seconds=seconds, seed=seed, keys=keys)

@@ -10,19 +10,32 @@ from rich.table import Table
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import (VIEW_AT, Film, Force, GivenRobot, Json, Ros, RunFolder, RunPort, View, ViewAt, console, show)
-from snakewalk.controller.run.finish import write_artifacts
+from snakewalk.controller.console.options import (
+    VIEW_AT,
+    Film,
+    Force,
+    GivenRobot,
+    Json,
+    Ros,
+    RunFolder,
+    RunPort,
+    View,
+    ViewAt,
+    console,
+    show,
+)
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
     refuse_to_overwrite,
     run_folder,
 )
+from snakewalk.controller.run.finish import write_artifacts
 
 if TYPE_CHECKING:
-    from snakewalk.controller.run.watchers import Watchers
     from snakewalk.controller.repertoire.repertoire import Repertoire
     from snakewalk.controller.repertoire.repertoire_run import RepertoireRun
+    from snakewalk.controller.run.watchers import Watchers
 
 Picture = Annotated[Path | None, typer.Option(help="draw the actions' ways here")]
 
@@ -119,8 +132,8 @@ def run_plan(
     """Run a plan on servos or in the simulator, and compare predicted with measured poses."""
     refuse_to_overwrite([picture], force)
 
-    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.repertoire.repertoire_planning import load_plan  # noqa: PLC0415  heavy
+    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
 
     job = load_plan(plan, replan=not open_loop)
     with watched(view, view_at, ros) as watchers:

@@ -7,9 +7,9 @@ import typer
 
 from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import (Force, Json, Look, show)
-from snakewalk.controller.run.finish import write_artifacts
+from snakewalk.controller.console.options import Force, Json, Look, show
 from snakewalk.controller.console.result_files import refuse_mixture
+from snakewalk.controller.run.finish import write_artifacts
 
 
 @command("report", group=JOB, examples=("report runs/flat-square-walk-seed0/log.mcap",))

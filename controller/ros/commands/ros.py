@@ -1,6 +1,7 @@
 """``snakewalk ros``: a robot in a ROS 2 graph."""
 
 import re
+from contextlib import nullcontext
 from typing import Annotated
 
 import typer
@@ -8,10 +9,22 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import JOB, command
-from snakewalk.controller.console.options import (VIEW_AT, Force, Json, Robot, RunFolder, RunPort, Set, View, ViewAt, World, key_values)
-from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.console.options import (
+    VIEW_AT,
+    Force,
+    Json,
+    Robot,
+    RunFolder,
+    RunPort,
+    Set,
+    View,
+    ViewAt,
+    World,
+    key_values,
+)
 from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.run.commands.gait import Param, parameters
+from snakewalk.controller.run.finish import show_run
 
 _WEEK_S = 604_800.0
 
@@ -64,7 +77,6 @@ def ros(
     as_json: Json = False,
 ) -> None:
     """Hold a robot, and let a ROS 2 graph command, watch and stop it; servos or the simulator."""
-    from snakewalk.controller.run.watchers import Watchers  # noqa: PLC0415  heavy
     from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.exchange.body_frames import joint_names  # noqa: PLC0415  --help stays quick
     from snakewalk.controller.motion.commanded import Commanded  # noqa: PLC0415
@@ -72,7 +84,7 @@ def ros(
     from snakewalk.controller.ros.ros_options import RosOptions  # noqa: PLC0415
     from snakewalk.controller.run.execute import execute  # noqa: PLC0415
     from snakewalk.controller.run.factory import gait_by_name, prepare_commanded  # noqa: PLC0415
-    from snakewalk.controller.view.live_view import open_view  # noqa: PLC0415
+    from snakewalk.controller.run.watchers import PAGE, Watchers, open_observer  # noqa: PLC0415  heavy
 
     if not timeout > 0.0:
         raise InputError(f"--timeout {timeout:g}: expected seconds over 0, or inf")
@@ -80,8 +92,8 @@ def ros(
         raise InputError(f"--namespace {namespace}: expected a name as snake or lab/snake")
     options = RosOptions(domain, namespace, network, commands=True, timeout_s=timeout)
     begun = None if gait is None else gait_by_name(gait, parameters(param))[0]
-    with open_ros(options) as link, open_view(view, view_at) as page:
-        assert link is not None, "it is asked for"
+    opened = open_observer(PAGE, view_at) if view else nullcontext()
+    with open_ros(options) as link, opened as page:
         prepared = prepare_commanded(
             lambda body, on_event: Commanded(
                 body,

@@ -13,10 +13,26 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import (VIEW_AT, Compliant, Film, Force, Json, Robot, Ros, RunFolder, RunPort, Set, Shadow, View, ViewAt, World, key_values)
-from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.console.options import (
+    VIEW_AT,
+    Compliant,
+    Film,
+    Force,
+    Json,
+    Robot,
+    Ros,
+    RunFolder,
+    RunPort,
+    Set,
+    Shadow,
+    View,
+    ViewAt,
+    World,
+    key_values,
+)
 from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.run.commands.gait import Name, Param, parameters
+from snakewalk.controller.run.finish import show_run
 
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
@@ -25,8 +41,8 @@ if TYPE_CHECKING:
     from snakewalk.controller.motion.gait_motion import GaitMotion
     from snakewalk.controller.motion.operator import Operator
     from snakewalk.controller.run.gait_run import GaitRun
+    from snakewalk.controller.run.watchers import PageControls
     from snakewalk.controller.runtime.drive import OnEvent
-    from snakewalk.controller.view.live_view import LiveView
 
 
 @command(
@@ -81,11 +97,11 @@ def run_gait(
     as_json: Json = False,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.metrics.displacement import gait_displacement  # noqa: PLC0415
     from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.run.factory import prepare_gait, with_compliance  # noqa: PLC0415
+    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
 
     if by not in {"blend", "cpg"}:
         raise InputError(f"--by {by}: expected blend or cpg")
@@ -158,7 +174,7 @@ class _Hands:
     """What an operator has in hand: keyboard, gamepad, page."""
 
     def __init__(
-        self, devices: "list[Keyboard | Gamepad | LiveView]", page: "LiveView | None"
+        self, devices: "list[Keyboard | Gamepad | PageControls]", page: "PageControls | None"
     ) -> None:
         self._devices = devices
         self._page = page
@@ -206,7 +222,7 @@ class _Hands:
 
 
 def _hands(
-    stack: ExitStack, live: bool, gamepad: Path | None, page: "LiveView | None"
+    stack: ExitStack, live: bool, gamepad: Path | None, page: "PageControls | None"
 ) -> _Hands | None:
     """Open what an operator has in hand, and say what it does; None without an operator."""
     if not live and gamepad is None:
@@ -218,7 +234,7 @@ def _hands(
     from snakewalk.controller.console.keyboard import Keyboard  # noqa: PLC0415
     from snakewalk.controller.motion.operator import KEYS  # noqa: PLC0415
 
-    devices: list[Keyboard | Gamepad | LiveView] = []
+    devices: list[Keyboard | Gamepad | PageControls] = []
     keys: list[str] = []
     if page is not None:
         devices.append(page)

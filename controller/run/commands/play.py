@@ -7,9 +7,23 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import MOTION, command
-from snakewalk.controller.console.options import (VIEW_AT, Film, Force, Json, Robot, Ros, RunFolder, RunPort, Set, View, ViewAt, World, key_values)
-from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.console.options import (
+    VIEW_AT,
+    Film,
+    Force,
+    Json,
+    Robot,
+    Ros,
+    RunFolder,
+    RunPort,
+    Set,
+    View,
+    ViewAt,
+    World,
+    key_values,
+)
 from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.run.finish import show_run
 
 
 @command(
@@ -44,10 +58,10 @@ def play(
     as_json: Json = False,
 ) -> None:
     """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
     from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
     from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.run.factory import prepare_playback  # noqa: PLC0415
+    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
 
     prepared = prepare_playback(
         track,

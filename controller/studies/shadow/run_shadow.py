@@ -12,12 +12,14 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.command import plugin
 from snakewalk.controller.run.prepared_run import pose_with
 from snakewalk.controller.runlog.record import InitialPose
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.studies.shadow.diagnosis import (
     LEAST_S,
     MOST_S,
+    check_level,
     diagnose,
     is_gap,
     last_part,
@@ -76,6 +78,7 @@ class ShadowAlarm:
         )
 
 
+@plugin("observer", "shadow")
 class RunShadow:
     """The shadow of a run: logs each cycle, raises the alarm, and names the cause at the end.
 
@@ -117,6 +120,16 @@ class RunShadow:
         self._shadow = Shadow(run, robot, world, ground, start)
         self._first_s: float | None = None
         self._last_s = 0.0
+
+    @staticmethod
+    def check(world: WorldConfig) -> None:
+        """Reject ground on which a shadow means nothing.
+
+        Raises:
+            InputError: the ground is no level, open floor.
+
+        """
+        check_level(world)
 
     def begin(self, state: JointState) -> None:
         """Put the shadow where the joints are; quick, as torque is on."""

@@ -1,6 +1,5 @@
-"""``snakewalk list`` and ``robot``: what is shipped; a robot in figures, and as files."""
+"""``snakewalk robot``: a robot in figures, and as files of other programs."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -8,42 +7,9 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import JOB, command
-from snakewalk.controller.console.options import Force, Json, console, show
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Force, Json, RobotName, console, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
-
-RobotName = Annotated[
-    str, typer.Argument(help="shipped robot, or a TOML file", autocompletion=completion.ROBOTS)
-]
-
-
-@command("list", group=JOB, examples=("list --json",))
-def list_(as_json: Json = False) -> None:
-    """List what is shipped: runs, robots, worlds, recordings, policies, sets of gait parameters."""
-    from snakewalk.config.loader import load_gait, load_robot, load_run, load_world, shipped  # noqa: PLC0415  --help stays quick
-
-    rows = {
-        "runs": [[n, f"{(r := load_run(n)).robot} on {r.world}"] for n in shipped("runs")],
-        "robots": [
-            [n, f"{b.joint_count} {', '.join(dict.fromkeys(b.servo_models))}, {b.length_m:.2f} m"]
-            for n in shipped("robots")
-            for b in [load_robot(n)]
-        ],
-        "worlds": [[n, load_world(n).ground.kind] for n in shipped("worlds")],
-        "recordings": [[n, "snakewalk track, play, run --track"] for n in shipped("recordings")],
-        "policies": [[n, "snakewalk policy list, run"] for n in shipped("policies")],
-        "gaits": [[n, f"{(g := load_gait(n)).gait} on {g.robot}"] for n in shipped("gaits")],
-    }
-    if as_json:
-        print(json.dumps({kind: [name for name, _ in rs] for kind, rs in rows.items()}))
-        return
-    for kind, lines in rows.items():
-        table = Table(title=kind, title_justify="left", box=None, show_header=False)
-        for line in lines:
-            table.add_row(f"  {line[0]}", line[1])
-        console.print(table)
-    console.print("all gaits: snakewalk gait list")
 
 
 @command("robot show", examples=("robot show alternating16", "robot show my.toml"))
