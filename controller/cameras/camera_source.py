@@ -8,6 +8,7 @@ from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import FlatGround, WorldConfig
+from snakewalk.controller.cameras.camera_pose import CameraPose
 from snakewalk.controller.cameras.device_camera import DeviceCamera
 from snakewalk.controller.cameras.rendered_camera import RenderedCamera
 from snakewalk.controller.console.command import plugin
@@ -47,8 +48,6 @@ class OverheadCameraPose:
             InputError: the camera is not there, or does not show the robot.
 
         """
-        from snakewalk.controller.cameras.camera_pose import CameraPose  # noqa: PLC0415  OpenCV is an extra
-
         robot = context.prepared.robot
         with closing(_camera(context)) as device:
             measure = CameraPose(

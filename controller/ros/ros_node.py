@@ -35,6 +35,7 @@ from snakewalk.controller.motion.command import (
 )
 from snakewalk.controller.ros.command_codec import encode_command
 from snakewalk.controller.ros.ros_options import RosOptions
+from snakewalk.controller.run.factory import gait_by_name, is_gait
 from snakewalk.controller.runlog.record import Header, RunRecord
 from snakewalk.controller.runlog.row_line import WatcherEnd
 from snakewalk.controller.runlog.tables import record_of
@@ -339,7 +340,6 @@ class RobotNode:
         if not words:
             self._command(HoldStill(), None, "gait")
             return
-        from snakewalk.controller.run.factory import gait_by_name, is_gait  # noqa: PLC0415
 
         command: Command
         try:

@@ -53,6 +53,7 @@ from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
+from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad
 
 if TYPE_CHECKING:
     from snakewalk.controller.run.watcher import Watcher
@@ -353,8 +354,6 @@ def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
 
 def _current_gain_a_rad(robot: RobotConfig) -> float:
     """Current of the stiffest joint per radian of lead; 0 where no motor is known."""
-    from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad  # noqa: PLC0415  figures only
-
     gains_a_rad = [0.0]
     for motor, gain in zip(known_motors(robot), robot.position_p_gains, strict=True):
         if motor is not None:
@@ -368,8 +367,6 @@ def _motor(robot: RobotConfig) -> tuple[float, Winding | None]:
 
     NaN and None where the simulator has no such model, or the servos are of several.
     """
-    from snakewalk.sim.servo.motor import known_motors  # noqa: PLC0415  only for these figures
-
     motors = set(known_motors(robot))
     motor = motors.pop()
     if motor is None or motors:

@@ -10,6 +10,12 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.animals.mesh import body_model as model
+from snakewalk.controller.animals.mesh.body_model import pose, straight
+from snakewalk.controller.animals.mesh.body_motion import animated
+from snakewalk.controller.animals.mesh.mesh import body_mesh
+from snakewalk.controller.animals.mesh.rig import spine_rig
+from snakewalk.controller.animals.mesh.skin_texture import unroll
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import Force, Json, show
@@ -18,6 +24,7 @@ from snakewalk.controller.console.result_files import (
     check_picture,
     refuse_to_overwrite,
 )
+from snakewalk.controller.track.readers.generated import EMBEDDED, embedded
 
 if TYPE_CHECKING:
     import numpy as np
@@ -159,9 +166,6 @@ class _Made:
 
     def solid(self, body: _Measured, skeleton: Floats | None, image: Path | None) -> None:
         """Write the ellipses along a skeleton; None is straight."""
-        from snakewalk.controller.animals.mesh.body_model import straight  # noqa: PLC0415
-        from snakewalk.controller.animals.mesh.mesh import body_mesh  # noqa: PLC0415
-
         one = body.model
         mesh = body_mesh(one, straight() if skeleton is None else skeleton)
         files = self._write(mesh, body.texture)
@@ -191,8 +195,6 @@ class _Made:
         if animate is None:
             files = self._write(skin.mesh, body.texture)
         else:
-            from snakewalk.controller.animals.mesh.body_motion import animated  # noqa: PLC0415
-            from snakewalk.controller.animals.mesh.rig import spine_rig  # noqa: PLC0415
             from snakewalk.controller.animals.mesh.skin_file import write_skin  # noqa: PLC0415
 
             if self.output.suffix.lower() != ".glb":
@@ -270,9 +272,6 @@ def _measure(
     track: str, image: Path | None, frame: int, side: Path | None, aspect: float
 ) -> _Measured:
     """Widths of a recording, and its texture from a picture."""
-    from snakewalk.controller.animals.mesh import body_model as model  # noqa: PLC0415  heavy
-    from snakewalk.controller.track.readers.generated import EMBEDDED, embedded  # noqa: PLC0415
-
     if track in EMBEDDED:
         if image is not None or side is not None:
             raise InputError(f"{track}: is made from figures, without widths; give an .npz")
@@ -291,16 +290,12 @@ def _measure(
 
 def _skeleton(track: str, points: Floats, frame: int) -> Floats:
     """Skeleton of one frame, in body lengths."""
-    from snakewalk.controller.animals.mesh.body_model import pose  # noqa: PLC0415
-
     _check_frame(track, points, frame)
     return pose(points[frame])
 
 
 def _texture(image: Path, shown: tuple[Image, Floats, Floats], pixels: bool) -> Image:
     """Strip of the skin from a picture, the skeleton in it and its radii."""
-    from snakewalk.controller.animals.mesh.skin_texture import unroll  # noqa: PLC0415
-
     picture, points, radius = shown
     if not pixels:
         raise InputError(f"{image}: the track holds no places in pictures (points_px, skeletons)")

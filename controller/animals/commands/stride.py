@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.controller.animals.legged.animal_stride import Names, measure_animal
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import (
@@ -21,6 +22,8 @@ from snakewalk.controller.console.result_files import (
     check_picture,
     refuse_to_overwrite,
 )
+from snakewalk.controller.track.readers.keypoints import choice_of
+from snakewalk.controller.track.readers.load import load_keypoints
 
 
 @command(
@@ -64,13 +67,6 @@ def stride(
     as_json: Json = False,
 ) -> None:
     """Measure one cycle of a tracked animal with legs ([KP] 4.2.2): contacts, phases, bends."""
-    from snakewalk.controller.animals.legged.animal_stride import (  # noqa: PLC0415  heavy
-        Names,
-        measure_animal,
-    )
-    from snakewalk.controller.track.readers.keypoints import choice_of  # noqa: PLC0415
-    from snakewalk.controller.track.readers.load import load_keypoints  # noqa: PLC0415
-
     names = Names.of(spine, girdles, feet)
     written = [output] if picture is None else [output, picture]
     refuse_to_overwrite(written, force)

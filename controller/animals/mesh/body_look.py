@@ -10,6 +10,9 @@ from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.world import Water
+from snakewalk.controller.animals.mesh.body_model import read_silhouettes
+from snakewalk.controller.animals.mesh.body_motion import robot_skin
+from snakewalk.controller.animals.mesh.rig import spine_rig
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.runlog.record import Header
 
@@ -66,9 +69,7 @@ def skin_look(look: str, header: Header) -> "SkinLook":
 
     """
     require_extra("a skin needs", "trimesh", "mujoco")
-    from snakewalk.controller.animals.mesh.body_motion import robot_skin  # noqa: PLC0415  an extra
     from snakewalk.controller.animals.mesh.body_skin import body_skin  # noqa: PLC0415
-    from snakewalk.controller.animals.mesh.rig import spine_rig  # noqa: PLC0415
 
     dressed = body_skin(animal(header.run.track) if look == ANIMAL else look)
     robot = header.robot
@@ -104,8 +105,6 @@ def rig_look(rig: "Rig", texture: Image | None, *, free: bool = True) -> "SkinLo
 
 def animal(track: str) -> str:
     """Name of the body that a motion was captured from: the recording's, or a plain snake."""
-    from snakewalk.controller.animals.mesh.body_model import read_silhouettes  # noqa: PLC0415
-
     try:
         read_silhouettes(Path(track))
     except InputError:

@@ -6,6 +6,8 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.controller.bench import scan as scanning
+from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.console.command import BUS, command
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.console.options import ChainPort, Json, console
@@ -20,9 +22,6 @@ def scan(
     as_json: Json = False,
 ) -> None:
     """List the servos on a bus, at every baud rate; changes nothing."""
-    from snakewalk.controller.bench import scan as scanning  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.bench.port_lines import open_lines  # noqa: PLC0415
-
     scanning.check_bauds(baud or ())
     found = []
     noise: dict[str, dict[int, int]] = {}

@@ -9,6 +9,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 
 if TYPE_CHECKING:
     from snakewalk.config.arrays import Image
@@ -51,9 +52,6 @@ def board(
         CalibrationBoard,
         read_pattern,
     )
-    from snakewalk.controller.console.result_files import (  # noqa: PLC0415  --help stays quick
-        refuse_to_overwrite,
-    )
 
     made = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
     check_print(out)
@@ -78,8 +76,6 @@ def write_print(out: Path, pages: "list[Image]") -> None:
     """Write pages (H, W) in their true size with a white margin of 10 mm."""
     from PIL import Image as Pictures  # noqa: PLC0415  an extra
     from PIL import ImageOps  # noqa: PLC0415
-
-    from snakewalk.controller.console.result_files import atomic_write  # noqa: PLC0415
 
     margin = round(10.0 / 25.4 * DOTS)
     sheets = [ImageOps.expand(Pictures.fromarray(page), margin, 255) for page in pages]

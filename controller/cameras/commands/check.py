@@ -10,6 +10,8 @@ from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.findings_table import show_findings
 from snakewalk.controller.console.options import VIEW_AT, Json, RunName, RunPort, Set, key_values
+from snakewalk.controller.run.factory import changed, prepare_job
+from snakewalk.controller.run.pose_provider import pose_faults
 
 
 @command(
@@ -37,8 +39,6 @@ def check(
     require_extra("a camera's check needs", "cv2", "skimage")
     from snakewalk.controller.cameras.camera_findings import camera_findings  # noqa: PLC0415
     from snakewalk.controller.cameras.camera_watch import CameraWatch, nobody  # noqa: PLC0415
-    from snakewalk.controller.run.factory import changed, prepare_job  # noqa: PLC0415
-    from snakewalk.controller.run.pose_provider import pose_faults  # noqa: PLC0415
 
     prepared = prepare_job(run, keys=key_values("--set", set_))
     if device is not None:

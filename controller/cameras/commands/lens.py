@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.cameras.commands.board import (
@@ -16,6 +17,8 @@ from snakewalk.controller.cameras.commands.board import (
 )
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.drivers.clock import WallClock
 
 if TYPE_CHECKING:
     from snakewalk.config.arrays import Image
@@ -54,10 +57,6 @@ def calibrate_camera(
         read_pattern,
     )
     from snakewalk.controller.cameras.lens_calibration import calibrate_lens  # noqa: PLC0415
-    from snakewalk.controller.console.result_files import (  # noqa: PLC0415  --help stays quick
-        atomic_write,
-        refuse_to_overwrite,
-    )
 
     if out.suffix.lower() not in _ENDINGS:
         raise InputError(f"{out}: the file of a lens ends in {', '.join(_ENDINGS)}")
@@ -118,9 +117,7 @@ def _from_device(
     """Take pictures one after another and say of each whether the board was found in it."""
     import numpy as np  # noqa: PLC0415  --help stays quick
 
-    from snakewalk.config.camera import CameraConfig  # noqa: PLC0415
     from snakewalk.controller.cameras.device_camera import open_device  # noqa: PLC0415  an extra
-    from snakewalk.drivers.clock import WallClock  # noqa: PLC0415
 
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit() and 64 <= int(width) <= 4096):

@@ -10,6 +10,7 @@ from snakewalk.config.extras import require_extra
 from snakewalk.controller.cameras.commands.board import DOTS, check_print, write_print
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.result_files import refuse_to_overwrite
 
 
 @command(
@@ -31,9 +32,6 @@ def markers(
     """
     require_extra("markers need", "cv2", "PIL")
     from snakewalk.controller.cameras.floor_markers import COUNT, marker_sheet  # noqa: PLC0415
-    from snakewalk.controller.console.result_files import (  # noqa: PLC0415  --help stays quick
-        refuse_to_overwrite,
-    )
 
     check_print(out)
     if out.suffix.lower() == ".png" and count > 1:

@@ -14,6 +14,10 @@ from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.exchange.flat_table import flat_tables, write_csv, write_parquet
+from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene
+from snakewalk.controller.exchange.ros_bag import write_ros_bag
+from snakewalk.controller.runlog.reader import read_log
 
 
 @command(
@@ -44,15 +48,6 @@ def export(
     as_json: Json = False,
 ) -> None:
     """Write a run's log as tables, as a ROS 2 bag, or for Foxglove with the body in 3-D."""
-    from snakewalk.controller.exchange.flat_table import (  # noqa: PLC0415  heavy; --help stays quick
-        flat_tables,
-        write_csv,
-        write_parquet,
-    )
-    from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene  # noqa: PLC0415
-    from snakewalk.controller.exchange.ros_bag import write_ros_bag  # noqa: PLC0415
-    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
-
     _check_names(log, csv, parquet, ros2, foxglove)
     record = read_log(log)
     if record.note:

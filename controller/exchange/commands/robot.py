@@ -7,16 +7,18 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import load_robot
+from snakewalk.config.template import robot_toml
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, RobotName, console, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
 
 
 @command("robot show", examples=("robot show alternating16", "robot show my.toml"))
 def show_robot(name: RobotName, as_json: Json = False) -> None:
     """Show a robot: its links, and servo, sign, zero and limit of each joint."""
-    from snakewalk.config.loader import load_robot  # noqa: PLC0415  --help stays quick
-
     robot = load_robot(name)
     columns = (robot.servo_ids, robot.servo_models, robot.signs, robot.zeros_rad, robot.limit_rad)
     joints: list[dict[str, object]] = [
@@ -84,9 +86,6 @@ def import_robot(
     as_json: Json = False,
 ) -> None:
     """Make a robot's file of another program's model; what cannot be said there is told."""
-    from snakewalk.config.extras import require_extra  # noqa: PLC0415  --help stays quick
-    from snakewalk.config.template import robot_toml  # noqa: PLC0415
-
     require_extra("MuJoCo models and URDF need", "mujoco")
     from snakewalk.controller.exchange import robot_import  # noqa: PLC0415
 
@@ -133,10 +132,6 @@ def export_robot(
     as_json: Json = False,
 ) -> None:
     """Write a robot for other programs: the same masses and kinematics."""
-    from snakewalk.config.extras import require_extra  # noqa: PLC0415  --help stays quick
-    from snakewalk.config.loader import load_robot  # noqa: PLC0415
-    from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text  # noqa: PLC0415
-
     if urdf is None and mjcf is None:
         raise InputError("say what to write: --urdf FILE, --mjcf FILE, or both")
     if ros2_control is not None and urdf is None:

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import shipped
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
@@ -34,8 +35,14 @@ from snakewalk.controller.console.options import (
     console,
     key_values,
 )
+from snakewalk.controller.console.progress import ProgressBar, TimeBar, in_real_time, show_progress
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite, run_folder
+from snakewalk.controller.learning import policy_trials as study
+from snakewalk.controller.motion.policy import load_policy
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_policy
 from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.watchers import watched
 
 if TYPE_CHECKING:
     from snakewalk.controller.learning.policy_trials import PolicyTrial, PolicyTrialResult
@@ -49,9 +56,6 @@ Name = Annotated[
 @command("policy list", examples=("policy list --json",))
 def list_policies(as_json: Json = False) -> None:
     """List the shipped policies, and how each was learnt."""
-    from snakewalk.config.loader import shipped  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.motion.policy import load_policy  # noqa: PLC0415
-
     policies = [load_policy(name) for name in shipped("policies")]
     if as_json:
         rows = [
@@ -106,11 +110,6 @@ def run_policy(
     as_json: Json = False,
 ) -> None:
     """Run a learnt policy on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.run.factory import prepare_policy  # noqa: PLC0415
-    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
-
     keys = key_values("--set", set_)
     prepared = prepare_policy(name, robot=robot, world=world, seconds=seconds, seed=seed, keys=keys)
     run_name = prepared.run.name
@@ -165,7 +164,6 @@ def learn_policy(
     refuse_to_overwrite([out], force)
     require_extra("learning a policy needs", "cma", "gymnasium", "mujoco")
 
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.learning.wave_search import search_wave  # noqa: PLC0415
 
     with ProgressBar(f"{robot} on {world}", generations) as bar:
@@ -213,9 +211,6 @@ def policy_trials(
 ) -> None:
     """Compare policies with gaits: the same seeds move start, friction and supply of all."""
     require_extra("trials need", "mujoco")
-
-    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.learning import policy_trials as study  # noqa: PLC0415
 
     rows = [(motion, ground) for ground in world or ["flat"] for motion in motions]
     rows = list(dict.fromkeys(rows))  # what is given twice is run once

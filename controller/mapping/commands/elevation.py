@@ -15,6 +15,10 @@ from snakewalk.controller.console.result_files import (
     check_picture,
     refuse_to_overwrite,
 )
+from snakewalk.controller.mapping.elevation_file import MapOptions, read_elevation
+from snakewalk.controller.mapping.raster_file import DEGREE, UNITS_M, RasterUnits
+from snakewalk.controller.mapping.world_file import MapWorld, map_beside
+from snakewalk.controller.terrain.elevation_map import CELL_HEIGHTS
 
 if TYPE_CHECKING:
     from snakewalk.controller.mapping.world_file import MapWorld
@@ -79,18 +83,6 @@ def elevation(
     as_json: Json = False,
 ) -> None:
     """Make a world that `plan` and `run` take of a file of real ground; its holes stay known."""
-    from snakewalk.controller.mapping.elevation_file import (  # noqa: PLC0415
-        MapOptions,
-        read_elevation,
-    )
-    from snakewalk.controller.mapping.raster_file import (  # noqa: PLC0415
-        DEGREE,
-        UNITS_M,
-        RasterUnits,
-    )
-    from snakewalk.controller.mapping.world_file import MapWorld  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.terrain.elevation_map import CELL_HEIGHTS  # noqa: PLC0415
-
     positive = {
         "--scale": scale, "--vertical-scale": vertical_scale, "--spacing": spacing,
         "--cell": cell, "--height-step": height_step,
@@ -151,7 +143,6 @@ def check_world_files(
     """
     if out.suffix != ".toml":
         raise InputError(f"{out}: a world's file ends in .toml")
-    from snakewalk.controller.mapping.world_file import map_beside  # noqa: PLC0415
 
     check_picture(picture)
     results = [out, map_beside(out), picture]

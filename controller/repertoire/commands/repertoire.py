@@ -8,6 +8,7 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
@@ -24,13 +25,18 @@ from snakewalk.controller.console.options import (
     console,
     show,
 )
+from snakewalk.controller.console.progress import ProgressBar, TimeBar, in_real_time
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
     refuse_to_overwrite,
     run_folder,
 )
+from snakewalk.controller.repertoire.repertoire import load_repertoire
+from snakewalk.controller.repertoire.repertoire_planning import default_file, flat, load_plan
+from snakewalk.controller.repertoire.repertoire_run import run_name, run_route
 from snakewalk.controller.run.finish import write_artifacts
+from snakewalk.controller.run.watchers import watched
 
 if TYPE_CHECKING:
     from snakewalk.controller.repertoire.repertoire import Repertoire
@@ -60,9 +66,6 @@ def record(
     check_picture(picture)
     refuse_to_overwrite([out, picture], force)
 
-    from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
-    from snakewalk.controller.repertoire.repertoire_planning import default_file, flat  # noqa: PLC0415
     from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record  # noqa: PLC0415
 
     body, ground = load_robot(robot), load_world(world)
@@ -100,8 +103,6 @@ def show_file(
     refuse_to_overwrite([picture], force)
     check_picture(picture)
 
-    from snakewalk.controller.repertoire.repertoire import load_repertoire  # noqa: PLC0415
-
     repertoire = load_repertoire(file)
     if picture is not None:
         from snakewalk.controller.repertoire import repertoire_plots as plots  # noqa: PLC0415
@@ -132,9 +133,6 @@ def run_plan(
     """Run a plan on servos or in the simulator, and compare predicted with measured poses."""
     refuse_to_overwrite([picture], force)
 
-    from snakewalk.controller.repertoire.repertoire_planning import load_plan  # noqa: PLC0415  heavy
-    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
-
     job = load_plan(plan, replan=not open_loop)
     with watched(view, view_at, ros) as watchers:
         found, complete = carry_out(job, port, out, film, picture, force, watchers)
@@ -153,9 +151,6 @@ def carry_out(
     watchers: "Watchers | None" = None,
 ) -> tuple[dict[str, object], bool]:
     """Execute a job with a bar; what it did, and whether it reached every waypoint."""
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.repertoire.repertoire_run import run_name, run_route  # noqa: PLC0415
-
     check_picture(picture)
     with (
         run_folder(run_name(job), out) as folder,

@@ -22,9 +22,17 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
 )
+from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.exchange.body_frames import joint_names
+from snakewalk.controller.motion.commanded import Commanded
+from snakewalk.controller.ros.ros_link import open_ros
+from snakewalk.controller.ros.ros_options import RosOptions
 from snakewalk.controller.run.commands.gait import Param, parameters
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import gait_by_name, prepare_commanded
 from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.watchers import PAGE, Watchers, open_observer
 
 _WEEK_S = 604_800.0
 
@@ -77,15 +85,6 @@ def ros(
     as_json: Json = False,
 ) -> None:
     """Hold a robot, and let a ROS 2 graph command, watch and stop it; servos or the simulator."""
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.exchange.body_frames import joint_names  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.motion.commanded import Commanded  # noqa: PLC0415
-    from snakewalk.controller.ros.ros_link import open_ros  # noqa: PLC0415
-    from snakewalk.controller.ros.ros_options import RosOptions  # noqa: PLC0415
-    from snakewalk.controller.run.execute import execute  # noqa: PLC0415
-    from snakewalk.controller.run.factory import gait_by_name, prepare_commanded  # noqa: PLC0415
-    from snakewalk.controller.run.watchers import PAGE, Watchers, open_observer  # noqa: PLC0415  heavy
-
     if not timeout > 0.0:
         raise InputError(f"--timeout {timeout:g}: expected seconds over 0, or inf")
     if not re.fullmatch(r"(/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*)?", namespace, re.ASCII):

@@ -13,6 +13,8 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
+from snakewalk.controller.console.gamepad import Gamepad
+from snakewalk.controller.console.keyboard import Keyboard
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Compliant,
@@ -30,9 +32,15 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
 )
+from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.metrics.displacement import gait_displacement
+from snakewalk.controller.motion.operator import KEYS, Operator
 from snakewalk.controller.run.commands.gait import Name, Param, parameters
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_gait, with_compliance
 from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.watchers import watched
 
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
@@ -97,12 +105,6 @@ def run_gait(
     as_json: Json = False,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.metrics.displacement import gait_displacement  # noqa: PLC0415
-    from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.run.factory import prepare_gait, with_compliance  # noqa: PLC0415
-    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
-
     if by not in {"blend", "cpg"}:
         raise InputError(f"--by {by}: expected blend or cpg")
     with ExitStack() as stack:
@@ -198,7 +200,6 @@ class _Hands:
         self, motion: "GaitMotion", robot: "RobotConfig", on_event: "OnEvent"
     ) -> "Operator":
         """Put the keys that were pressed in charge of a motion."""
-        from snakewalk.controller.motion.operator import Operator  # noqa: PLC0415
 
         def on_change(kind: str, text: str) -> None:
             on_event(kind, text)
@@ -229,10 +230,6 @@ def _hands(
         return None
     from rich.columns import Columns  # noqa: PLC0415
     from rich.console import Console  # noqa: PLC0415
-
-    from snakewalk.controller.console.gamepad import Gamepad  # noqa: PLC0415
-    from snakewalk.controller.console.keyboard import Keyboard  # noqa: PLC0415
-    from snakewalk.controller.motion.operator import KEYS  # noqa: PLC0415
 
     devices: list[Keyboard | Gamepad | PageControls] = []
     keys: list[str] = []

@@ -6,7 +6,10 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.document import json_schema
 from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot, load_run, load_world, shipped
+from snakewalk.config.template import template
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import Force, Json, Robot, show
@@ -49,10 +52,6 @@ def init(
     as_json: Json = False,
 ) -> None:
     """Write run.toml, robot.toml and world.toml to change, with their schemas for editors."""
-    from snakewalk.config.document import json_schema  # noqa: PLC0415  --help stays quick
-    from snakewalk.config.loader import load_robot, load_run, load_world, shipped  # noqa: PLC0415
-    from snakewalk.config.template import template  # noqa: PLC0415
-
     if from_ is None:
         known = {name: load_run(name).robot for name in (*_USED_FIRST, *shipped("runs"))}
         fitting = (name for name, body in known.items() if body == (robot or "yaw16"))

@@ -24,6 +24,8 @@ from snakewalk.controller.console.options import (
     show,
 )
 from snakewalk.controller.console.plugins import require
+from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.terrain.summary import path_relief, path_warnings
 
 
 @command(
@@ -77,8 +79,6 @@ def plan(
         raise InputError(
             "--repertoire, --beam, --out, --run and --physics belong to --with repertoire"
         )
-    from snakewalk.controller.run.factory import prepare_walk  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.terrain.summary import path_relief, path_warnings  # noqa: PLC0415
 
     prepared = prepare_walk(
         run, keys=key_values("--set", set_), seed=seed, motion=motion, robot=robot, world=world,

@@ -22,8 +22,12 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
 )
+from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_playback
 from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.watchers import watched
 
 
 @command(
@@ -58,11 +62,6 @@ def play(
     as_json: Json = False,
 ) -> None:
     """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.run.factory import prepare_playback  # noqa: PLC0415
-    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
-
     prepared = prepare_playback(
         track,
         robot=robot,

@@ -23,7 +23,11 @@ from snakewalk.controller.console.options import (
     TrackFile,
     console,
 )
+from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.run.factory import moves_by_gait
+from snakewalk.controller.studies import trials as study
+from snakewalk.controller.studies.trials_table import TrialsTable
 
 _HEADS = {
     "run": "run",
@@ -126,11 +130,6 @@ def trials(
     check_picture(picture)
     refuse_to_overwrite([picture], force)
     refuse_to_overwrite([out], force=True)  # a table grows
-
-    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415
-    from snakewalk.controller.run.factory import moves_by_gait  # noqa: PLC0415
-    from snakewalk.controller.studies import trials as study  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.studies.trials_table import TrialsTable  # noqa: PLC0415
 
     require_extra("trials need", "mujoco")
     motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
