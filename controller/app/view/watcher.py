@@ -1,16 +1,15 @@
 """Who looks on at a run: a process of its own, which is fed with the rows of the log."""
 
 import json
-import signal
 import socket
 from collections.abc import Callable
-from multiprocessing import get_context
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Protocol, Self
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
+from snakewalk.controller.app.child_process import start
 from snakewalk.controller.app.view.row_line import RunEnd
 
 _START_S: Final = 60.0
@@ -53,13 +52,7 @@ class WatcherProcess:
 
         """
         ours, far = socket.socketpair()
-        context = get_context("spawn")
-        self._process = context.Process(target=serve, args=(far, *options), daemon=True)
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Ctrl-C is the run's
-        try:
-            self._process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        self._process = start(serve, far, *options, daemon=True)
         far.close()
         ours.settimeout(_START_S)
         try:
