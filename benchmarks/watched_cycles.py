@@ -98,7 +98,11 @@ def lateness_s(condition: str, seconds: float) -> tuple[Floats, int]:
             ill = threading.Timer(0.4 * seconds, lambda: os.kill(victim.pid or 0, what))
             ill.start()
         finished = execute(
-            prepare_gait("lateral-undulation", seconds=seconds, keys=PATIENT),
+            prepare_gait(
+                "lateral-undulation",
+                seconds=seconds,
+                keys=PATIENT | {"run.safety.lost_observer": "warn"},
+            ),
             folder / "run",
             port,
             view=page,

@@ -238,8 +238,7 @@ def test_json_from_outside_is_parsed_in_one_place() -> None:
     """
     own = {
         *("config/archive.py", "controller/runlog/reader.py", "drivers/safety/stop_button.py"),
-        *("controller/app/ros/command_codec.py", "controller/app/view/row_line.py"),
-        *("controller/app/view/browser_gamepad.py", "controller/app/view/watcher.py"),
+        *("controller/app/view/row_line.py", "controller/app/view/watcher.py"),
     }
     root = Path(__file__).parents[2]
     found = {

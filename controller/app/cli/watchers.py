@@ -27,6 +27,15 @@ class Watchers:
         for each in self._watchers:
             each.on_picture(image, time_s)
 
+    def lost(self, now_s: float) -> str | None:
+        """Return which E-STOPs do not work any more, and why, or None."""
+        reasons = [reason for each in self._watchers if (reason := each.lost(now_s)) is not None]
+        return "; ".join(reasons) or None
+
+    def rejected(self) -> list[str]:
+        """Return why commands were rejected since the last call."""
+        return [why for each in self._watchers for why in each.rejected()]
+
     def on_button(self, path: Path) -> None:
         """Give the stop button to each."""
         for each in self._watchers:

@@ -5,7 +5,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -26,6 +26,7 @@ from snakewalk.controller.app.runs.backend import (
     split,
 )
 from snakewalk.controller.app.runs.map_provider import MapProvider, map_faults, map_provider
+from snakewalk.controller.app.runs.observer_watch import ObserverWatch, Watcher
 from snakewalk.controller.app.runs.pose_provider import PoseProvider, pose_faults, pose_provider
 from snakewalk.controller.app.runs.prepared_run import PathRun, PreparedRun, pose_with
 from snakewalk.controller.app.shadow.diagnosis import check_level
@@ -55,9 +56,6 @@ from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
 
-if TYPE_CHECKING:
-    from snakewalk.controller.app.view.watcher import Watcher
-
 
 @dataclass(frozen=True, slots=True)
 class Finished:
@@ -83,7 +81,7 @@ def execute(
     *,
     force: bool = False,
     stoppable: bool = True,
-    view: "Watcher | None" = None,
+    view: Watcher | None = None,
     shadow: bool = False,
     confirm: Callable[[str], bool] | None = None,
     stop_requested: Callable[[], str | None] = lambda: None,
@@ -166,6 +164,7 @@ def execute(
             log.event(clock.now_s(), kind, text)
             on_event(kind, text)
 
+        observers = ObserverWatch(view, safety.lost_observer, warn)
         shown = {} if view is None else {"on_picture": view.on_picture}
         with (
             pose_provider(prepared, backend, log_event, **shown) as pose,
@@ -180,7 +179,7 @@ def execute(
                 SafetyLimits.from_config(robot, safety),
                 clock,
                 recovery,
-                lambda: stop_requested() or (None if button is None else button.pressed()),
+                observers.with_stop(stop_requested, button),
                 lambda text: warn("safety", text),
             )
             beside = _shadow(prepared, initial_pose, log, on_event) if shadow else None
@@ -197,7 +196,7 @@ def execute(
                 energy=backend.energy,
                 observer=beside,
                 friction=friction,
-                on_progress=on_progress,
+                on_progress=observers.with_report(on_progress),
                 on_event=on_event,
             )
             with _end_told(link, log, clock):

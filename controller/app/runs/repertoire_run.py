@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.runs.execute import Finished, execute
+from snakewalk.controller.app.runs.observer_watch import Watcher
 from snakewalk.controller.app.runs.prepared_run import pose_with
 from snakewalk.controller.kinematics.frame import Frame, body_frame
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
@@ -24,9 +24,6 @@ from snakewalk.controller.repertoire.search import MotionPrimitives, Route
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent, OnProgress
 from snakewalk.drivers.types import BodyPose
-
-if TYPE_CHECKING:
-    from snakewalk.controller.app.view.watcher import Watcher
 
 
 @dataclass(frozen=True)
@@ -209,7 +206,7 @@ def run_route(
     on_progress: OnProgress = lambda progress: None,
     *,
     force: bool = False,
-    view: "Watcher | None" = None,
+    view: Watcher | None = None,
 ) -> RouteRun:
     """Execute a plan on ``port``, or on the simulator where it is None; ``view`` looks on.
 
