@@ -61,7 +61,7 @@ class ObserverWatch:
             now_s: clock of the machine.
 
         """
-        self._view = view if isinstance(view, OffersStop) else None
+        self._view: OffersStop | None = view if isinstance(view, OffersStop) else None
         self._policy, self._warn, self._now_s = policy, warn, now_s
         self._refusals = Refusals(lambda why: warn("refused", why))
         self._reported: str | None = None
