@@ -159,14 +159,17 @@ def test_the_page_has_the_script_and_its_socket_is_behind_the_gate(
     assert answer.getheader("Content-Encoding") == "identity"
     line.close()
     address = f"ws://127.0.0.1:{port}/gamepad"
+    own = {"Origin": f"http://127.0.0.1:{port}"}
     for headers, status in (
-        ({}, 401),
+        ({}, 403),
+        (own, 401),
+        (cookie, 403),
         (cookie | {"Origin": "http://evil.example"}, 403),
     ):
         with pytest.raises(InvalidStatus) as refused, connect(address, additional_headers=headers):
             pass
         assert refused.value.response.status_code == status
-    with connect(address, additional_headers=cookie) as socket:
+    with connect(address, additional_headers=cookie | own) as socket:
         for message in (state(), state(4, 1)):
             socket.send(message)
             assert socket.recv(10.0) == "taken"
