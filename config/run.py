@@ -164,6 +164,11 @@ class SafetyConfig(Strict):
     recovery: Literal["stop", "confirm", "resume"] = Field(
         "stop", description="after a vanished port or a rebooted servo: torque off, ask, or go on"
     )
+    lost_observer: Literal["stop", "warn"] = Field(
+        "stop",
+        description="when the page, the ROS node or the gamepad, each with an E-STOP, ends or does "
+        "not respond during a run: torque off, or a warning",
+    )
     recovery_time_s: float = Field(10.0, gt=0.0, description="how long it is waited for")
     overload_reboots: int = Field(
         0,

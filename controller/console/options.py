@@ -89,9 +89,7 @@ Shadow = Annotated[
 View = Annotated[bool, typer.Option("--view", help="show the run in a browser while it lasts")]
 ViewAt = Annotated[
     str,
-    typer.Option(
-        "--view-at", metavar="HOST:PORT", help="of the page; beyond this machine it needs a token"
-    ),
+    typer.Option("--view-at", metavar="HOST:PORT", help="of the page"),
 ]
 Ros = Annotated[
     bool, typer.Option("--ros", help="tell a ROS 2 graph of the run, with a service that stops it")

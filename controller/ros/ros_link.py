@@ -25,7 +25,7 @@ class RosLink(WatcherProcess):
 
     def __init__(self, options: RosOptions) -> None:
         require_extra("ROS needs", "rclpy")
-        super().__init__(_serve, options, fault="ROS")
+        super().__init__(_serve, options, what="ROS node", fault="ROS")
         self.name = str(self.said["name"])
         """Of the node, with its namespace."""
         self.domain = int(self.said["domain"])

@@ -5,7 +5,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import Any, Protocol, cast
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
@@ -28,6 +28,7 @@ from snakewalk.controller.run.backend import (
     split,
 )
 from snakewalk.controller.run.map_provider import MapProvider, map_faults, map_provider
+from snakewalk.controller.run.observer_watch import ObserverWatch, Watcher
 from snakewalk.controller.run.pose_provider import PoseProvider, pose_faults, pose_provider
 from snakewalk.controller.run.prepared_run import PathRun, PreparedRun
 from snakewalk.controller.run.summary_file import write_summary
@@ -55,9 +56,6 @@ from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad
 
-if TYPE_CHECKING:
-    from snakewalk.controller.run.watcher import Watcher
-
 
 class RunObserver(CycleObserver, Protocol):
     """An observer of every cycle, which also says something at the end of the run."""
@@ -84,14 +82,14 @@ class Finished:
     """The motion that ran, at its end."""
 
 
-def execute(
+def execute(  # noqa: PLR0915
     prepared: PreparedRun,
     folder: Path,
     port: str | None = None,
     *,
     force: bool = False,
     stoppable: bool = True,
-    view: "Watcher | None" = None,
+    view: Watcher | None = None,
     shadow: bool = False,
     confirm: Callable[[str], bool] | None = None,
     stop_requested: Callable[[], str | None] = lambda: None,
@@ -174,6 +172,7 @@ def execute(
             log.event(clock.now_s(), kind, text)
             on_event(kind, text)
 
+        observers = ObserverWatch(view, safety.lost_observer, warn)
         shown = {} if view is None else {"on_picture": view.on_picture}
         with (
             pose_provider(prepared, backend, log_event, **shown) as pose,
@@ -188,7 +187,7 @@ def execute(
                 SafetyLimits.from_config(robot, safety),
                 clock,
                 recovery,
-                lambda: stop_requested() or (None if button is None else button.pressed()),
+                observers.with_stop(stop_requested, button),
                 lambda text: warn("safety", text),
             )
             start = initial_pose if port is None else None
@@ -206,7 +205,7 @@ def execute(
                 energy=backend.energy,
                 observer=beside,
                 friction=friction,
-                on_progress=on_progress,
+                on_progress=observers.with_report(on_progress),
                 on_event=on_event,
             )
             with _end_told(link, log, clock):

@@ -8,13 +8,13 @@ from typing import Any, Protocol
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.plugins import require
-from snakewalk.controller.run.watcher import Watcher
+from snakewalk.controller.run.observer_watch import OffersStop, Watcher
 
 PAGE, ROS, SHADOW = "page", "ros", "shadow"
 """Observers that have an option of their own."""
 
 
-class PageControls(Watcher, Protocol):
+class PageControls(Watcher, OffersStop, Protocol):
     """The page of a run, which may also command it."""
 
     @property
@@ -42,6 +42,7 @@ class Watchers:
         self.page = page
         """The page of the run, which may also command it; None without a page."""
         self._watchers: list[Watcher] = [one for one in (page, *others) if one is not None]
+        self._with_stop = [one for one in self._watchers if isinstance(one, OffersStop)]
 
     def on_row(self, topic: str, row: bytes) -> None:
         """Pass a row of the log on."""
@@ -52,6 +53,15 @@ class Watchers:
         """Pass a picture on."""
         for each in self._watchers:
             each.on_picture(image, time_s)
+
+    def lost(self, now_s: float) -> str | None:
+        """Return which E-STOPs have failed, and why, or None."""
+        reasons = [why for each in self._with_stop if (why := each.lost(now_s)) is not None]
+        return "; ".join(reasons) or None
+
+    def rejected(self) -> list[str]:
+        """Return why commands were rejected since the last call."""
+        return [why for each in self._with_stop for why in each.rejected()]
 
     def on_button(self, path: Path) -> None:
         """Pass the stop button on."""

@@ -31,9 +31,9 @@ class LiveView(WatcherProcess):
 
     def __init__(self, at: str = "127.0.0.1:8080") -> None:
         require_extra("the page needs", "viser")
-        super().__init__(_serve, *host_and_port(at), fault=f"--view-at {at}")
+        super().__init__(_serve, *host_and_port(at), what="page", fault=f"--view-at {at}")
         self.url = str(self.said["url"])
-        """To be opened in a browser; holds the token where one is asked for."""
+        """To be opened in a browser; contains the token."""
         self._picture: bytes | None = None
         self._picture_s = -math.inf
         self._dead_man = DeadMan()

@@ -27,9 +27,7 @@ def check(
     seconds: Annotated[float, typer.Option(min=1.0, max=36_000.0, help="how long it looks")] = 8.0,
     set_: Set = None,
     view: Annotated[bool, typer.Option("--view", help="show it in a browser meanwhile")] = False,
-    view_at: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="of the page; elsewhere it needs a token")
-    ] = VIEW_AT,
+    view_at: Annotated[str, typer.Option(metavar="HOST:PORT", help="of the page")] = VIEW_AT,
     as_json: Json = False,
 ) -> None:
     """Look through a run's camera, or the simulator's: markers, frame rate, latency, light.

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -15,6 +15,7 @@ from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.gamepad import Gamepad
 from snakewalk.controller.console.keyboard import Keyboard
+from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Compliant,
@@ -126,6 +127,8 @@ def run_gait(
         )
         prepared = replace(prepared, run=with_compliance(prepared.run, compliance))
         run = prepared.run
+        if hands is not None:
+            hands.policy = run.safety.lost_observer
         folder = stack.enter_context(run_folder(f"gait-{run.name}-{prepared.robot.name}", out))
         bar = stack.enter_context(TimeBar(run.name, seconds, _names(prepared, hands)))
         paced = (watchers is not None or prepared.make_operator is not None) and port is None
@@ -183,6 +186,9 @@ class _Hands:
         self._waiting: list[str] = []
         self._off = False
         self._motion: GaitMotion | None = None
+        self._lost: str | None = None
+        self.policy = "stop"
+        """``safety.lost_observer`` of the run."""
 
     @property
     def gait(self) -> str | None:
@@ -194,7 +200,24 @@ class _Hands:
         for device in self._devices:
             self._waiting += device.pressed()
         self._off = self._off or "t" in self._waiting
-        return "the operator switched torque off" if self._off else None
+        return "the operator switched torque off" if self._off else self._lost_device()
+
+    def _lost_device(self) -> str | None:
+        """Return which device with a torque-off key is gone; only warn if the run says so."""
+        local = [
+            cast("Keyboard | Gamepad", each) for each in self._devices if each is not self._page
+        ]
+        gone = [device.gone for device in local if device.gone is not None]
+        if not gone:
+            return None
+        if self.policy == "stop":
+            from snakewalk.controller.run.observer_watch import ADVICE  # noqa: PLC0415
+
+            return f"{gone[0]}; {ADVICE}"
+        if self._lost is None:
+            self._lost = gone[0]
+            LOGGER.warning("%s; the run goes on (safety.lost_observer)", gone[0])
+        return None
 
     def operator(
         self, motion: "GaitMotion", robot: "RobotConfig", on_event: "OnEvent"
