@@ -8,9 +8,9 @@ import numpy as np
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.console.result_files import MAP
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.map_provider import MapContext, MapProvider
 from snakewalk.controller.run.prepared_run import PreparedRun
-from snakewalk.controller.run.walk_run import WalkRun
 from snakewalk.drivers.types import BodyPose, JointState
 
 

@@ -28,9 +28,12 @@ from snakewalk.controller.motion.policy import load_policy
 from snakewalk.controller.motion.policy_motion import PolicyMotion
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.run.assembly import assemble, load_body
-from snakewalk.controller.run.commanded_run import CommandedRun, MakeCommanded
-from snakewalk.controller.run.gait_run import GaitRun, MakeOperator
-from snakewalk.controller.run.playback_run import PlaybackRun
+from snakewalk.controller.run.kinds.commanded_run import CommandedRun, MakeCommanded
+from snakewalk.controller.run.kinds.gait_run import GaitRun, MakeOperator
+from snakewalk.controller.run.kinds.playback_run import PlaybackRun
+from snakewalk.controller.run.kinds.source_run import MakeSource, SourceRun
+from snakewalk.controller.run.kinds.steered_run import SteeredRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.pose_provider import pose_plugin
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.run.run_keys import (
@@ -41,9 +44,6 @@ from snakewalk.controller.run.run_keys import (
     with_keys_of,
 )
 from snakewalk.controller.run.servo_setup import check_servos, with_gains
-from snakewalk.controller.run.source_run import MakeSource, SourceRun
-from snakewalk.controller.run.steered_run import SteeredRun
-from snakewalk.controller.run.walk_run import WalkRun
 from snakewalk.controller.track.readers.load import track_beside
 
 _WALKS: Final = ("walk", "walk-printed", "walk-blind", "kp", "serpenoid")

@@ -26,8 +26,8 @@ from snakewalk.controller.run.factory import (
     prepare_job,
     with_compliance,
 )
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.prepared_run import PreparedRun
-from snakewalk.controller.run.walk_run import WalkRun
 from snakewalk.controller.terrain.summary import path_relief
 from snakewalk.controller.track.readers.load import load_track
 

@@ -33,7 +33,7 @@ from snakewalk.controller.console.result_files import (
 from snakewalk.controller.run.factory import prepare_walk
 
 if TYPE_CHECKING:
-    from snakewalk.controller.run.walk_run import WalkRun
+    from snakewalk.controller.run.kinds.walk_run import WalkRun
 
 _SYNTHESISED = ("walk", "walk-printed", "kp")
 _ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}

@@ -25,7 +25,7 @@ from snakewalk.controller.mechanics.ground_step import (
     half_heights_m,
 )
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
-from snakewalk.controller.run.walk_run import POINTS, WalkRun
+from snakewalk.controller.run.kinds.walk_run import POINTS, WalkRun
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
 from snakewalk.controller.shape.states import to_states
 from snakewalk.controller.terrain.path import SplinePath

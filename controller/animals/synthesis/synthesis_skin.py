@@ -17,7 +17,7 @@ from snakewalk.controller.animals.synthesis.snake_synthesis import SynthesisedWa
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.report.film import film_motion
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.track.bone_motion import BoneMotion
 
 if TYPE_CHECKING:

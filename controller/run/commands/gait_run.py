@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from snakewalk.controller.console.keyboard import Keyboard
     from snakewalk.controller.motion.gait_motion import GaitMotion
     from snakewalk.controller.motion.operator import Operator
-    from snakewalk.controller.run.gait_run import GaitRun
+    from snakewalk.controller.run.kinds.gait_run import GaitRun
     from snakewalk.controller.run.watchers import PageControls
     from snakewalk.controller.runtime.drive import OnEvent
 

@@ -109,7 +109,8 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     from snakewalk.controller.console import pool
     from snakewalk.controller.repertoire import crowd_film, repertoire_recording
     from snakewalk.controller.report import artifacts
-    from snakewalk.controller.run import execute, summary_file, walk_run
+    from snakewalk.controller.run import execute, summary_file
+    from snakewalk.controller.run.kinds import walk_run
     from snakewalk.controller.studies import graph_study, trials
 
     now = Budget()
