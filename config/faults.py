@@ -109,19 +109,18 @@ class PortFault(_Lasting):
     kind: Literal["port"]
 
 
-Fault = Annotated[
-    NoiseFault
-    | ServoFault
+ScheduledFault = (
+    ServoFault
     | ClashFault
     | WriteFault
     | TripFault
     | HeatFault
     | SupplyFault
     | UnplugFault
-    | StallFault
-    | PortFault,
-    Field(discriminator="kind"),
-]
+    | PortFault
+)
+"""Faults that begin and end at a time; the others change packets or stop the host."""
+Fault = Annotated[NoiseFault | StallFault | ScheduledFault, Field(discriminator="kind")]
 
 
 class FaultPlan(Strict):
