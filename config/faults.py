@@ -43,9 +43,9 @@ class NoiseFault(_Lasting):
 
 
 class ServoFault(_Lasting):
-    """Servos that fall silent, jam, lose their supply, or share an ID."""
+    """Servos that do not reply, jam, lose their supply, or whose output stage is dead."""
 
-    kind: Literal["mute", "stuck", "brown_out"]
+    kind: Literal["mute", "stuck", "brown_out", "no_output"]
     ids: tuple[ServoId, ...] = Field(min_length=1)
 
 

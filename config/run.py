@@ -25,7 +25,7 @@ MotionName = Literal[
     "source",
 ]
 
-_FULL_OUTPUT_RAD = 885 * 128 * 2.0 * math.pi / 4096
+FULL_OUTPUT_RAD = 885 * 128 * 2.0 * math.pi / 4096
 """Position error at which a P gain of 1 gives full output: PWM 885 is 100 %, the gain is the
 register over 128, an error is counted in 4096ths of a turn (e-manual, X series)."""
 
@@ -179,7 +179,7 @@ class SafetyConfig(Strict):
         """
         most_rad, limits_rad = 0.9 * self.goal_lead_rad, []
         for axis, gain in zip(robot.all_axes, robot.position_p_gains, strict=True):
-            full_rad = _FULL_OUTPUT_RAD / max(gain, 1) if axis != "p" else 0.0
+            full_rad = FULL_OUTPUT_RAD / max(gain, 1) if axis != "p" else 0.0
             limits_rad.append(min(max(self.following_limit_rad, 2.0 * full_rad), most_rad))
         return tuple(limits_rad)
 

@@ -61,6 +61,10 @@ class FaultyServos(Protocol):
         """Free blocked shafts."""
         ...
 
+    def cut_output(self, rows: Indices, on: bool) -> None:
+        """Cut the output stages of servos off their motors, or connect them again."""
+        ...
+
     def cut_power(self, rows: Indices) -> None:
         """Take the supply away."""
         ...
@@ -268,6 +272,10 @@ class FaultPlayer:
                 return partial(line.mute, rows, True), partial(line.mute, rows, False)
             case "stuck":
                 return partial(servos.block_shafts, rows), partial(servos.free_shafts, rows)
+            case "no_output":
+                return partial(servos.cut_output, rows, True), partial(
+                    servos.cut_output, rows, False
+                )
             case "brown_out":
                 return self._power_cut(rows)
             case unknown:
