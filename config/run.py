@@ -149,6 +149,9 @@ class SafetyConfig(Strict):
     voltage_max_v: float | None = Field(
         None, gt=0.0, description="default: the robot's servo.supply_max_v"
     )
+    voltage_time_s: float = Field(
+        0.3, ge=0.0, description="how long the supply may be too low, but not at the start"
+    )
     stale_limit_s: float = Field(
         0.1, gt=0.0, description="how old a measured position, velocity or current may be"
     )

@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Int32s
-from snakewalk.config.robot import RobotConfig
+from snakewalk.config.robot import STALL_CURRENT_A, RobotConfig
 from snakewalk.drivers.bus.budget import WireBudget, robot_budget
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, CycleCounters
 from snakewalk.drivers.bus.group_read import GroupReadReply
+from snakewalk.drivers.chain.alarm_reader import AlarmReader
 from snakewalk.drivers.chain.identified_read import IdentifiedRead, check_stillness
 from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Readings
@@ -24,6 +25,7 @@ from snakewalk.drivers.chain.start_up import (
     inspect,
     let_reply,
 )
+from snakewalk.drivers.chain.temperature_sensors import TemperatureSensors
 from snakewalk.drivers.chain.torque_off import TorqueOff
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import BusError, ChainError
@@ -98,6 +100,10 @@ class ServoChain:
         self._imu = None if robot.imu is None else ImuReader(bus, robot.imu)
         self._reads = 0
         self._losses = LostReplies()
+        self._alarms = AlarmReader(bus, robot, self._readings)
+        stall_a = [STALL_CURRENT_A.get(model, math.inf) for model in robot.servo_models]
+        names = [robot.joint_name(joint) for joint in range(robot.joint_count)]
+        self._sensors = TemperatureSensors(names, np.array(stall_a))
         self._torque_off = TorqueOff(bus, robot, self._clock, self._watchdog_s)
         self._armed = False
         self._sent_at_s = -np.inf
@@ -188,6 +194,7 @@ class ServoChain:
     def _begin(self, found_rad: Floats | None = None) -> JointState:
         """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
         self._reads = 0
+        self._alarms.clear()
         check_pose(self.robot, self._first_state().position_rad)
         try:
             here_rad = self._identified.positions_rad(_FIRST_READS, ask_again=True)
@@ -309,13 +316,17 @@ class ServoChain:
         reply = self._slow.read()
         self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
         self._readings.update_slow(reply, self._sent_at_s)
+        readings = self._readings
+        for line in self._sensors.update(readings.temperature_c, readings.current_a, measured_at_s):
+            self.on_event(line)
         return True
 
     def _take(self, reply: GroupReadReply, *, again: bool = False) -> float:
         """Take in a group read of the state, or one more in this cycle; when it was measured, s."""
         measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
-        for joint in self._readings.update(reply, measured_at_s, again=again):
-            self._read_alarm(int(joint))
+        alerted = self._readings.update(reply, measured_at_s, again=again)
+        for line in self._alarms.update(alerted):
+            self.on_event(line)
         return measured_at_s
 
     def _check_liveness(self, *, has_time: bool) -> None:
@@ -412,10 +423,3 @@ class ServoChain:
             self._reads = 0  # so that the slow state is read again, too
         silent = [str(i) for i, v in zip(self.robot.servo_ids, state.valid, strict=True) if not v]
         raise BusError(f"servo {', '.join(silent) or 'group'}: group read fails, pings do not")
-
-    def _read_alarm(self, joint: int) -> None:
-        servo_id = self.robot.servo_ids[joint]
-        try:
-            self._readings.update_alarm(joint, self._bus.read(servo_id, "Hardware Error Status"))
-        except BusError:
-            return  # the error byte carries the alert already; read again in the next cycle

@@ -38,6 +38,8 @@ class SafetyLimits:
     temperature_limit_c: float
     voltage_min_v: float
     voltage_max_v: float
+    voltage_time_s: float
+    """How long the supply may be too low."""
     stale_limit_s: float
     slow_stale_limit_s: float
     """The same for temperature and voltage."""
@@ -70,6 +72,7 @@ class SafetyLimits:
             temperature_limit_c=safety.temperature_limit_c,
             voltage_min_v=voltage_min_v,
             voltage_max_v=voltage_max_v,
+            voltage_time_s=safety.voltage_time_s,
             stale_limit_s=safety.stale_limit_s,
             slow_stale_limit_s=safety.slow_stale_limit_s,
             following_limit_rad=np.array(safety.following_limits_rad(robot)),
