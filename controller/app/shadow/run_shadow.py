@@ -14,6 +14,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.app.shadow.diagnosis import LEAST_S, Goals, diagnose
 from snakewalk.controller.app.shadow.shadow import Shadow
 from snakewalk.controller.runlog.record import InitialPose
+from snakewalk.controller.runlog.topics import ShadowTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.types import JointState
 
@@ -114,7 +115,12 @@ class RunShadow:
             self._first_s = deadline_s
         shadow = self._shadow.step(deadline_s - self._first_s, sent_rad)
         self._rows.append((deadline_s, sent_rad, state.current_a, state.position_rad))
-        self._log.shadow(deadline_s, shadow.position_rad, shadow.current_a)
+        self._log.add(
+            ShadowTable,
+            deadline_s,
+            position_rad=shadow.position_rad,
+            current_a=shadow.current_a,
+        )
         for text in self._alarm.update(state, shadow):
             self._log.event(deadline_s, "shadow", text, "warning")
             self._on_event("shadow", text)

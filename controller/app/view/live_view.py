@@ -13,7 +13,9 @@ from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.app.view.dead_man import DeadMan
+from snakewalk.controller.app.view.row_line import COURSE, GAIT, PICTURE
 from snakewalk.controller.app.view.watcher import WatcherProcess
+from snakewalk.controller.runlog.topics import PoseTable
 
 _PICTURE_S: Final = 0.5
 """Pictures of a camera are shown no more often (ours)."""
@@ -49,17 +51,17 @@ class LiveView(WatcherProcess):
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:
         """Take the gait that an operator runs: the page then has its sliders."""
         row = {"name": name, "parameters": parameters}
-        self._end.add("/gait", json.dumps(row).encode())
+        self._end.add(GAIT, json.dumps(row).encode())
 
     def on_course(self) -> None:
         """Take it that the run's waypoints may be set: the page then takes clicks."""
-        self._end.add("/course", b"{}")
+        self._end.add(COURSE, b"{}")
 
     def on_row(self, topic: str, row: bytes) -> None:
         """Take a row of the log; returns at once."""
-        if topic == "/pose" and self._picture is not None:
+        if topic == PoseTable.topic.name and self._picture is not None:
             picture, self._picture = self._picture, None
-            self._end.add("/picture", picture)
+            self._end.add(PICTURE, picture)
         self._end.add(topic, row)
 
     def on_picture(self, image: Image, time_s: float) -> None:

@@ -11,6 +11,12 @@ from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import PlanSummary, RunRecord
+from snakewalk.controller.runlog.topics import (
+    PathTable,
+    PoseTable,
+    ShadowTable,
+    WaypointTable,
+)
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.types import BodyPose, ImuState, JointState
 
@@ -67,10 +73,17 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
             head = rng.normal(size=3)
             angles[15] = 0.0
             body = body_in_world(robot, BodyPose(time_s, head, turn), angles)
-            file.pose(time_s, head, turn, links_m=body.link_m, centre_m=body.centre_m)
-            file.shadow(time_s, angles / 2.0, angles / 5.0)
-        file.waypoints_changed(0.2, [[2.0, 1.0], [0.0, 3.0]])
-        file.path_replanned(0.2, [[0.0, 1.0, 0.5], [2.0, 2.0, 0.4]])
+            file.add(
+                PoseTable,
+                time_s,
+                head_m=head,
+                rotation=turn,
+                links_m=body.link_m,
+                centre_m=body.centre_m,
+            )
+            file.add(ShadowTable, time_s, position_rad=angles / 2.0, current_a=angles / 5.0)
+        file.add(WaypointTable, 0.2, waypoints_m=[[2.0, 1.0], [0.0, 3.0]])
+        file.add(PathTable, 0.2, points_m=[[0.0, 1.0, 0.5], [2.0, 2.0, 0.4]])
         file.event(0.38, "trip", "joint 7: current", level="error")
     return path
 

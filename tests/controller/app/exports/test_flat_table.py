@@ -11,7 +11,7 @@ from snakewalk.controller.runlog.record import RunRecord
 
 UNITS = ("_rad", "_rad_s", "_a", "_s", "_m", "_m_s", "_c", "_v", "_j")
 UNITLESS = {
-    *("verdict", "reason", "joints", "target", "level", "kind", "text", "number"),
+    *("verdict", "reason", "joints", "target", "level", "kind", "text", "number", "key", "value"),
     *(f"rotation_{i}{j}" for i in range(3) for j in range(3)),
 }
 
@@ -50,7 +50,7 @@ def test_parquet_gives_every_number_back(record: RunRecord, tmp_path: Path) -> N
 
 def test_units_stand_in_the_names(record: RunRecord) -> None:
     tables = {table.name: table for table in flat_tables(record)}
-    names = {"cycle", "slow", "pose", "imu", "shadow", "path", "waypoints", "event"}
+    names = {"config", "cycle", "slow", "pose", "imu", "shadow", "path", "waypoints", "event"}
     assert set(tables) == names
     columns = [name for table in tables.values() for name in table.columns]
     flags = [f"{of}_joint{k}" for of in ("valid", "error", "hardware_error") for k in range(16)]
