@@ -73,15 +73,17 @@ class Curve:
     colour: str
     """Name of a colour of the report's palette."""
     joints: Literal["", "largest", "least", "mean"] = ""
-    """Value that is drawn of a field with a value for each joint; magnitudes of currents."""
+    """Value that is drawn of a field with a value for each joint."""
+    magnitude: bool = False
+    """Whether the sign is left out."""
     scale: float = 1.0
     """Factor from the field's unit to the panel's."""
     flat: float | None = None
     """Span up to which the values are constant: the page then states the value in words."""
     constant: str = ""
     """Words for constant values; default: name, median and unit."""
-    only_valid: bool = False
-    """Whether the curve has gaps where a cycle failed to read the joint."""
+    gaps: str = ""
+    """Field of the same topic that is false where the curve has a gap."""
 
 
 @dataclass(frozen=True, slots=True)

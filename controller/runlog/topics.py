@@ -29,6 +29,10 @@ from snakewalk.controller.runlog.column import (
 
 FORMAT: Final = 1
 NAN: Final = float("nan")
+FLAT_V: Final = 0.15
+"""Span up to which a supply holds no information (ours)."""
+FLAT_C: Final = 1.0
+"""The same of a temperature (ours)."""
 Flags = NDArray[np.bool_]
 Texts = tuple[str, ...]
 _TIME: Final = Column("clock of the run, s", "exact", is_known=True)
@@ -88,7 +92,7 @@ class CycleTable(Table):
     """Share of ``asked_rad`` that is due to compliance; NaN without compliance."""
     measured_rad: Annotated[
         Floats,
-        _per_joint("(J,)", curves=(Curve(Panel.JOINT_ANGLE, "measured", "blue", only_valid=True),)),
+        _per_joint("(J,)", curves=(Curve(Panel.JOINT_ANGLE, "measured", "blue", gaps="valid"),)),
     ]
     velocity_rad_s: Annotated[Floats, _per_joint("(J,)")]
     current_a: Annotated[
@@ -96,8 +100,8 @@ class CycleTable(Table):
         _per_joint(
             "(J,)",
             curves=(
-                Curve(Panel.CURRENT, "highest joint", "red", joints="largest"),
-                Curve(Panel.CURRENT, "mean of joints", "sky", joints="mean"),
+                Curve(Panel.CURRENT, "highest joint", "red", joints="largest", magnitude=True),
+                Curve(Panel.CURRENT, "mean of joints", "sky", joints="mean", magnitude=True),
                 Curve(Panel.JOINT_CURRENT, "current", "purple"),
             ),
         ),
@@ -149,14 +153,15 @@ class SlowTable(Table):
     temperature_c: Annotated[
         Floats,
         _per_joint(
-            "(J,)", curves=(Curve(Panel.HEAT, "hottest servo", "red", joints="largest", flat=1.0),)
+            "(J,)",
+            curves=(Curve(Panel.HEAT, "hottest servo", "red", joints="largest", flat=FLAT_C),),
         ),
     ]
     voltage_v: Annotated[
         Floats,
         _per_joint(
             "(J,)",
-            curves=(Curve(Panel.SUPPLY, "lowest supply", "amber", joints="least", flat=0.15),),
+            curves=(Curve(Panel.SUPPLY, "lowest supply", "amber", joints="least", flat=FLAT_V),),
         ),
     ]
     hardware_error: Annotated[Ints, _per_joint("(J,) register 70", "integer")]

@@ -52,7 +52,7 @@ from snakewalk.sim.physics.solids import solids
 Json = dict[str, Any]
 Row = tuple[float, str, Json]
 """Time in s, topic, message."""
-_TYPES: Final = {
+TYPES: Final = {
     SCENE: "foxglove.SceneUpdate",
     FRAMES: "foxglove.FrameTransforms",
     JOINT_STATES: "foxglove.JointStates",
@@ -101,8 +101,8 @@ def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:
 
         @cache
         def channel(topic: str) -> int:
-            if topic in _TYPES:
-                name = _TYPES[topic]
+            if topic in TYPES:
+                name = TYPES[topic]
                 schema = encode(SCHEMAS[name]).encode()
             else:
                 of_log = next(table.topic for table in TABLES if table.topic.name == topic)

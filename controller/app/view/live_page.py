@@ -192,7 +192,7 @@ class _LivePage:
             if now_s - self._curves_s >= _CURVES_S:
                 self._curves_s = now_s
                 past = self._record({topic: list(each) for topic, each in self._rows.items()})
-                dashboard.show_curves(past, len(past.cycle.time_s) - 1, len(past.pose.time_s) - 1)
+                dashboard.show_curves(past, len(past.cycle.time_s) - 1)
                 scene.show_paths(past.paths, float(past.cycle.time_s[-1]))
                 scene.show_trail(past.pose.centre_m)
 

@@ -54,7 +54,9 @@ def faults(value: Any, schema: Any, where: str) -> list[str]:
         return [] if "null" in kinds else [where]
     if kinds[0] == "array":
         ok, items = isinstance(value, list), schema.get("items")
-        return [f for v in value for f in faults(v, items, where) if items] if ok else [where]
+        if not ok or items is None:
+            return [] if ok else [where]
+        return [fault for one in value for fault in faults(one, items, where)]
     if kinds[0] != "object":
         return [] if isinstance(value, PYTHON_TYPES[kinds[0]]) else [where]
     if "properties" not in schema:
