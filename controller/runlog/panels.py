@@ -60,6 +60,12 @@ def _values(table: Table, name: str, curve: Curve) -> Floats:
         return values
     reduced = np.full(len(values), np.nan)
     known = np.isfinite(values).any(axis=1)
-    reduce = {"largest": np.nanmax, "least": np.nanmin, "mean": np.nanmean}[curve.joints]
-    reduced[known] = reduce(values[known], axis=1)
+    some = values[known]
+    match curve.joints:
+        case "largest":
+            reduced[known] = np.nanmax(some, axis=1)
+        case "least":
+            reduced[known] = np.nanmin(some, axis=1)
+        case "mean":
+            reduced[known] = np.nanmean(some, axis=1)
     return reduced

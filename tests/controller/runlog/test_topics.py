@@ -12,8 +12,7 @@ import pytest
 from mcap.reader import make_reader
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.app.exports import exported_topics
-from snakewalk.controller.app.view import row_line
+from snakewalk.controller.exchange import exported_topics
 from snakewalk.controller.runlog.column import Panel, Table, topic, unit_of
 from snakewalk.controller.runlog.panels import panel_curves
 from snakewalk.controller.runlog.reader import read_log
@@ -27,6 +26,7 @@ from snakewalk.controller.runlog.topics import (
     WalkTable,
 )
 from snakewalk.controller.runlog.writer import RunLog
+from snakewalk.controller.view import row_line
 from snakewalk.drivers.types import ImuState, JointState
 
 ROOT = Path(__file__).resolve().parents[3]

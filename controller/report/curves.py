@@ -1,0 +1,193 @@
+"""Curves of a run that can be zoomed and read off: Plotly's own page element, in the report."""
+
+import base64
+import gzip
+import json
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.figures.style import (
+    AMBER,
+    BLUE,
+    COLOURS,
+    GREEN,
+    INK,
+    RED,
+)
+from snakewalk.controller.metrics.path_error import path_error_m, waypoint_times_s
+from snakewalk.controller.runlog.column import Panel
+from snakewalk.controller.runlog.panels import panel_curves
+from snakewalk.controller.runlog.record import RunRecord
+
+_ROWS: Final = 4000
+"""Most rows of a curve: of a longer run every second, third ... row is on the page (ours)."""
+_PANEL_PX: Final = 150
+_GAP: Final = 0.055
+Curve = tuple[str, str, Floats, Floats]
+"""Name, colour, times, values."""
+
+
+def curves_html(record: RunRecord) -> str:
+    """HTML of the section, the library in it; empty where the log has nothing to draw."""
+    if len(record.cycle.time_s) < 2:
+        return ""
+    panels, constant = _panels(record)
+    spec = json.dumps(_figure(record, panels))
+    joints = "".join(
+        f"<option value='{k}'>joint {k + 1}</option>"
+        for k in range(record.cycle.asked_rad.shape[1])
+    )
+    step = _step(len(record.cycle.time_s))
+    which = "" if step == 1 else f" Every {step}. cycle is here, all are in the log."
+    return (
+        "<section id='curves'><h2>Curves</h2><figure>"
+        f"<p class='facts'><label>Last two panels: <select id='joint'>{joints}</select></label></p>"
+        "<div id='plot'><noscript>Curves need scripts; the pictures below do not.</noscript></div>"
+        "<figcaption>Drag to zoom in time, double-click for all, click a name to hide its curve. "
+        "Green: a waypoint reached; amber and orange: a warning, an error. The dark line is the "
+        f"film's time.{which}{constant}</figcaption></figure>"
+        f"<script id='plotly' type='text/plain'>{_library()}</script>"
+        f"<script id='curves-data' type='text/plain'>{_zipped(spec)}</script></section>"
+    )
+
+
+def _panels(record: RunRecord) -> tuple[list[tuple[str, list[Curve]]], str]:
+    """Panels (title with unit, curves), and a sentence about the constant values."""
+    error_m = path_error_m(record)
+    panels: list[tuple[str, list[Curve]]] = []
+    if np.isfinite(error_m).any():
+        panels.append(("from the path, m", [("from the path", BLUE, record.pose.time_s, error_m)]))
+    constant = []
+    for panel in Panel:
+        curves = [] if panel.is_of_one_joint else panel_curves(record, panel)
+        constant += [each.constant_text for each in curves if each.is_constant]
+        drawn = [
+            (each.curve.name, COLOURS[each.curve.colour], each.time_s, each.values)
+            for each in curves
+            if not each.is_constant
+        ]
+        if drawn:
+            panels.append((panel, drawn))
+    words = f" Constant, and not drawn: {', '.join(constant)}." if constant else ""
+    return panels, words
+
+
+def _figure(record: RunRecord, panels: Sequence[tuple[str, list[Curve]]]) -> dict[str, Any]:
+    """Traces, layout, and the values that the two panels of each joint show, for Plotly."""
+    joint = [(each, panel_curves(record, each)) for each in Panel if each.is_of_one_joint]
+    traces = [
+        _trace(name, colour, row, time_s, values)
+        for row, (_, curves) in enumerate(panels, start=1)
+        for name, colour, time_s, values in curves
+    ]
+    first = len(traces)
+    traces += [
+        _trace(each.curve.name, COLOURS[each.curve.colour], row, each.time_s, each.values[:, 0])
+        for row, (_, curves) in enumerate(joint, start=len(panels) + 1)
+        for each in curves
+    ]
+    every = [
+        [_packed(each.values[:, k]) for _, curves in joint for each in curves]
+        for k in range(record.cycle.asked_rad.shape[1])
+    ]
+    titles = [title for title, _ in (*panels, *joint)]
+    return {
+        "traces": traces,
+        "layout": _layout(record, titles),
+        "joints": every,
+        "first": first,
+        "height": _PANEL_PX * len(titles) + 60,
+    }
+
+
+def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:
+    count = len(titles)
+    tall = (1.0 - _GAP * (count - 1)) / count
+    layout: dict[str, Any] = {
+        "margin": {"l": 46, "r": 8, "t": 22, "b": 36},
+        "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
+        "hovermode": "x",
+        "showlegend": True,
+        "legend": {"orientation": "h", "y": -40.0 / (_PANEL_PX * count), "yanchor": "top"},
+        "dragmode": "zoom",
+        "xaxis": {
+            "range": [0.0, max(record.end_s, 1e-3)],
+            "title": {"text": "time (s)", "standoff": 4},
+            "anchor": "free",
+            "position": 0.0,
+        },
+        "annotations": [],
+        "shapes": [
+            _line(time_s, colour)
+            for colour, times in (
+                (GREEN, list(waypoint_times_s(record.pose, record.header.plan))),
+                (AMBER, [e.time_s for e in record.events if e.level == "warning"][:100]),
+                (RED, [e.time_s for e in record.events if e.level == "error"][:100]),
+            )
+            for time_s in times
+        ],
+    }
+    for row, title in enumerate(titles, start=1):
+        top = 1.0 - (row - 1) * (tall + _GAP)
+        layout["yaxis" if row == 1 else f"yaxis{row}"] = {
+            "domain": [max(top - tall, 0.0), top],
+            "fixedrange": True,
+            "gridcolor": "#e9edf1",
+            "zerolinecolor": "#d9e0e6",
+            "nticks": 5,
+        }
+        layout["annotations"].append(
+            {
+                "text": f"<b>{title}</b>", "xref": "paper", "yref": "paper", "x": 0.0, "y": top,
+                "xanchor": "left", "yanchor": "bottom", "showarrow": False,
+            }
+        )  # fmt: skip
+    return layout
+
+
+def _line(time_s: float, colour: str) -> dict[str, Any]:
+    return {
+        "type": "line", "x0": time_s, "x1": time_s, "yref": "paper", "y0": 0.0, "y1": 1.0,
+        "line": {"color": colour, "width": 1}, "opacity": 0.6, "layer": "below",
+    }  # fmt: skip
+
+
+def _trace(name: str, colour: str, row: int, time_s: Floats, values: Floats) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": name,
+        "x": _packed(time_s),
+        "y": _packed(values),
+        "xaxis": "x",
+        "yaxis": "y" if row == 1 else f"y{row}",
+        "line": {"color": colour, "width": 1.3},
+        "hovertemplate": f"{name} %{{y:.4g}}<extra></extra>",
+    }
+
+
+@cache
+def _library() -> str:
+    """Plotly, compressed once however many pages a process makes."""
+    from plotly.offline import get_plotlyjs  # noqa: PLC0415  an extra
+
+    return _zipped(get_plotlyjs())
+
+
+def _zipped(text: str) -> str:
+    """Base64, which holds no markup, of the compressed text; the page's script unpacks it."""
+    return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
+
+
+def _step(rows: int) -> int:
+    return max(1, -(-rows // _ROWS))
+
+
+def _packed(values: Floats) -> dict[str, str]:
+    """An array as Plotly's base64 of 4-byte numbers; NaN is a gap."""
+    thinned = np.asarray(values[:: _step(len(values))], dtype="<f4")
+    return {"dtype": "f4", "bdata": base64.b64encode(thinned.tobytes()).decode()}
