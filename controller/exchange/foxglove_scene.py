@@ -20,20 +20,16 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.controller.exchange.body_frames import WORLD, body_frames, joint_names
-from snakewalk.controller.exchange.exported_topics import (
-    FOXGLOVE_LOG,
+from snakewalk.controller.exchange.foxglove_schema import SCHEMAS
+from snakewalk.controller.exchange.imu_readings import imu_readings
+from snakewalk.controller.exchange.remaining_fields import TIME, Shown, remaining_fields
+from snakewalk.controller.exchange.ros_messages import (
     FRAMES,
     HEAD_POSE,
     IMU,
     JOINT_GOALS,
     JOINT_STATES,
-    SCENE,
-    TIME,
-    Shown,
-    other_fields,
 )
-from snakewalk.controller.exchange.foxglove_schema import SCHEMAS
-from snakewalk.controller.exchange.imu_readings import imu_readings
 from snakewalk.controller.runlog.encode import encode, floats, number
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.row_printer import json_value
@@ -52,6 +48,8 @@ from snakewalk.sim.physics.solids import solids
 Json = dict[str, Any]
 Row = tuple[float, str, Json]
 """Time in s, topic, message."""
+SCENE: Final = "/scene"
+FOXGLOVE_LOG: Final = "/log"
 TYPES: Final = {
     SCENE: "foxglove.SceneUpdate",
     FRAMES: "foxglove.FrameTransforms",
@@ -145,7 +143,7 @@ def _rows(record: RunRecord) -> Iterator[Row]:
 def _others(record: RunRecord) -> Iterator[Row]:
     """Rows of the log without the fields that other messages contain."""
     yield 0.0, ConfigTable.topic.name, record.header.row()
-    for table, columns in other_fields(record, SHOWN):
+    for table, columns in remaining_fields(record, SHOWN):
         for k, time_s in enumerate(table.time_s.tolist()):
             values = {
                 name: json_value(each, getattr(table, name)[k]) for name, each in columns.items()

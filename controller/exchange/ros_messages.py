@@ -10,19 +10,8 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.exchange.body_frames import WORLD, body_frames, joint_names
-from snakewalk.controller.exchange.exported_topics import (
-    DIAGNOSTICS,
-    FRAMES,
-    HEAD_POSE,
-    IMU,
-    JOINT_GOALS,
-    JOINT_STATES,
-    PATH,
-    ROSOUT,
-    Shown,
-    other_fields,
-)
 from snakewalk.controller.exchange.imu_readings import imu_readings
+from snakewalk.controller.exchange.remaining_fields import Shown, remaining_fields
 from snakewalk.controller.runlog.column import Column
 from snakewalk.controller.runlog.encode import encode
 from snakewalk.controller.runlog.record import RunRecord
@@ -31,10 +20,19 @@ from snakewalk.controller.runlog.topics import (
     CycleTable,
     EventTable,
     ImuTable,
+    PathTable,
     PoseTable,
     SlowTable,
 )
 
+JOINT_STATES: Final = "/joint_states"
+JOINT_GOALS: Final = "/joint_goals"
+FRAMES: Final = "/tf"
+HEAD_POSE: Final = "/head_pose"
+IMU: Final = ImuTable.topic.name
+PATH: Final = PathTable.topic.name
+DIAGNOSTICS: Final = "/diagnostics"
+ROSOUT: Final = "/rosout"
 _LEVELS: Final = {"info": 20, "warning": 30, "error": 40}
 """Of ``rcl_interfaces/msg/Log``."""
 OK: Final = 0
@@ -219,7 +217,7 @@ class RosMessages:
         """Fields that no message above contains: each has a topic of its own."""
         name = ConfigTable.topic.name
         yield self._row(0.0, name, _TEXT, data=encode(record.header.row()))
-        for table, columns in other_fields(record, SHOWN):
+        for table, columns in remaining_fields(record, SHOWN):
             for name, column in columns.items():
                 topic = table.topic.name
                 times_s, values = table.time_s.tolist(), getattr(table, name)

@@ -23,17 +23,15 @@ from rclpy.signals import SignalHandlerOptions
 from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.exchange.exported_topics import (
+from snakewalk.controller.exchange.ros_messages import (
     DIAGNOSTICS,
+    ERROR,
     HEAD_POSE,
     IMU,
     JOINT_GOALS,
     JOINT_STATES,
-    PATH,
-)
-from snakewalk.controller.exchange.ros_messages import (
-    ERROR,
     OK,
+    PATH,
     TYPES,
     WARNING,
     RosMessages,

@@ -7,9 +7,9 @@ import pytest
 from mcap.reader import make_reader
 
 from snakewalk.controller.exchange import foxglove_scene, ros_messages
-from snakewalk.controller.exchange.exported_topics import TIME
 from snakewalk.controller.exchange.flat_table import flat_tables
 from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene
+from snakewalk.controller.exchange.remaining_fields import TIME
 from snakewalk.controller.exchange.ros_bag import write_ros_bag
 from snakewalk.controller.runlog.column import Table, unit_of
 from snakewalk.controller.runlog.record import RunRecord

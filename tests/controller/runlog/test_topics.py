@@ -1,9 +1,7 @@
-"""One table of topics: nothing types a topic twice, and logs of before keep their bytes."""
+"""The table of topics: logs of before load and keep their bytes, rows have their fields."""
 
-import ast
 import json
-from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections import defaultdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +10,6 @@ import pytest
 from mcap.reader import make_reader
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.exchange import exported_topics
 from snakewalk.controller.runlog.column import Panel, Table, topic, unit_of
 from snakewalk.controller.runlog.panels import panel_curves
 from snakewalk.controller.runlog.reader import read_log
@@ -26,10 +23,8 @@ from snakewalk.controller.runlog.topics import (
     WalkTable,
 )
 from snakewalk.controller.runlog.writer import RunLog
-from snakewalk.controller.view import row_line
 from snakewalk.drivers.types import ImuState, JointState
 
-ROOT = Path(__file__).resolve().parents[3]
 OLD_LOG = Path(__file__).parent / "logs" / "three-joints-0.1.mcap"
 """Recorded by version 0.1.0 before the table of topics: a row of every topic, unknown numbers."""
 Messages = dict[str, list[tuple[int, bytes]]]
@@ -124,46 +119,6 @@ def test_a_log_of_before_loads(tmp_path: Path) -> None:
     assert len(record.paths) == len(record.waypoints) == 2
     for table in record.tables():
         assert len(table.time_s), table.topic.name
-
-
-def texts(tree: ast.AST) -> Iterator[str]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            yield node.value
-
-
-def repeated(sources: dict[str, str]) -> set[str]:
-    """Topics that are typed more than once in the library."""
-    names = {table.topic.name for table in TABLES}
-    for module in (exported_topics, row_line):
-        names |= {
-            value
-            for key, value in vars(module).items()
-            if key.isupper() and isinstance(value, str) and value.startswith("/")
-        }
-    found = Counter(
-        text for source in sources.values() for text in texts(ast.parse(source)) if text in names
-    )
-    assert names == set(found), "each is typed somewhere"
-    return {name for name, count in found.items() if count > 1}
-
-
-@pytest.fixture(scope="module")
-def library() -> dict[str, str]:
-    return {
-        str(file): file.read_text(encoding="utf-8")
-        for top in ("config", "drivers", "sim", "controller")
-        for file in (ROOT / top).rglob("*.py")
-    }
-
-
-def test_no_topic_is_typed_a_second_time(library: dict[str, str]) -> None:
-    assert repeated(library) == set()
-
-
-def test_a_second_copy_is_found(library: dict[str, str]) -> None:
-    planted = library | {"copy.py": 'rows = {"/friction": []}'}
-    assert repeated(planted) == {"/friction"}
 
 
 def test_the_unit_is_the_end_of_the_name() -> None:

@@ -1,4 +1,4 @@
-"""Topics of the exported files, and the fields of the log that their messages contain."""
+"""Fields of a log that no well-known message of an export contains."""
 
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any, Final
@@ -7,24 +7,13 @@ import numpy as np
 
 from snakewalk.controller.runlog.column import Column, Table
 from snakewalk.controller.runlog.record import RunRecord
-from snakewalk.controller.runlog.topics import ImuTable, PathTable
 
-JOINT_STATES: Final = "/joint_states"
-JOINT_GOALS: Final = "/joint_goals"
-FRAMES: Final = "/tf"
-HEAD_POSE: Final = "/head_pose"
-IMU: Final = ImuTable.topic.name
-PATH: Final = PathTable.topic.name
-DIAGNOSTICS: Final = "/diagnostics"
-ROSOUT: Final = "/rosout"
-SCENE: Final = "/scene"
-FOXGLOVE_LOG: Final = "/log"
 TIME: Final = "time_s"
 Shown = Mapping[type[Table], Collection[str]]
 """Fields that well-known messages contain, by table."""
 
 
-def other_fields(record: RunRecord, shown: Shown) -> Iterator[tuple[Table, dict[str, Column]]]:
+def remaining_fields(record: RunRecord, shown: Shown) -> Iterator[tuple[Table, dict[str, Column]]]:
     """Tables that have rows, and their fields that no well-known message contains.
 
     A field is left out if it is unknown in every row.
