@@ -7,8 +7,6 @@ lies along its own axis makes no difference to the motion, so anchors are moved 
 """
 
 import math
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +21,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.console.child_process import run_code
 from snakewalk.controller.kinematics.links import body_in_world, chain_points_m
 from snakewalk.drivers.types import BodyPose
 
@@ -208,8 +207,7 @@ def _compile(source: Path, made: Path) -> str | None:
     A model may ask for any memory and time, and crash the compiler; that process is limited in all.
     """
     limits = str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)
-    command = [sys.executable, "-c", _COMPILER, str(source), str(made), *limits]
-    ended = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    ended = run_code(_COMPILER, str(source), str(made), *limits)
     if ended.returncode == _SAID:
         return ended.stdout
     if ended.returncode or not made.is_file():

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import viser
 
+from snakewalk.controller.console.messages import plain
 from snakewalk.controller.runlog.record import Header, RunRecord
 from snakewalk.controller.runlog.row_line import BUTTON, COURSE, GAIT, PICTURE, WatcherEnd
 from snakewalk.controller.runlog.tables import record_of
@@ -57,9 +58,14 @@ def serve(line: socket.socket, host: str, port: int) -> None:
         return
     line.sendall(json.dumps({"url": url}).encode() + b"\n")
     page = _LivePage(server, WatcherEnd(line), gamepad)
-    with suppress(EOFError, OSError):
+    with suppress(EOFError):
         while True:
-            page.step()
+            try:
+                page.step()
+            except EOFError:
+                raise
+            except Exception as fault:  # the E-STOP stays
+                page.report(fault)
     server.stop()
 
 
@@ -82,6 +88,7 @@ class _LivePage:
         self._waypoint_panel: WaypointPanel | None = None
         self._takes_waypoints = False
         self._over = False
+        self._faults: set[str] = set()
         self._asked_s = self._told_s = self._servos_s = self._curves_s = -1.0
 
     def step(self) -> None:
@@ -105,6 +112,15 @@ class _LivePage:
                 self._stop.ended(ended)
             elif self._told_s > 0.0 and not self._over:
                 self._stop.show(f"no news of the run for {now_s - self._told_s:.0f} s")
+
+    def report(self, fault: Exception) -> None:
+        """Report once what could not be shown."""
+        text = " ".join(
+            f"page: it cannot show everything ({fault or type(fault).__name__})".split()
+        )
+        if text not in self._faults:
+            self._faults.add(text)
+            print(f"snakewalk: {plain(text)}", file=sys.stderr, flush=True)
 
     def _commands(self) -> list[str]:
         """What was set in the page since the last call."""

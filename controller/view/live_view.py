@@ -12,6 +12,7 @@ from typing import Final
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import plugin
 from snakewalk.controller.run.watcher import WatcherProcess
 from snakewalk.controller.runlog.row_line import COURSE, GAIT, PICTURE
 from snakewalk.controller.runlog.topics import PoseTable
@@ -32,9 +33,9 @@ class LiveView(WatcherProcess):
 
     def __init__(self, at: str = "127.0.0.1:8080") -> None:
         require_extra("the page needs", "viser")
-        super().__init__(_serve, *host_and_port(at), fault=f"--view-at {at}")
+        super().__init__(_serve, *host_and_port(at), what="page", fault=f"--view-at {at}")
         self.url = str(self.said["url"])
-        """To be opened in a browser; holds the token where one is asked for."""
+        """To be opened in a browser; contains the token."""
         self._picture: bytes | None = None
         self._picture_s = -math.inf
         self._dead_man = DeadMan()
@@ -77,12 +78,10 @@ class LiveView(WatcherProcess):
             self._picture = json.dumps({"time_s": time_s, "jpeg": shown}).encode()
 
 
+@plugin("observer", "page")
 @contextmanager
-def open_view(view: bool, at: str) -> Iterator[LiveView | None]:
-    """Serve the page of a run where it is asked for, and print its address."""
-    if not view:
-        yield None
-        return
+def open_page(at: str) -> Iterator[LiveView]:
+    """Live web page of a run, with a stop button."""
     with LiveView(at) as page:
         print(f"page: {page.url}", file=sys.stderr, flush=True)
         yield page
