@@ -38,10 +38,11 @@ from snakewalk.controller.console.options import (
 from snakewalk.controller.console.progress import ProgressBar, TimeBar, in_real_time, show_progress
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite, run_folder
 from snakewalk.controller.learning import policy_trials as study
+from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.motion.policy import load_policy
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_policy
-from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.finish import by_evidence, show_run
 from snakewalk.controller.run.watchers import watched
 
 if TYPE_CHECKING:
@@ -134,11 +135,15 @@ def run_policy(
         "duration_s": round(finished.outcome.duration_s, 2),
         "tripped": finished.outcome.tripped,
         "slowed_to": round(finished.outcome.least_rate, 3),
-        "travelled_m": finished.summary.travelled_m,
+        **by_evidence(finished, {"travelled_m": _travelled_m(finished.summary)}),
         "electrical_energy_j": finished.summary.electrical_energy_j,
         "peak_current_a": finished.summary.peak_current_a,
     }
     show_run(finished, folder, result, as_json, film=film)
+
+
+def _travelled_m(numbers: RunSummary) -> float | None:
+    return numbers.travelled_m if numbers.is_measured else numbers.dead_reckoned_travelled_m
 
 
 @command(

@@ -35,7 +35,7 @@ from snakewalk.controller.console.options import (
     show,
 )
 from snakewalk.controller.console.result_files import run_folder
-from snakewalk.controller.run.finish import write_artifacts
+from snakewalk.controller.run.finish import arrivals, exit_code, write_artifacts
 
 
 @command(
@@ -85,6 +85,13 @@ def run(
     observe: Observe = None,
     film: Film = True,
     look: Look = "servos",
+    accept_dead_reckoning: Annotated[
+        bool,
+        typer.Option(
+            "--accept-dead-reckoning",
+            help="exit code 0 instead of 3 where the arrival was dead-reckoned, not measured",
+        ),
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -142,7 +149,7 @@ def run(
         {
             "run": name,
             "waypoints": outcome.waypoints,
-            "waypoints_reached": outcome.reached,
+            **arrivals(finished),
             "duration_s": round(outcome.duration_s, 2),
             "tripped": outcome.tripped,
             "advance_alarms": outcome.alarms,
@@ -154,8 +161,7 @@ def run(
         },
         as_json,
     )
-    if not outcome.complete:
-        raise SystemExit(1)
+    raise SystemExit(exit_code(finished, accept_dead_reckoning))
 
 
 def _confirm(found: str) -> bool:
