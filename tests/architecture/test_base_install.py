@@ -112,7 +112,7 @@ def test_a_motion_runs_on_servos(results: dict[tuple[str, ...], Result]) -> None
     assert result["report"] is None
     assert result["film"] is None
     assert "snakewalk: no film: films need MuJoCo and PyAV: pip install" in ran.err
-    assert "snakewalk: no report: the report needs matplotlib: pip install" in ran.err
+    assert "snakewalk: no report: the report needs matplotlib and Plotly: pip install" in ran.err
 
 
 def test_a_log_becomes_tables_and_a_scene(results: dict[tuple[str, ...], Result]) -> None:
