@@ -6,12 +6,14 @@ libraries warn of is ``debug``. Without :func:`messages` nothing is shown, as fo
 """
 
 import logging
+import platform
 import re
 import shlex
 import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TextIO
 
@@ -79,9 +81,6 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
     shown = warnings.showwarning
     warnings.showwarning = _library_warning
     try:
-        import platform  # noqa: PLC0415  a program starts without these
-        from importlib.metadata import version  # noqa: PLC0415
-
         words = shlex.join(["snakewalk", *sys.argv[1:]])
         LOGGER.debug(
             "%s; version %s, Python %s, %s",

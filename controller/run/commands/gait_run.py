@@ -37,7 +37,7 @@ from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.motion.operator import KEYS, Operator
-from snakewalk.controller.run.commands.gait import Name, Param, parameters
+from snakewalk.controller.run.commands.gait_options import Name, Param, parameters
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_gait, with_compliance
 from snakewalk.controller.run.finish import by_evidence, costs_of_transport, show_run
