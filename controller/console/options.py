@@ -10,14 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.plain_console import PlainConsole
 from snakewalk.controller.console.result_files import LOG
+from snakewalk.controller.console.shared_text import without_folders
 
 if TYPE_CHECKING:
     from snakewalk.controller.metrics.summary import RunSummary
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 _WIDE: Final = 200
 """Columns of a pipe or a file, which break no line."""
-console = Console(
+console = PlainConsole(
     highlight=False,
     markup=False,
     emoji=False,  # er:100:9 is a graph
@@ -263,9 +264,10 @@ def _text(value: object) -> str:
     return "-" if value is None else str(value)
 
 
-def _what_made_it() -> str:
-    """The command, the machine and the time, for the foot of a page."""
-    words = shlex.join(["snakewalk", *sys.argv[1:]])
+def _what_made_it(folders: bool) -> str:
+    """Return command, machine and time for the foot of a page, with folders or only file names."""
+    given = sys.argv[1:] if folders else [without_folders(word) for word in sys.argv[1:]]
+    words = shlex.join(["snakewalk", *given])
     when = datetime.now().astimezone().isoformat(" ", "seconds")
     return f"Made by {words} on {platform.node()} ({platform.machine()}), {when}."
 
@@ -278,13 +280,18 @@ def write_artifacts(
     film: bool,
     fine: bool = False,
     look: str = "servos",
+    folders: bool = False,
 ) -> "Artifacts":
-    """Make the report and the film of a run; print on standard error what could not be made."""
+    """Make the report and the film of a run; print on standard error what could not be made.
+
+    The report contains the folders of the user's files if ``folders`` is true.
+    """
     from snakewalk.controller.report.artifacts import make_artifacts  # noqa: PLC0415  heavy; --help stays quick
 
     try:
+        what = _what_made_it(folders)
         made = make_artifacts(
-            record, folder, numbers, film=film, fine=fine, look=look, made=_what_made_it()
+            record, folder, numbers, film=film, fine=fine, look=look, made=what, folders=folders
         )
     except KeyboardInterrupt as stop:
         log = folder / LOG

@@ -15,6 +15,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import digest
+from snakewalk.config.plain_text import plain
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import FrictionConfig, WorldConfig
@@ -275,6 +276,7 @@ class RunLog:
 
     def event(self, time_s: float, kind: str, text: str, level: Level = "info") -> None:
         """Log something that happened; above ``info`` it is on the disk when this returns."""
+        text = plain(text)
         self._add("/event", time_s, {"time_s": time_s, "level": level, "kind": kind, "text": text})
         if level != "info":
             self._writer.flush()

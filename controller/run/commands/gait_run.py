@@ -242,10 +242,10 @@ def _hands(
     if not live and gamepad is None:
         return None
     from rich.columns import Columns  # noqa: PLC0415
-    from rich.console import Console  # noqa: PLC0415
 
     from snakewalk.controller.console.gamepad import Gamepad  # noqa: PLC0415
     from snakewalk.controller.console.keyboard import Keyboard  # noqa: PLC0415
+    from snakewalk.controller.console.plain_console import PlainConsole  # noqa: PLC0415
     from snakewalk.controller.motion.operator import KEYS  # noqa: PLC0415
 
     devices: list[Keyboard | Gamepad | LiveView] = []
@@ -258,7 +258,7 @@ def _hands(
     if gamepad is not None:
         devices.append(stack.enter_context(Gamepad(gamepad)))
         keys += ["hold LB or RB: it moves", "right stick pressed: torque off"]
-    Console(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
+    PlainConsole(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
     return _Hands(devices, page)
 
 
