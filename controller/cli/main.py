@@ -17,10 +17,13 @@ _ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)
 )
 """Signals that would end a program without a word; SIGQUIT is Ctrl-\\."""
-_LEFT_OUT = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR X86_V4"
-"""What numpy, which is imported later, must do without on an x86-64: its sines and exponentials for
-these come from another library and differ in the last bit, and so would runs. A name that a version
-of numpy or a processor does not know is no fault."""
+_LEFT_OUT = (
+    "AVX512F AVX512CD AVX512_KNL AVX512_KNM AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR "
+    "X86_V4"
+)
+"""Loops for AVX-512 that numpy, which is imported later, leaves out on x86-64: their sines and
+exponentials come from another library and differ in the last bit, and so would runs. numpy ignores
+names that its version or the processor does not have."""
 _BY_SIGNAL = 128
 """Exit code of a program that a signal has ended: this, and the signal's number."""
 _INTERRUPTED = 130

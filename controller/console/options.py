@@ -1,13 +1,10 @@
 """What the commands share: options, and how a result is shown."""
 
 import json
-import platform
-import shlex
 import sys
 from collections.abc import Mapping
-from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import typer
 from rich.table import Table
@@ -15,16 +12,7 @@ from rich.table import Table
 from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plain_console import PlainConsole
-from snakewalk.controller.console.result_files import LOG
-from snakewalk.controller.console.shared_text import without_folders
-
-if TYPE_CHECKING:
-    from snakewalk.controller.metrics.summary import RunSummary
-    from snakewalk.controller.report.artifacts import Artifacts
-    from snakewalk.controller.run.execute import Finished
-    from snakewalk.controller.runlog.record import RunRecord
 
 _WIDE: Final = 200
 """Columns of a pipe or a file, which break no line."""
@@ -42,6 +30,10 @@ RunName = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
+Assume = Annotated[
+    list[str] | None,
+    typer.Option(help="KEY=VALUE for what the file does not state; may be repeated"),
+]
 Seed = Annotated[int | None, typer.Option(help="of every random choice")]
 FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="the others follow it")]
 Motion = Annotated[
@@ -264,51 +256,14 @@ def _text(value: object) -> str:
     return "-" if value is None else str(value)
 
 
-def _what_made_it(folders: bool) -> str:
-    """Return command, machine and time for the foot of a page, with folders or only file names."""
-    given = sys.argv[1:] if folders else [without_folders(word) for word in sys.argv[1:]]
-    words = shlex.join(["snakewalk", *given])
-    when = datetime.now().astimezone().isoformat(" ", "seconds")
-    return f"Made by {words} on {platform.node()} ({platform.machine()}), {when}."
-
-
-def write_artifacts(
-    record: "RunRecord",
-    folder: Path,
-    numbers: "RunSummary | None" = None,
-    *,
-    film: bool,
-    fine: bool = False,
-    look: str = "servos",
-    folders: bool = False,
-) -> "Artifacts":
-    """Make the report and the film of a run; print on standard error what could not be made.
-
-    The report contains the folders of the user's files if ``folders`` is true.
-    """
-    from snakewalk.controller.report.artifacts import make_artifacts  # noqa: PLC0415  heavy; --help stays quick
-
-    try:
-        what = _what_made_it(folders)
-        made = make_artifacts(
-            record, folder, numbers, film=film, fine=fine, look=look, made=what, folders=folders
-        )
-    except KeyboardInterrupt as stop:
-        log = folder / LOG
-        if log.exists():
-            stop.add_note(f"the run is whole: {log}; its film: snakewalk report {log}")
-        raise
-    for line in made.notes:
-        LOGGER.warning("%s", line)
-    return made
-
-
-def show_run(
-    finished: "Finished", folder: Path, facts: Mapping[str, object], as_json: bool, *, film: bool
-) -> None:
-    """Make the report and the film, and show a run's facts and files; exit 1 if safety tripped."""
-    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
-    files = {"log": str(finished.log), "summary": str(folder / "summary.json")}
-    show({**facts, **files, **artifacts.to_dict()}, as_json)
-    if finished.outcome.tripped is not None:
-        raise SystemExit(1)
+RobotName = Annotated[
+    str, typer.Argument(help="shipped robot, or a TOML file", autocompletion=completion.ROBOTS)
+]
+Observe = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--observe",
+        metavar="NAME[:ARGUMENT]",
+        help="observer from a plug-in; `snakewalk list` shows them; may be given again",
+    ),
+]

@@ -12,6 +12,9 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.gamepad import Gamepad
+from snakewalk.controller.console.keyboard import Keyboard
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import (
     VIEW_AT,
@@ -29,10 +32,18 @@ from snakewalk.controller.console.options import (
     ViewAt,
     World,
     key_values,
-    show_run,
 )
+from snakewalk.controller.console.plain_console import PlainConsole
+from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.metrics.displacement import gait_displacement
+from snakewalk.controller.motion.operator import KEYS, Operator
 from snakewalk.controller.run.commands.gait import Name, Param, parameters
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_gait, with_compliance
+from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.observer_watch import ADVICE
+from snakewalk.controller.run.watchers import watched
 
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
@@ -40,11 +51,19 @@ if TYPE_CHECKING:
     from snakewalk.controller.console.keyboard import Keyboard
     from snakewalk.controller.motion.gait_motion import GaitMotion
     from snakewalk.controller.motion.operator import Operator
-    from snakewalk.controller.run.gait_run import GaitRun
+    from snakewalk.controller.run.kinds.gait_run import GaitRun
+    from snakewalk.controller.run.watchers import PageControls
     from snakewalk.controller.runtime.drive import OnEvent
-    from snakewalk.controller.view.live_view import LiveView
 
 
+@command(
+    "gait run",
+    examples=(
+        "gait run sidewinding --param lift_rad=0.15 --seconds 10",
+        "gait run lateral-undulation --robot yaw16 --live",
+        "gait run rolling --port /dev/ttyUSB0",
+    ),
+)
 def run_gait(
     name: Name,
     robot: Robot = None,
@@ -89,12 +108,6 @@ def run_gait(
     as_json: Json = False,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.metrics.displacement import gait_displacement  # noqa: PLC0415
-    from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.run.factory import prepare_gait, with_compliance  # noqa: PLC0415
-
     if by not in {"blend", "cpg"}:
         raise InputError(f"--by {by}: expected blend or cpg")
     with ExitStack() as stack:
@@ -168,7 +181,7 @@ class _Hands:
     """What an operator has in hand: keyboard, gamepad, page."""
 
     def __init__(
-        self, devices: "list[Keyboard | Gamepad | LiveView]", page: "LiveView | None"
+        self, devices: "list[Keyboard | Gamepad | PageControls]", page: "PageControls | None"
     ) -> None:
         self._devices = devices
         self._page = page
@@ -200,8 +213,6 @@ class _Hands:
         if not gone:
             return None
         if self.policy == "stop":
-            from snakewalk.controller.run.observer_watch import ADVICE  # noqa: PLC0415
-
             return f"{gone[0]}; {ADVICE}"
         if self._lost is None:
             self._lost = gone[0]
@@ -212,7 +223,6 @@ class _Hands:
         self, motion: "GaitMotion", robot: "RobotConfig", on_event: "OnEvent"
     ) -> "Operator":
         """Put the keys that were pressed in charge of a motion."""
-        from snakewalk.controller.motion.operator import Operator  # noqa: PLC0415
 
         def on_change(kind: str, text: str) -> None:
             on_event(kind, text)
@@ -236,19 +246,14 @@ class _Hands:
 
 
 def _hands(
-    stack: ExitStack, live: bool, gamepad: Path | None, page: "LiveView | None"
+    stack: ExitStack, live: bool, gamepad: Path | None, page: "PageControls | None"
 ) -> _Hands | None:
     """Open what an operator has in hand, and say what it does; None without an operator."""
     if not live and gamepad is None:
         return None
     from rich.columns import Columns  # noqa: PLC0415
 
-    from snakewalk.controller.console.gamepad import Gamepad  # noqa: PLC0415
-    from snakewalk.controller.console.keyboard import Keyboard  # noqa: PLC0415
-    from snakewalk.controller.console.plain_console import PlainConsole  # noqa: PLC0415
-    from snakewalk.controller.motion.operator import KEYS  # noqa: PLC0415
-
-    devices: list[Keyboard | Gamepad | LiveView] = []
+    devices: list[Keyboard | Gamepad | PageControls] = []
     keys: list[str] = []
     if page is not None:
         devices.append(page)
