@@ -7,13 +7,14 @@ import base64
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from html import escape
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.shared_text import shared, without_folders
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.runlog.record import Event
 
@@ -44,6 +45,7 @@ def page(
     curves: str = "",
     links: Sequence[str] = (),
     made: str = "",
+    folders: bool = False,
 ) -> str:
     """Whole page.
 
@@ -56,8 +58,14 @@ def page(
         curves: HTML made by ``curves_html``, or empty.
         links: names of files beside the page.
         made: by which command, where and when the page was made; empty: not said.
+        folders: whether the texts keep the folders of the user's files.
 
     """
+    if not folders:
+        known = {field.name: getattr(numbers, field.name) for field in fields(numbers)}
+        texts = {key: without_folders(one) for key, one in known.items() if isinstance(one, str)}
+        numbers, config, made = replace(numbers, **texts), shared(config), without_folders(made)
+        events = [replace(event, text=without_folders(event.text)) for event in events]
     title = f"{numbers.run} on {numbers.backend}"
     note = f'<p class="note">{escape(numbers.log_note)}</p>' if numbers.log_note else ""
     body = [
@@ -70,7 +78,7 @@ def page(
         curves,
         *(_figure(s) for s in sections),
         _events(events),
-        _details("All numbers", numbers.to_dict()),
+        _details("All numbers", numbers.to_dict() if folders else shared(numbers.to_dict())),
         _details("Configuration", config),
         _footer(links, made),
     ]

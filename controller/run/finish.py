@@ -13,6 +13,7 @@ from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import show
 from snakewalk.controller.console.plugins import require
 from snakewalk.controller.console.result_files import LOG
+from snakewalk.controller.console.shared_text import without_folders
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.run.execute import Finished
 from snakewalk.controller.runlog.record import RunRecord
@@ -35,9 +36,10 @@ class Artifacts:
         }
 
 
-def _what_made_it() -> str:
-    """The command, the machine and the time, for the foot of a page."""
-    words = shlex.join(["snakewalk", *sys.argv[1:]])
+def _what_made_it(folders: bool) -> str:
+    """Return command, machine and time for the foot of a page, with folders or only file names."""
+    given = sys.argv[1:] if folders else [without_folders(word) for word in sys.argv[1:]]
+    words = shlex.join(["snakewalk", *given])
     when = datetime.now().astimezone().isoformat(" ", "seconds")
     return f"Made by {words} on {platform.node()} ({platform.machine()}), {when}."
 
@@ -50,11 +52,16 @@ def write_artifacts(
     film: bool,
     fine: bool = False,
     look: str = "servos",
+    folders: bool = False,
 ) -> Artifacts:
-    """Make the report and the film of a run; print on standard error what could not be made."""
+    """Make the report and the film of a run; print on standard error what could not be made.
+
+    The report contains the folders of the user's files if ``folders`` is true.
+    """
+    what = _what_made_it(folders)
     try:
         made: Artifacts = require("results", "report", "--film").load()(
-            record, folder, numbers, film=film, fine=fine, look=look, made=_what_made_it()
+            record, folder, numbers, film=film, fine=fine, look=look, made=what, folders=folders
         )
     except KeyboardInterrupt as stop:
         log = folder / LOG

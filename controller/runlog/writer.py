@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import digest
+from snakewalk.config.plain_text import plain
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
@@ -187,7 +188,7 @@ class RunLog:
 
     def event(self, time_s: float, kind: str, text: str, level: Level = "info") -> None:
         """Log an event; above ``info`` it is on the disk when this returns."""
-        self.add(EventTable, time_s, level=level, kind=kind, text=text)
+        self.add(EventTable, time_s, level=level, kind=kind, text=plain(text))
         if level != "info":
             self._writer.flush()
 

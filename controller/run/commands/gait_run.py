@@ -33,6 +33,7 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
 )
+from snakewalk.controller.console.plain_console import PlainConsole
 from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.metrics.displacement import gait_displacement
@@ -41,6 +42,7 @@ from snakewalk.controller.run.commands.gait_options import Name, Param, paramete
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_gait, with_compliance
 from snakewalk.controller.run.finish import by_evidence, costs_of_transport, show_run
+from snakewalk.controller.run.observer_watch import ADVICE
 from snakewalk.controller.run.watchers import watched
 
 if TYPE_CHECKING:
@@ -213,8 +215,6 @@ class _Hands:
         if not gone:
             return None
         if self.policy == "stop":
-            from snakewalk.controller.run.observer_watch import ADVICE  # noqa: PLC0415
-
             return f"{gone[0]}; {ADVICE}"
         if self._lost is None:
             self._lost = gone[0]
@@ -254,7 +254,6 @@ def _hands(
     if not live and gamepad is None:
         return None
     from rich.columns import Columns  # noqa: PLC0415
-    from rich.console import Console  # noqa: PLC0415
 
     devices: list[Keyboard | Gamepad | PageControls] = []
     keys: list[str] = []
@@ -266,7 +265,7 @@ def _hands(
     if gamepad is not None:
         devices.append(stack.enter_context(Gamepad(gamepad)))
         keys += ["hold LB or RB: it moves", "right stick pressed: torque off"]
-    Console(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
+    PlainConsole(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
     return _Hands(devices, page)
 
 
