@@ -114,7 +114,10 @@ class CycleObserver(Protocol):
     """Follows a run from cycle to cycle; it steers nothing."""
 
     def begin(self, state: JointState) -> None:
-        """Take the state in which the run begins, before its first cycle."""
+        """Accept the state in which the run begins, before its first cycle.
+
+        Torque is on: it returns well within the servos' bus watchdog (0.2 s).
+        """
         ...
 
     def step(self, deadline_s: float, sent_rad: Floats, state: JointState) -> None:

@@ -1,0 +1,108 @@
+"""The live table of a served bus, drawn by a process of its own.
+
+Drawing takes longer than a servo may take to reply. A thread would not help: while it draws it
+holds the interpreter for 5 ms at a time, at each byte that the serving thread waits for.
+"""
+
+import sys
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from types import TracebackType
+from typing import Final
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from snakewalk.controller.console.child_process import pipe, start
+from snakewalk.drivers.priority import give_way
+from snakewalk.sim.ax12.decode import Decoder1
+from snakewalk.sim.serve.live_table import Packet, Rows
+from snakewalk.sim.sniff.decode import DecodedPacket, Decoder
+
+MakeDecoder = Callable[[], Decoder | Decoder1]
+_SHOWN: Final = 8
+"""Packets in words below the table."""
+_END_S: Final = 2.0
+"""How long the drawing process may take to end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """What one drawing shows."""
+
+    counts: str
+    rows: Rows
+    packets: tuple[Packet, ...]
+    """The latest, oldest first."""
+
+
+class LiveScreen:
+    """Draws snapshots on standard error; use it in a ``with``.
+
+    ``make_decoder`` is called in the drawing process and must be picklable.
+    """
+
+    def __init__(self, make_decoder: MakeDecoder) -> None:
+        self._line, far = pipe()
+        self._process = start(_draw, far, make_decoder)
+        far.close()
+
+    def __enter__(self) -> "LiveScreen":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._line.close()
+        self._process.join(_END_S)
+        if self._process.is_alive():
+            self._process.kill()
+
+    @property
+    def ready(self) -> bool:
+        """Whether the last snapshot is drawn: only then the next is sent, so nothing ever waits."""
+        with suppress(EOFError, OSError):
+            if self._line.poll():
+                self._line.recv()
+                return True
+        return False
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Send a snapshot once after each time that the screen was ``ready``."""
+        with suppress(OSError):  # its process was killed: the servos go on
+            self._line.send(snapshot)
+
+
+def _draw(line: Connection, make_decoder: MakeDecoder) -> None:
+    """Draw what comes until the server is gone."""
+    give_way()
+    decoder, recent = make_decoder(), deque[DecodedPacket](maxlen=_SHOWN)
+    screen = Console(file=sys.stderr)
+    with Live(console=screen, auto_refresh=False) as live, suppress(EOFError, OSError):
+        while True:
+            line.send(None)
+            shown: Snapshot = line.recv()
+            for time_s, data in shown.packets:
+                recent.extend(decoder.feed(time_s, data))
+            live.update(view(shown, recent, screen.width), refresh=True)
+
+
+def view(shown: Snapshot, recent: deque[DecodedPacket], columns: int) -> Group:
+    """Counts, registers and the latest packets, each in one line."""
+    # 80 columns hold the headings and the largest registers, a column apart
+    table = Table(box=None, header_style="bold", padding=(0, 1, 0, 0), pad_edge=False)
+    for heading in shown.rows[0] if shown.rows else ():
+        table.add_column(heading, min_width=len(heading), no_wrap=True)
+    for row in shown.rows:
+        style = "red" if row["error"] or not row["power"] else "" if row["torque"] else "dim"
+        table.add_row(*(str(value) for value in row.values()), style=style)
+    packets = "\n".join(packet.text()[:columns] for packet in recent)
+    return Group(Text(shown.counts, style="bold"), table, Text(packets, style="dim"))

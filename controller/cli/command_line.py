@@ -1,0 +1,217 @@
+"""The command line: every command that a manifest lists, imported when it is called."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import pairwise
+from typing import Annotated, Any, Final
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from snakewalk.controller.cli.called_command import CalledCommand, with_messages
+from snakewalk.controller.console.command import (
+    BUS,
+    JOB,
+    MOTION,
+    RECORDINGS,
+    CommandInfo,
+    command_info,
+)
+from snakewalk.controller.console.plugins import Plugin, plugins
+
+_FAMILIES: Final = {
+    "bus": ("Servos and their settings.", BUS),
+    "camera": ("The camera above the robot: lens, markers, check.", JOB),
+    "fish": ("Fish from video: match, synthesise, film.", RECORDINGS),
+    "gait": ("Gaits: list, show, run, fit.", MOTION),
+    "policy": ("Learnt policies: list, run, compare by trials, learn.", MOTION),
+    "repertoire": ("Actions recorded from the physics.", MOTION),
+    "robot": ("A robot: show it, its power, export it, import one.", JOB),
+    "terrain": ("Worlds from real ground: maps of files, and of stereo.", JOB),
+}
+"""Help and group of commands of two words; those of other packages have a general help."""
+_GROUPS: Final = (JOB, MOTION, RECORDINGS, BUS)
+"""Order of the groups in ``--help``; other groups follow."""
+_FIRST: Final = ("list", "init", "plan", "run", "stop", "report")
+"""Commands that come first in their group; the others follow by name."""
+_CONTEXT: Final = {"help_option_names": ["-h", "--help"]}
+
+
+class CommandGroup(TyperGroup):
+    """Commands by name, each imported when it is called; ``--help`` needs their manifests only."""
+
+    prefix = ""
+    """First word of a family's commands."""
+    _is_listing = False
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the words that may follow."""
+        words = dict.fromkeys(_next_word(each, self.prefix) for each in _listed(self.prefix))
+        return [*words]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command with its options, a family, or None."""
+        here = [e for e in _listed(self.prefix) if _next_word(e, self.prefix) == cmd_name]
+        if not here:
+            return None
+        path = f"{self.prefix} {cmd_name}".strip()
+        if here[0].name != path:
+            return _family(path, here)
+        return _stub(cmd_name, here[0]) if self._is_listing else _whole(cmd_name, here[0])
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the list of commands from their manifests."""
+        with self._listing():
+            super().format_help(ctx, formatter)
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> Any:
+        """Complete a command's name from the manifests."""
+        with self._listing():
+            return super().shell_complete(ctx, incomplete)
+
+    @contextmanager
+    def _listing(self) -> Iterator[None]:
+        self._is_listing = True
+        try:
+            yield
+        finally:
+            self._is_listing = False
+
+    def main(
+        self,
+        args: Any = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        *more: Any,
+        **options: Any,
+    ) -> Any:
+        """Run the command line of a process; wrong words end it with one line and exit code 2."""
+        if not standalone_mode:
+            return super().main(args, prog_name, complete_var, False, *more, **options)
+        try:
+            code = super().main(args, prog_name, complete_var, False, *more, **options)
+        except Exception as error:
+            if hasattr(error, "format_message"):  # an error of typer's or click's
+                _print_fault(error)
+                raise SystemExit(getattr(error, "exit_code", 2)) from None
+            if type(error).__name__ != "Abort":
+                raise
+            print("snakewalk: aborted", file=sys.stderr)
+            raise SystemExit(1) from None
+        raise SystemExit(code if isinstance(code, int) else 0)
+
+    def make_context(self, info_name: Any, args: list[str], *more: Any, **options: Any) -> Any:
+        """Read the words before a command's name; an empty word is rejected."""
+        for before, word in pairwise([self.name or "snakewalk", *args]):
+            name = before if word == "" else word.removesuffix("=")
+            if word == "" or (word.startswith("--") and name != word):
+                raise typer.BadParameter(f"nothing after {name}: fill it, or leave it out")
+        return super().make_context(info_name, args, *more, **options)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command; after an interrupt, print the notes about torque and log."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as stop:
+            text = "; ".join(["interrupted", *getattr(stop, "__notes__", [])])
+            print(f"snakewalk: {text}", file=sys.stderr)
+            raise SystemExit(130) from None
+
+
+def _print_fault(error: Any) -> None:
+    """Print in one line what is wrong with a command's words."""
+    if type(error).__name__ == "NoArgsIsHelpError":  # its help has been shown
+        return
+    context = getattr(error, "ctx", None)
+    path = "snakewalk" if context is None else context.command_path
+    text = " ".join(error.format_message().split()).replace(": Value error, ", ": ")  # pydantic's
+    print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)
+
+
+def _listed(prefix: str) -> list[Plugin]:
+    """Return the commands below a prefix in the order of ``--help``."""
+
+    def order(each: Plugin) -> tuple[int, int, str]:
+        group = each.group or _FAMILIES.get(each.name.split()[0], ("", ""))[1]
+        first = _FIRST.index(each.name) if each.name in _FIRST else len(_FIRST)
+        place = _GROUPS.index(group) if group in _GROUPS else len(_GROUPS)
+        return place, first, each.name
+
+    found: dict[str, Plugin] = {}
+    for each in plugins("command"):
+        if not prefix or each.name.startswith(f"{prefix} "):
+            found.setdefault(each.name, each)
+    return sorted(found.values(), key=order)
+
+
+def _next_word(each: Plugin, prefix: str) -> str:
+    return each.name.removeprefix(prefix).split()[0]
+
+
+def _family(path: str, commands: list[Plugin]) -> Any:
+    """Return the group of the commands that begin with the same word."""
+    about, group = _FAMILIES.get(path, (f"Commands of {commands[0].package}.", commands[0].group))
+    group_class = type("Family", (CommandGroup,), {"prefix": path})
+    family = typer.Typer(
+        cls=group_class, help=about, rich_markup_mode="rich", context_settings=_CONTEXT
+    )
+    family.callback(no_args_is_help=True, help=about, rich_help_panel=group or None)(_nothing)
+    made = typer.main.get_group(family)
+    made.name, made.rich_help_panel = path.rsplit(maxsplit=1)[-1], group or None
+    return made
+
+
+def _nothing() -> None:
+    """A family has no options."""
+
+
+def _stub(name: str, listed: Plugin) -> Any:
+    """Return a command with its first line only."""
+    return TyperCommand(
+        name, help=listed.help, rich_help_panel=listed.group or None, rich_markup_mode="rich"
+    )
+
+
+def _whole(name: str, listed: Plugin) -> Any:
+    """Import a command and build its options."""
+    function: Callable[..., Any] = listed.load()
+    info = command_info(function)
+    alone = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=_CONTEXT)
+    alone.command(
+        name, cls=CalledCommand, epilog=_examples(info), rich_help_panel=listed.group or None
+    )(with_messages(function))
+    return typer.main.get_command(alone)
+
+
+def _examples(info: CommandInfo) -> str:
+    lines = (f"[bold]snakewalk {line}[/bold]" for line in info.examples)
+    return "\n\n".join(["Examples:", *lines]) if info.examples else ""
+
+
+def _show_version(is_asked: bool) -> None:
+    if is_asked:
+        from importlib.metadata import version  # noqa: PLC0415  --help stays quick
+
+        print(f"snakewalk {version('snakewalk')}")
+        raise typer.Exit
+
+
+app = typer.Typer(
+    cls=CommandGroup,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    context_settings=_CONTEXT,
+    help="Run gaits on a DYNAMIXEL servo snake, or on a simulated one that answers the same bytes.",
+)
+
+
+@app.callback()
+def _options(
+    show_version: Annotated[
+        bool,
+        typer.Option("--version", help="show it", is_eager=True, callback=_show_version),
+    ] = False,
+) -> None:
+    """Read the options before a command."""

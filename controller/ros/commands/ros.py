@@ -1,0 +1,133 @@
+"""``snakewalk ros``: a robot in a ROS 2 graph."""
+
+import re
+from contextlib import nullcontext
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.options import (
+    VIEW_AT,
+    Force,
+    Json,
+    Robot,
+    RunFolder,
+    RunPort,
+    Set,
+    View,
+    ViewAt,
+    World,
+    key_values,
+)
+from snakewalk.controller.console.progress import TimeBar, in_real_time
+from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.exchange.body_frames import joint_names
+from snakewalk.controller.motion.commanded import Commanded
+from snakewalk.controller.ros.ros_link import open_ros
+from snakewalk.controller.ros.ros_options import RosOptions
+from snakewalk.controller.run.commands.gait import Param, parameters
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import gait_by_name, prepare_commanded
+from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.watchers import PAGE, Watchers, open_observer
+
+_WEEK_S = 604_800.0
+
+
+@command(
+    "ros",
+    group=JOB,
+    examples=(
+        "ros",
+        "ros --robot my.toml --port /dev/ttyUSB0 --domain 7 --namespace snake",
+        "ros --robot alternating16 --gait rolling --network",
+    ),
+)
+def ros(
+    robot: Robot = None,
+    world: World = None,
+    port: RunPort = None,
+    gait: Annotated[
+        str | None,
+        typer.Option(help="gait to begin with; default: hold", autocompletion=completion.GAITS),
+    ] = None,
+    param: Param = None,
+    domain: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=232, help="default: ROS_DOMAIN_ID of the environment", show_default=False
+        ),
+    ] = None,
+    namespace: Annotated[str, typer.Option(help="of all topics and services")] = "",
+    network: Annotated[
+        bool,
+        typer.Option(
+            "--network",
+            help="seen by other machines; default: as ROS_AUTOMATIC_DISCOVERY_RANGE says, else by "
+            "this one only",
+        ),
+    ] = False,
+    timeout: Annotated[
+        float,
+        typer.Option(help="s: joints on their way hold when no joint goals come; inf: they go on"),
+    ] = 1.0,
+    seconds: Annotated[
+        float, typer.Option(help="then torque goes off", show_default="a week")
+    ] = _WEEK_S,
+    set_: Set = None,
+    view: View = False,
+    view_at: ViewAt = VIEW_AT,
+    out: RunFolder = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Hold a robot, and let a ROS 2 graph command, watch and stop it; servos or the simulator."""
+    if not timeout > 0.0:
+        raise InputError(f"--timeout {timeout:g}: expected seconds over 0, or inf")
+    if not re.fullmatch(r"(/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*)?", namespace, re.ASCII):
+        raise InputError(f"--namespace {namespace}: expected a name as snake or lab/snake")
+    options = RosOptions(domain, namespace, network, commands=True, timeout_s=timeout)
+    begun = None if gait is None else gait_by_name(gait, parameters(param))[0]
+    opened = open_observer(PAGE, view_at) if view else nullcontext()
+    with open_ros(options) as link, opened as page:
+        prepared = prepare_commanded(
+            lambda body, on_event: Commanded(
+                body,
+                joint_names(body),
+                link.commands,
+                on_event,
+                timeout_s=timeout,
+                gait=begun,
+            ),
+            robot=robot,
+            world=world,
+            seconds=seconds,
+            name="ros",
+            keys=key_values("--set", set_),
+        )
+        if begun is not None:
+            begun.check(prepared.robot)
+        with (
+            run_folder(f"ros-{prepared.robot.name}", out) as folder,
+            TimeBar("ros", seconds) as bar,
+        ):
+            finished = execute(
+                prepared,
+                folder,
+                port,
+                force=force,
+                view=Watchers(page, link),
+                on_progress=bar.on_progress if port else in_real_time(bar.on_progress),
+                on_event=bar.on_event,
+            )
+    facts = {
+        "robot": prepared.robot.name,
+        "world": prepared.world.name,
+        "duration_s": round(finished.outcome.duration_s, 2),
+        "tripped": finished.outcome.tripped,
+        "peak_current_a": finished.summary.peak_current_a,
+    }
+    show_run(finished, folder, facts, as_json, film=False)

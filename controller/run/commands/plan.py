@@ -1,0 +1,133 @@
+"""``snakewalk plan``: a run on paper."""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.options import (
+    DEFAULT_RUN,
+    Force,
+    Json,
+    Motion,
+    Robot,
+    RunName,
+    Seed,
+    Set,
+    TrackFile,
+    World,
+    console,
+    key_values,
+    show,
+)
+from snakewalk.controller.console.plugins import require
+from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.terrain.summary import path_relief, path_warnings
+
+
+@command(
+    "plan",
+    group=JOB,
+    examples=(
+        "plan",
+        "plan flat-slalom --motion serpenoid --json",
+        "plan flat-slalom --with repertoire -o plan.json --run",
+    ),
+)
+def plan(
+    run: RunName = DEFAULT_RUN,
+    robot: Robot = None,
+    world: World = None,
+    track: TrackFile = None,
+    seed: Seed = None,
+    motion: Motion = None,
+    set_: Set = None,
+    with_: Annotated[
+        str | None, typer.Option("--with", help="repertoire: search over recorded actions")
+    ] = None,
+    repertoire: Annotated[
+        Path | None, typer.Option(help="file of actions; default: repertoire-ROBOT-WORLD.npz")
+    ] = None,
+    beam: Annotated[
+        int | None,
+        typer.Option(min=1, max=100_000, help="sequences kept a round; default: 400"),
+    ] = None,
+    physics: Annotated[
+        int, typer.Option(min=0, help="candidates to run on the physics, for the ratio")
+    ] = 0,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="write the sequence, as JSON")
+    ] = None,
+    carry: Annotated[bool, typer.Option("--run", help="run it in the simulator")] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Judge a run on paper: library, path and joint limits, with no servo and no simulator."""
+    if with_ is not None:
+        planner = require("planner", with_, "--with")
+        if motion is not None or track is not None or seed is not None or set_:
+            raise InputError("--with repertoire: takes no --motion, --track, --seed or --set")
+        planner.load()(
+            run, repertoire=repertoire, robot=robot, world=world, beam=beam or 400, physics=physics,
+            out=out, carry=carry, force=force, as_json=as_json,
+        )  # fmt: skip
+        return
+    if repertoire is not None or beam is not None or out is not None or carry or physics:
+        raise InputError(
+            "--repertoire, --beam, --out, --run and --physics belong to --with repertoire"
+        )
+
+    prepared = prepare_walk(
+        run, keys=key_values("--set", set_), seed=seed, motion=motion, robot=robot, world=world,
+        track=track,
+    )  # fmt: skip
+    ahead = prepared.forecast()
+    found: dict[str, object] = {
+        "run": prepared.run.name,
+        "robot": prepared.robot.name,
+        "world": prepared.world.name,
+        "motion": prepared.run.motion,
+        "seed": prepared.run.seed,
+        "waypoints": len(prepared.run.waypoints_m),
+        "waypoints_reached": ahead.reached,
+        "passed_by": ahead.missed,
+        "path_m": round(prepared.path.length_m, 3),
+        "duration_s": round(ahead.duration_s, 2),
+        "joint_reach_rad": round(float(abs(ahead.joint_rad).max()), 3),
+        "joint_speed_rad_s": round(float(ahead.joint_speed_rad_s.max()), 3),
+        "joint_acceleration_rad_s2": round(float(ahead.joint_acceleration_rad_s2.max()), 2),
+        "joint_torque_n_m": round(float(ahead.joint_torque_n_m.max()), 3),
+        "predicted_gain": round(prepared.gain, 3),
+    }
+    if ahead.slide is not None:
+        found["steeper_than_held"] = (
+            f"{math.degrees(ahead.slide.slope_rad):.1f} deg of "
+            f"{math.degrees(ahead.slide.held_rad):.1f}, for {ahead.slide.lasted_s:.2f} s"
+        )
+    if prepared.run.motion != "serpenoid":
+        found["states"] = prepared.library.counts
+    warnings = prepared.warnings
+    if prepared.ground_ahead is not None:
+        relief = path_relief(prepared.planner, prepared.path)
+        found["slope_median_deg"] = _deg(relief.median_slope_rad)
+        found["slope_max_deg"] = _deg(relief.max_slope_rad)
+        found["world_slope_median_deg"] = _deg(relief.world_median_slope_rad)
+        found["under_body_slope_median_deg"] = _deg(relief.median_footprint_slope_rad)
+        found["under_body_slope_max_deg"] = _deg(relief.max_footprint_slope_rad)
+        found["up_slope_max_deg"] = _deg(relief.max_up_slope_rad)
+        found["side_slope_max_deg"] = _deg(relief.max_side_slope_rad)
+        found["climb_m"] = round(relief.climb_m, 3)
+        found["safe_nodes"] = f"{relief.safe_node_share:.0%}"
+        warnings += path_warnings(prepared.planner, relief, prepared.run.waypoints_m)
+    if as_json:
+        found["warnings"] = warnings
+    show(found, as_json)
+    for line in () if as_json else warnings:
+        console.print(f"warning: {line}")
+
+
+def _deg(angle_rad: float) -> float:
+    return round(math.degrees(angle_rad), 1)

@@ -1,0 +1,78 @@
+"""In what a robot differs from its file and its world: ground, loads, servos, horns."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import DeviationConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.sim.plant import Mounting
+
+if TYPE_CHECKING:
+    from snakewalk.sim.plant import Mounting
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """What is different; the defaults are no difference. None stands for none in any of them."""
+
+    along: float = 1.0
+    """Friction along the body over the world's, forward and backward."""
+    across: float = 1.0
+    """Friction across the body over the world's."""
+    load_kg: Floats | None = None
+    """(L,) mass that each link has more than the robot's file says."""
+    torque: Floats | None = None
+    """(J,) torque of each servo for a current, over its model's."""
+    slip_rad: Floats | None = None
+    """(J,) angle by which each joint is bent more than its servo says: its horn has slipped."""
+
+    @classmethod
+    def of_run(cls, by: DeviationConfig, robot: RobotConfig) -> "Deviation":
+        """Return that of a whole robot from its file."""
+        more = by.mass - 1.0
+        return cls(
+            by.friction_along,
+            by.friction_across,
+            more * np.array(robot.link_masses_kg) if more else None,
+            np.full(robot.joint_count, by.torque) if by.torque != 1.0 else None,
+        )
+
+    def robot(self, robot: RobotConfig) -> RobotConfig:
+        """Return the body that the physics has."""
+        if self.load_kg is None:
+            return robot
+        links = [link.model_dump() for link in robot.links] or [{}] * robot.link_count
+        masses_kg = np.array(robot.link_masses_kg) + self.load_kg
+        if robot.stereo_head is not None:  # the robot adds it again
+            masses_kg[robot.stereo_head.link] -= robot.stereo_head.mass_kg
+        loaded = [
+            link | {"mass_kg": float(mass_kg)}
+            for link, mass_kg in zip(links, masses_kg, strict=True)
+        ]
+        return RobotConfig.model_validate(robot.model_dump() | {"links": loaded})
+
+    def world(self, world: WorldConfig) -> WorldConfig:
+        """Return the ground that the physics has."""
+        told = world.friction
+        back = None if told.back is None else told.back * self.along
+        changes = {"along": told.along * self.along, "across": told.across * self.across}
+        friction = told.model_copy(update=changes | {"back": back})
+        return world.model_copy(update={"friction": friction})
+
+    def shaft_rad(self, joint_rad: Floats) -> Floats:
+        """Return the angles (J,) of joints whose servos say ``joint_rad``."""
+        return joint_rad if self.slip_rad is None else joint_rad + self.slip_rad
+
+    def mounting(self, robot: RobotConfig) -> "Mounting":
+        """Return how the servos sit on the shafts."""
+        told = Mounting.of(robot)
+        if self.slip_rad is None:
+            return told
+        return Mounting(told.sign, told.zero_rad - told.sign * self.slip_rad)
+
+
+NO_DEVIATION: Final = Deviation()

@@ -1,0 +1,467 @@
+"""The one factory of runs: from a configuration, or a command's options, to a ``PreparedRun``."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from snakewalk.config.camera import MappingConfig
+from snakewalk.config.compliance import ComplianceConfig
+from snakewalk.config.errors import InputError
+from snakewalk.config.gait import GaitSetConfig
+from snakewalk.config.loader import (
+    checked,
+    load_gait,
+    load_robot,
+    load_run,
+    load_world,
+    shipped,
+)
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import MOTIONS, RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.plugins import find, require, unknown
+from snakewalk.controller.console.plugins import names as plugin_names
+from snakewalk.controller.gaits.gait import Gait, fitting_robot
+from snakewalk.controller.gaits.registry import GAITS, make_gait
+from snakewalk.controller.motion.policy import load_policy
+from snakewalk.controller.motion.policy_motion import PolicyMotion
+from snakewalk.controller.motion.recorded import Recorded
+from snakewalk.controller.run.assembly import assemble, load_body
+from snakewalk.controller.run.kinds.commanded_run import CommandedRun, MakeCommanded
+from snakewalk.controller.run.kinds.gait_run import GaitRun, MakeOperator
+from snakewalk.controller.run.kinds.playback_run import PlaybackRun
+from snakewalk.controller.run.kinds.source_run import MakeSource, SourceRun
+from snakewalk.controller.run.kinds.steered_run import SteeredRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.pose_provider import pose_plugin
+from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.run.run_keys import (
+    OF_A_GAIT,
+    OF_A_RECORDING,
+    OF_A_SOURCE,
+    checked_keys,
+    with_keys_of,
+)
+from snakewalk.controller.run.servo_setup import check_servos, with_gains
+from snakewalk.controller.track.readers.load import track_beside
+
+_WALKS: Final = ("walk", "walk-printed", "walk-blind", "kp", "serpenoid")
+
+
+def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
+    """Prepare a run from its configuration, for example from that in a log.
+
+    Raises:
+        InputError: the configuration alone does not hold the run, or has no waypoints to walk to.
+
+    """
+    if run.motion == "gait":
+        return (SteeredRun if run.waypoints_m else GaitRun)(run, robot, world)
+    if run.motion == "playback":
+        return PlaybackRun(run, robot, world)
+    if run.motion == "source":
+        raise InputError(
+            f"run {run.name}: its motion was the user's own, which no configuration holds; its "
+            "goals are sent again by: snakewalk replay LOG; a new run is made by prepare_source"
+        )
+    if run.motion not in _WALKS:
+        return _extension(run, robot, world)
+    if not run.waypoints_m:
+        raise InputError(f"run {run.name}: a {run.motion} needs waypoints")
+    return WalkRun(run, robot, world)
+
+
+def _extension(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
+    """Prepare a run whose motion is a plug-in: a kind of run, or a motion source.
+
+    Raises:
+        InputError: there is no such motion.
+
+    """
+    kind = find("run", run.motion)
+    if kind is not None:
+        prepared: PreparedRun = kind.load()(run, robot, world)
+        return prepared
+    source = find("motion", run.motion)
+    if source is None:
+        names = [*MOTIONS, *plugin_names("run"), *plugin_names("motion")]
+        raise InputError(unknown("motion", run.motion, names))
+    make: MakeSource = source.load()
+    needs = make(robot).needs
+    needs.check(robot, f"motion {run.motion}")
+    return SourceRun(run, with_gains(robot, pitch=needs.pitch), world, make)
+
+
+def prepare_walk(
+    name: str,
+    *,
+    keys: Mapping[str, object] | None = None,
+    on_paper: bool = False,
+    **changes: object,
+) -> WalkRun:
+    """Load a walk's run: as ``prepare_job``, which takes gaits along waypoints, too.
+
+    Raises:
+        ConfigError: every fault of a file at once.
+        InputError: as ``prepare_job``, and for other motions than a walk.
+
+    """
+    found = prepare_job(name, keys=keys, on_paper=on_paper, **changes)
+    if isinstance(found, SteeredRun):
+        raise InputError(
+            f"run {found.run.name}: a gait along waypoints; run it by: snakewalk run {name}"
+        )
+    if not isinstance(found, WalkRun):
+        raise InputError(
+            f"run {found.run.name}: motion {found.run.motion} is no walk; run it by: snakewalk "
+            f"run {name}"
+        )
+    return found
+
+
+def prepare_job(
+    name: str,
+    *,
+    keys: Mapping[str, object] | None = None,
+    on_paper: bool = False,
+    **changes: object,
+) -> PreparedRun:
+    """Load a run with its robot and world; ``changes`` replace fields of the run where not None.
+
+    ``keys`` replace single values of the three files: ``run.seed``, ``robot.link_mass_kg``,
+    ``world.ground.slope_rad``, or ``slope_deg``. ``on_paper`` allows motions that no robot makes by
+    itself.
+
+    Raises:
+        ConfigError: every fault of a file at once.
+        InputError: what the configuration asks cannot be made, or does not fit the wire.
+
+    """
+    keys = checked_keys(keys)
+    run = load_run(name)
+    beside = Path(name).parent if name.endswith(".toml") else None
+    options = {key: value for key, value in changes.items() if value is not None}
+    options.setdefault("track", track_beside(run.track, beside))
+    run = checked(RunConfig, run.model_dump() | options, "command line")
+    run = with_keys_of("run", run, keys)
+    if run.motion == "kp" and not on_paper:
+        raise InputError(
+            f"run {run.name}: kp is a motion on paper: snakewalk synthesise RUN --motion kp "
+            "-o NAME, then snakewalk play NAME.npz"
+        )
+    if run.motion == "gait" and not run.waypoints_m:
+        raise InputError(f"run {run.name}: a gait is run by: snakewalk gait run NAME")
+    if run.motion == "playback":
+        raise InputError(f"run {run.name}: a recording is played by: snakewalk play TRACK")
+    if run.motion == "repertoire":
+        raise InputError(
+            f"run {run.name}: planned by: snakewalk plan --with repertoire; without waypoints "
+            "played by: snakewalk repertoire play"
+        )
+    if run.motion == "source":
+        raise InputError(f"run {run.name}: a source of your own is run by prepare_source")
+    if run.pose is not None:
+        pose_plugin(run.pose)
+    robot = run.walk.pitch.set_up(load_robot(run.robot, beside))
+    robot = with_keys_of("robot", robot, keys)
+    check_servos(run, robot)
+    world = with_keys_of("world", load_world(run.world, beside), keys)
+    if run.motion not in MOTIONS:
+        return _extension(run, robot, world)
+    if run.motion == "gait":
+        if changes.get("track") is not None:
+            raise InputError(f"run {run.name}: moves by a gait: leave --track out")
+        steered = SteeredRun(run, robot, world)
+        steered.check_plan()
+        gait = steered.gait
+        soft = [gait.p_gain] if gait.p_gain is not None else []
+        return replace(steered, robot=with_gains(robot, pitch=gait.needs.pitch, soft=soft))
+    _reject_legs(robot)
+    _refuse_one_joint(robot)
+    return WalkRun(run, robot, world)
+
+
+def gait_keys(keys: Mapping[str, object] | None) -> dict[str, object]:
+    """Return keys of run, robot and world that a gait's run takes, angles in rad.
+
+    Raises:
+        InputError: a key is of none of the files, or has an option of its own; one line each.
+
+    """
+    return checked_keys(keys, OF_A_GAIT)
+
+
+def _refuse_one_joint(robot: RobotConfig) -> None:
+    """Refuse a body that can only bend to and fro: such a motion leads nowhere.
+
+    Raises:
+        InputError: it has one yaw joint.
+
+    """
+    if len(robot.yaw_joints) == 1:
+        raise InputError(
+            f"robot {robot.name}: has one yaw joint, which only bends to and fro; a walk takes two "
+            "at least, and more to steer"
+        )
+
+
+def _reject_legs(robot: RobotConfig) -> None:
+    if robot.limbs:
+        raise InputError(
+            f"robot {robot.name}: walks and recordings move a body without legs; a robot with legs "
+            "runs gaits (snakewalk gait run), gaits along waypoints (snakewalk run "
+            "salamander-square) and sources of your own"
+        )
+
+
+def prepare_gait(
+    name: str,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    parameters: dict[str, Any] | None = None,
+    seconds: float = 20.0,
+    seed: int = 0,
+    look_heading_rad: float | None = None,
+    look_at_m: tuple[float, float] | None = None,
+    make_operator: MakeOperator | None = None,
+    then: Sequence[tuple[float, str, dict[str, Any]]] = (),
+    by: Literal["blend", "cpg"] = "blend",
+    keys: Mapping[str, object] | None = None,
+) -> GaitRun:
+    """Prepare a gait, or a shipped or own set of parameters (``config/gaits``), by name.
+
+    ``then`` holds (time, name, parameters) of the gaits that follow, ``by`` how the gait changes,
+    ``keys`` values of run, robot and world that are replaced, as of ``prepare_walk``.
+
+    Raises:
+        InputError: no such gait, parameters out of range, a robot that lacks joints, changes out of
+            order or together with an operator.
+
+    """
+    if make_operator is not None and (then or by == "cpg"):
+        raise InputError("--live changes gaits by keys and joins: leave out --then and --by cpg")
+    keys = gait_keys(keys)
+    gait, known = gait_by_name(name, parameters)
+    if known is not None:
+        robot, world = robot or known.robot, world or known.world
+    changes = [(at_s, gait_by_name(other, values)[0]) for at_s, other, values in then]
+    gaits = [gait, *(other for _, other in changes)]
+    pitch = any(each.needs.pitch for each in gaits)
+    own = robot or fitting_robot(each.needs for each in gaits)
+    body = load_body(own, keys)
+    for each in gaits:
+        each.check(body)
+    run, ground = assemble(
+        {
+            "name": name.removesuffix(".toml").rpartition("/")[2],
+            "robot": body.name,
+            "world": world or gait.world,
+            "motion": "gait",
+            "seed": seed,
+            "time_limit_s": seconds + (60.0 if by == "cpg" else 30.0),
+            "gait": {
+                "name": gait.name,
+                "parameters": gait.params.model_dump(),
+                "duration_s": seconds,
+                "look_heading_rad": look_heading_rad,
+                "look_at_m": look_at_m,
+                "then": [
+                    {"at_s": at_s, "name": g.name, "parameters": g.params.model_dump()}
+                    for at_s, g in changes
+                ],
+                "by": by,
+            },
+            "compliance": known.compliance if known is not None else None,
+        },
+        keys,
+        body,
+    )
+    soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
+    body = with_gains(body, pitch=pitch, soft=soft)
+    return GaitRun(run, body, ground, make_operator)
+
+
+def is_gait(name: str) -> bool:
+    """Whether this is the name of a gait or of a shipped set of its parameters."""
+    return name in GAITS or name in shipped("gaits")
+
+
+def moves_by_gait(name: str) -> bool:
+    """Whether this names a gait, or a run that goes along its waypoints by a gait."""
+    return is_gait(name) or load_run(name).motion == "gait"
+
+
+def with_compliance(run: RunConfig, on: bool | None) -> RunConfig:
+    """Let joints yield, by the run's own table if it has one, or not; None: as the run says."""
+    if on is None:
+        return run
+    table = (run.compliance or ComplianceConfig()) if on else None
+    return run.model_copy(update={"compliance": table})
+
+
+def with_map(run: RunConfig, source: str | None) -> RunConfig:
+    """Let the walk know the ground of its world, or map it as it goes; None: as the run says.
+
+    Raises:
+        InputError: the source is neither ``world`` nor a plug-in.
+
+    """
+    if source is None:
+        return run
+    if source == "world":
+        return run.model_copy(update={"mapping": None})
+    require("map", source, "--map", ["world"])
+    table = (run.mapping or MappingConfig()).model_copy(update={"source": source})
+    return run.model_copy(update={"mapping": table})
+
+
+def changed(prepared: PreparedRun, **fields: object) -> PreparedRun:
+    """Return a prepared run with other values of its fields, for example ``run`` or ``world``."""
+    made: PreparedRun = replace(prepared, **fields)  # type: ignore[type-var]
+    return made
+
+
+def prepare_playback(
+    track: str,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    speed: float | None = None,
+    scale: float = 1.0,
+    clip: bool = False,
+    keys: Mapping[str, object] | None = None,
+) -> PlaybackRun:
+    """Prepare to play a recording; ``keys`` as of ``prepare_walk``.
+
+    Raises:
+        InputError: no such recording, joints that do not bend so far, too fast for them.
+
+    """
+    keys = checked_keys(keys, OF_A_RECORDING)
+    body = load_body(robot or "yaw16", keys)
+    fields = {
+        "name": Path(track).stem,
+        "robot": body.name,
+        "world": world or "flat",
+        "track": track,
+        "motion": "playback",
+        "playback": {"speed": speed, "scale": scale, "clip": clip},
+    }
+    _reject_legs(body)
+    run, ground = assemble(fields, keys, body)
+    prepared = PlaybackRun(run, body, ground)
+    Recorded(body, *prepared.joint_track).needs.check(body, "this recording")
+    if "run.time_limit_s" in keys:
+        return prepared
+    limit = {"time_limit_s": prepared.duration_s + 30.0}
+    return replace(prepared, run=run.model_copy(update=limit))
+
+
+def prepare_source(
+    make: MakeSource,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    seconds: float = 20.0,
+    seed: int = 0,
+    name: str = "source",
+    keys: Mapping[str, object] | None = None,
+) -> SourceRun:
+    """Prepare a run of your own motion source, of at most ``seconds``; it ends earlier when done.
+
+    ``make`` takes the robot and returns a fresh source at each call: one is stepped on paper before
+    torque is on, another one in the run; ``keys`` as of ``prepare_walk``.
+
+    Raises:
+        InputError: the robot lacks joints that the source needs, or its cycle does not fit the
+            wire; limits of the joints are checked by ``execute``.
+
+    """
+    keys = checked_keys(keys, OF_A_SOURCE)
+    body = load_body(robot or "yaw16", keys)
+    needs = make(body).needs
+    needs.check(body, "the motion source")
+    fields = {
+        "name": name,
+        "robot": body.name,
+        "world": world or "flat",
+        "motion": "source",
+        "seed": seed,
+        "time_limit_s": seconds,
+    }
+    run, ground = assemble(fields, keys, body, origin="prepare_source")
+    return SourceRun(run, with_gains(body, pitch=needs.pitch), ground, make)
+
+
+def prepare_policy(
+    name: str,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    seconds: float = 20.0,
+    seed: int = 0,
+    keys: Mapping[str, object] | None = None,
+) -> SourceRun:
+    """Prepare a learnt policy, shipped or of a file; after ``seconds`` it comes to rest.
+
+    Robot and world are by default those that it was learnt on.
+
+    Raises:
+        InputError: no such policy, or a robot whose joints it does not know.
+
+    """
+    policy = load_policy(name)
+    return prepare_source(
+        lambda body: PolicyMotion(policy, body, duration_s=seconds),
+        robot=robot or policy.robot,
+        world=world or policy.origin.world,
+        seconds=seconds + 30.0,
+        seed=seed,
+        name=policy.name,
+        keys=keys,
+    )
+
+
+def prepare_commanded(
+    make: MakeCommanded,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    seconds: float,
+    name: str,
+    keys: Mapping[str, object] | None = None,
+) -> CommandedRun:
+    """Prepare a run that another program commands, for ``seconds`` at most.
+
+    Pitch joints are set up to carry links, as for gaits; ``keys`` as of ``prepare_walk``.
+
+    Raises:
+        InputError: no such robot or world; its cycle does not fit the wire.
+
+    """
+    keys = checked_keys(keys, OF_A_SOURCE)
+    body = load_body(robot or "yaw16", keys)
+    fields = {
+        "name": name,
+        "robot": body.name,
+        "world": world or "flat",
+        "motion": "source",
+        "time_limit_s": seconds,
+    }
+    run, ground = assemble(fields, keys, body)
+    return CommandedRun(run, with_gains(body, pitch=bool(len(body.pitch_joints))), ground, make)
+
+
+def gait_by_name(name: str, parameters: dict[str, Any] | None) -> tuple[Gait, GaitSetConfig | None]:
+    """Make a gait by its name or by that of a set of parameters, and return the set."""
+    if name in GAITS:
+        return make_gait(name, parameters), None
+    if not is_gait(name) and not name.endswith(".toml"):
+        raise InputError(
+            f"{name}: no such gait; there are {', '.join(GAITS)}; "
+            f"sets of parameters: {', '.join(shipped('gaits'))}; your own ends in .toml"
+        )
+    known = load_gait(name)
+    return make_gait(known.gait, dict(known.parameters) | (parameters or {})), known

@@ -1,0 +1,91 @@
+"""An observer of a run: a process of its own, which is fed with the rows of the log."""
+
+import json
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+from snakewalk.config.arrays import Image
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.child_process import start
+from snakewalk.controller.runlog.row_line import RunEnd
+
+_START_S: Final = 60.0
+"""How long it may take to start: a busy machine imports slowly (ours)."""
+_END_S: Final = 2.0
+
+
+class WatcherProcess:
+    """A watcher in a process of its own; use it in a ``with``.
+
+    Raises:
+        InputError: it did not start; says why.
+
+    """
+
+    def __init__(self, serve: Callable[..., None], *options: Any, what: str, fault: str) -> None:
+        """Start ``serve(line, *options)`` in a fresh interpreter.
+
+        Args:
+            serve: a function of a module; sends one line of JSON when it is ready, with ``fault``
+                if it cannot be, and ends when the line does.
+            options: what can be pickled.
+            what: name of the watcher in messages.
+            fault: beginning of the sentence that says what could not be started.
+
+        """
+        ours, far = socket.socketpair()
+        self._process = start(serve, far, *options, daemon=True)
+        far.close()
+        ours.settimeout(_START_S)
+        try:
+            # unbuffered: what follows the line is the run's to read
+            said = json.loads(ours.makefile("rb", buffering=0).readline() or "{}")
+        except OSError:
+            said = {}
+        if not said or "fault" in said:
+            self._process.kill()
+            raise InputError(f"{fault}: {said.get('fault', 'it did not start')}")
+        self.said: dict[str, Any] = said
+        """What it said of itself."""
+        self._end = RunEnd(ours)
+        self._what = what
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._end.close(0.5)
+        self._process.join(_END_S)
+        if self._process.is_alive():
+            self._process.kill()
+
+    def lost(self, now_s: float) -> str | None:
+        """Return why its E-STOP does not work any more, or None."""
+        if self._end.is_closed:
+            return f"{self._what}: its process has ended, and its E-STOP with it"
+        if self._end.is_silent(now_s):
+            return f"{self._what}: it does not respond, so its E-STOP may not work"
+        return None
+
+    def rejected(self) -> list[str]:
+        """Return why commands were rejected since the last call."""
+        return [f"{self._what}: {why}" for why in self._end.rejected()]
+
+    def on_row(self, topic: str, row: bytes) -> None:
+        """Take a row of the log; returns at once."""
+        self._end.add(topic, row)
+
+    def on_picture(self, image: Image, time_s: float) -> None:
+        """Let a picture go by."""
+
+    def on_button(self, path: Path) -> None:
+        """Take the run's stop button, which the watcher presses."""
+        self._end.add("/button", json.dumps({"path": str(path)}).encode())

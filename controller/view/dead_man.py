@@ -1,0 +1,59 @@
+"""The dead man's button of a browser's gamepad, at the run's end: who lets go stops the body."""
+
+import math
+import time
+from collections.abc import Callable
+from typing import Final
+
+STALE_S: Final = 0.3
+"""A gamepad that says nothing for so long is not held (ours)."""
+_AHEAD_S: Final = 0.1
+"""A later time is not believed (ours): both processes read the same clock."""
+WITHOUT: Final = "pad=none"
+"""Says that nobody has to hold a gamepad any more."""
+
+
+def hold_command(held: bool, at_s: float) -> str:
+    """Say that a gamepad was held, or was not, at a time of the machine's clock."""
+    return f"pad={held:d}@{at_s:.3f}"
+
+
+class DeadMan:
+    """Whether the body may move: once a gamepad steers, somebody has to hold its button.
+
+    One that is gone or silent is not held.
+    """
+
+    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+        self._now_s = now_s
+        self._until_s = math.inf
+
+    @property
+    def held(self) -> bool:
+        """Whether the body may move."""
+        return self._now_s() < self._until_s
+
+    def sort_out(self, commands: list[str]) -> list[str]:
+        """Process the commands of a gamepad; returns the others, and those that are damaged."""
+        return [
+            command
+            for command in commands
+            if not command.startswith("pad=") or not self._process(command)
+        ]
+
+    def _process(self, command: str) -> bool:
+        """Whether a command of a gamepad is valid; a time in the future is not."""
+        down, _, text = command.removeprefix("pad=").partition("@")
+        try:
+            at_s = float(text) if text else 0.0
+        except ValueError:
+            return False
+        if command == WITHOUT:
+            self._until_s = math.inf
+        elif down == "0":
+            self._until_s = -math.inf
+        elif down == "1" and text and at_s <= self._now_s() + _AHEAD_S:
+            self._until_s = at_s + STALE_S
+        else:
+            return False
+        return True

@@ -1,0 +1,204 @@
+"""Who may open the page: checked at every request, before viser sees it.
+
+viser serves every program that reaches its port, browsers let any web page send requests to this
+machine, and every user of this machine can reach 127.0.0.1. So a request has to name an expected
+host, a socket has to come from our own page, and both need the token, which a cookie keeps.
+"""
+
+import hmac
+import http
+import ipaddress
+import re
+import secrets
+import socket
+from collections.abc import Callable
+from html import escape
+from http.cookies import CookieError, SimpleCookie
+from typing import Any, Final, Protocol
+from urllib.parse import parse_qs, urlsplit
+
+import websockets.asyncio.server
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+_LOCAL: Final = frozenset({"127.0.0.1", "localhost", "::1"})
+_ANY: Final = frozenset({"0.0.0.0", "::"})
+_HOST: Final = re.compile(r"(?P<name>\[[0-9A-Fa-f:.]+\]|[\w.-]+)(:\d+)?")
+_ASK: Final = (
+    "<!doctype html><title>snakewalk</title><meta name=viewport content='width=device-width'>"
+    "<body style='font:16px system-ui;margin:3em'><form><p>{}</p><input name=token autofocus "
+    "type=password aria-label=token> <button>open</button></form>"
+)
+_CHECK_S: Final = 5.0
+_PAGES: Final = ("/", "/index.html")
+Serve = Callable[..., Any]
+
+
+class Insert(Protocol):
+    """Something of our own in the page: a script, and the socket that it opens."""
+
+    path: str
+    """Of the socket."""
+    script: str
+
+    async def serve(self, connection: Any) -> None:
+        """Talk to the script of one browser."""
+        ...
+
+
+class Gate:
+    """Lets requests pass, or answers them itself."""
+
+    def __init__(self, host: str, insert: Insert | None = None) -> None:
+        self._insert = insert
+        self._host = host
+        self.token = secrets.token_urlsafe(16)
+        """Asked for once in each browser."""
+
+    def answer(self, request: Request, port: int) -> Response | None:
+        """Return the refusal, or None if the request may pass."""
+        host = _only(request, "Host")
+        if not self._is_expected(host):
+            text = f"{escape(host) or 'no host'}: the page is not served by this name"
+            return _response(http.HTTPStatus.FORBIDDEN, text)
+        needs_origin = bool(request.headers.get_all("Origin") or request.headers.get_all("Upgrade"))
+        if needs_origin and not _is_of(_only(request, "Origin"), host):
+            return _response(http.HTTPStatus.FORBIDDEN, "another page may not open this one")
+        cookie = f"snakewalk-{port}"
+        if self._is_right(_cookie(request, cookie)):
+            return None
+        given = parse_qs(urlsplit(request.path).query).get("token", [""])[0]
+        if self._is_right(given):
+            response = _response(http.HTTPStatus.SEE_OTHER, "")
+            response.headers["Location"] = "/"
+            kept = f"{cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+            response.headers["Set-Cookie"] = kept
+            return response
+        text = "That is another token." if given else "The token that the command has printed:"
+        return _response(http.HTTPStatus.UNAUTHORIZED, _ASK.format(escape(text)))
+
+    def _is_right(self, given: str) -> bool:
+        return hmac.compare_digest(given.encode(errors="replace"), self.token.encode())
+
+    def _is_expected(self, host: str) -> bool:
+        """Whether a request may name this host: a name of another page may lead here."""
+        found = _HOST.fullmatch(host)
+        if found is None:
+            return False
+        name = found["name"].lower().strip("[]").removesuffix(".")
+        if self._host in _LOCAL or name in _LOCAL:
+            return name in _LOCAL
+        if name == self._host.lower().removesuffix("."):
+            return True
+        if self._host not in _ANY:
+            return False
+        own, _, _ = socket.gethostname().lower().partition(".")
+        return _is_address(name) or name.partition(".")[0] == own
+
+    def guard(self, serve: Serve) -> Serve:
+        """Return a ``websockets`` server that asks this gate before its own ``process_request``.
+
+        It has the insert's script in its page, and leads its socket to the insert.
+        """
+        insert = self._insert
+
+        def guarded(handler: Serve, *args: Any, process_request: Any = None, **options: Any) -> Any:
+            def ask(connection: Any, request: Request) -> Response | None:
+                port = connection.local_address[1]
+                refusal = self.answer(request, port)
+                if refusal is not None or process_request is None:
+                    return refusal
+                has_script = insert is not None and urlsplit(request.path).path in _PAGES
+                if has_script:  # the page is changed, so it must come as it is
+                    _ask_for_plain(request)
+                passed: Response | None = process_request(connection, request)
+                if insert is not None and has_script and passed is not None:
+                    _add_script(passed, insert.script)
+                return passed
+
+            async def handle(connection: Any) -> None:
+                if insert is not None and urlsplit(connection.request.path).path == insert.path:
+                    await insert.serve(connection)
+                else:
+                    await handler(connection)
+
+            return serve(handle, *args, process_request=ask, **options)
+
+        return guarded
+
+    def install(self, make: Callable[[], Any]) -> Any:
+        """Make a viser server behind this gate; its port must be open when ``make`` returns.
+
+        viser has no place for it, so its call of ``websockets`` is wrapped while it starts.
+        """
+        server = websockets.asyncio.server
+        serve = server.serve
+        server.serve = self.guard(serve)  # type: ignore[assignment,misc]
+        try:
+            return make()
+        finally:
+            server.serve = serve  # type: ignore[misc]
+
+    def is_shut(self, host: str, port: int) -> bool:
+        """Whether a request that names another host is refused: the gate is where it should be."""
+        here = "127.0.0.1" if host == "0.0.0.0" else host
+        with socket.create_connection((here, port), _CHECK_S) as line:
+            line.sendall(b"GET / HTTP/1.1\r\nHost: elsewhere.example\r\nOrigin: http://x\r\n\r\n")
+            return line.recv(64).startswith(b"HTTP/1.1 403")
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_of(origin: str, host: str) -> bool:
+    """Whether an origin is the page that is served at a host."""
+    try:
+        place = urlsplit(origin)
+    except ValueError:
+        return False
+    return place.scheme in {"http", "https"} and place.netloc.lower() == host.lower()
+
+
+def _only(request: Request, header: str) -> str:
+    """Value of a header that is there once; else empty."""
+    values = request.headers.get_all(header)
+    return values[0] if len(values) == 1 else ""
+
+
+def _ask_for_plain(request: Request) -> None:
+    """Take out of a request that what is sent may be compressed."""
+    if "Accept-Encoding" in request.headers:
+        del request.headers["Accept-Encoding"]
+
+
+def _add_script(response: Response, script: str) -> None:
+    """Put a script into a page, before everything else."""
+    head = b"<head>"
+    response.body = response.body.replace(head, head + f"<script>{script}</script>".encode(), 1)
+    del response.headers["Content-Length"]
+    response.headers["Content-Length"] = str(len(response.body))
+
+
+def _cookie(request: Request, name: str) -> str:
+    try:
+        cookies = SimpleCookie("; ".join(request.headers.get_all("Cookie")))
+    except CookieError:
+        return ""
+    return cookies[name].value if name in cookies else ""
+
+
+def _response(status: http.HTTPStatus, text: str) -> Response:
+    body = text.encode()
+    headers = Headers(
+        [
+            ("Content-Type", "text/html; charset=utf-8"),
+            ("Content-Length", str(len(body))),
+            ("Connection", "close"),
+        ]
+    )
+    return Response(status.value, status.phrase, headers, body)
