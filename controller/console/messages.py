@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Final, TextIO
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.plain_text import plain
+from snakewalk.drivers.fallbacks import fallbacks_in_use
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -82,6 +83,8 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
             "%s; version %s, Python %s, %s",
             *(words, version("snakewalk"), platform.python_version(), platform.platform()),
         )
+        for text in fallbacks_in_use():  # reported when modules were imported, before this
+            LOGGER.warning(text)
         yield
         LOGGER.debug("done")
     except BaseException as error:
