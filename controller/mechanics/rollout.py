@@ -79,7 +79,7 @@ _BEYOND_M = 4.0
 
 
 @dataclass(frozen=True, slots=True)
-class PathTable:
+class TabulatedPath:
     """A path as a table: a point every ``PATH_STEP_M``, and straight on beyond its end."""
 
     points_m: Floats
@@ -92,7 +92,7 @@ class PathTable:
     @classmethod
     def of(
         cls, points_m: Floats, waypoint_m: Floats | None = None, waypoint_at: float = np.inf
-    ) -> "PathTable":
+    ) -> "TabulatedPath":
         """Carry points (n, 2), ``PATH_STEP_M`` apart, on along the last direction."""
         step = points_m[-1] - points_m[-2]
         step = step / np.hypot(step[0], step[1]) * PATH_STEP_M
@@ -160,7 +160,7 @@ class Rolled:
 class Followed:
     """How a body that moves otherwise follows a path: measured as rollouts are."""
 
-    def __init__(self, path: PathTable, path_at: int) -> None:
+    def __init__(self, path: TabulatedPath, path_at: int) -> None:
         """Begin at the path's point with index ``path_at``."""
         self._path, self._from, self._steps = path, path_at, 0
         self._state = np.zeros(_STATE)
@@ -226,7 +226,7 @@ class Rollout:
         samples_rad: Floats,
         head: float,
         start: PlanarPose,
-        path: PathTable,
+        path: TabulatedPath,
         path_at: int,
         cruise_segments_s: float,
         drift: Drift,

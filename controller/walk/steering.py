@@ -21,11 +21,11 @@ from snakewalk.controller.mechanics.rollout import (
     PASSED,
     TIME,
     Drift,
-    PathTable,
     PlanarPose,
     Rolled,
     Rollout,
     RolloutTree,
+    TabulatedPath,
 )
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.drivers.compiling import compiled, readonly_array
@@ -43,7 +43,7 @@ class PathPose:
     """(2,) centre of mass."""
     aim_rad: float
     """Direction to the carrot on the path, in the world."""
-    path: PathTable
+    path: TabulatedPath
     """The path in force."""
     path_at: int
     """Index of the path's point nearest to the centre."""

@@ -16,17 +16,17 @@ from snakewalk.controller.mechanics.rollout import (
     PATH_STEP_M,
     STEP_SEGMENTS,
     Drift,
-    PathTable,
     PlanarPose,
     Rolled,
     Rollout,
+    TabulatedPath,
     _sine_cosine,
 )
 from tests.helpers.uneven import spelt_out
 
 SNAKE = FrictionConfig(along=0.1, across=0.7)
 ROBOT = load_robot("yaw16")
-STRAIGHT = PathTable.of(np.arange(0.0, 6.0, PATH_STEP_M)[:, None] * np.array([1.0, 0.0]))
+STRAIGHT = TabulatedPath.of(np.arange(0.0, 6.0, PATH_STEP_M)[:, None] * np.array([1.0, 0.0]))
 START = PlanarPose(np.zeros(2), 0.0)
 
 
@@ -61,7 +61,7 @@ def test_a_waypoint_that_is_passed_is_as_far_as_the_body_came_near() -> None:
     line = np.arange(0.0, 6.0, PATH_STEP_M)[:, None] * np.array([1.0, 0.0])
     tree_of = rollout().begin
     for at_m, passed in ((0.2, True), (3.0, False)):
-        path = PathTable.of(line, np.array([at_m, 0.5]), at_m / PATH_STEP_M)
+        path = TabulatedPath.of(line, np.array([at_m, 0.5]), at_m / PATH_STEP_M)
         tree = tree_of(sine(0, 102), 101.0, START, path, 0, 25.0, Drift())
         made = tree.roll(sine(102, 60)[None])
         assert float(made.along_m[0]) > 0.25
@@ -214,7 +214,7 @@ def test_joints_at_their_speed_limit_take_longer() -> None:
 
 def test_a_path_goes_on_straight_beyond_its_end() -> None:
     bent = np.stack([np.cos(np.linspace(0, 1, 101)), np.sin(np.linspace(0, 1, 101))], axis=1)
-    table = PathTable.of(bent).points_m
+    table = TabulatedPath.of(bent).points_m
     assert table.flags.c_contiguous
     steps = np.diff(table[100:], axis=0)
     np.testing.assert_allclose(np.hypot(*steps.T), PATH_STEP_M)
