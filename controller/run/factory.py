@@ -44,6 +44,7 @@ from snakewalk.drivers.bus.budget import robot_budget
 from snakewalk.sim.servo.models import MODELS
 
 C = TypeVar("C", RunConfig, RobotConfig, WorldConfig)
+P = TypeVar("P", GaitRun, ScheduleRun)
 _FIELDS = {
     "run": tuple(RunConfig.model_fields),
     "robot": tuple(RobotConfig.model_fields),
@@ -322,7 +323,15 @@ def prepare_gait(
     soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
     body = _with_gains(body, pitch=pitch, soft=soft)
     ground = with_keys_of("world", load_world(run.world), keys)
-    return GaitRun(run, body, ground, make_operator)
+    return _remarked(GaitRun(run, body, ground, make_operator))
+
+
+def _remarked(prepared: P) -> P:
+    """Return the run; warn if the body may move otherwise than requested."""
+    remark = prepared.remark()
+    if remark is not None:
+        LOGGER.warning("%s", remark)
+    return prepared
 
 
 def is_gait(name: str) -> bool:
@@ -430,10 +439,7 @@ def prepare_schedule(
     _check_servos(run, body)
     prepared = ScheduleRun(run, body, with_keys_of("world", load_world(run.world), keys))
     prepared.check_plan()
-    remark = prepared.remark()
-    if remark is not None:
-        LOGGER.warning("%s", remark)
-    return prepared
+    return _remarked(prepared)
 
 
 def prepare_source(

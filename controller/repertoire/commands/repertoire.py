@@ -9,6 +9,7 @@ from rich.table import Table
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Film,
@@ -76,6 +77,8 @@ def record(
 
         repertoire = record(body, ground, on_progress=on_progress)
         bar.update(float(len(ACTIONS)), description="recorded")
+    for line in repertoire.contradictions():
+        LOGGER.warning("%s", line)
     with atomic_write(file) as part:
         repertoire.save(part)
     if picture is not None:
