@@ -1,7 +1,7 @@
 """What a run is: robot, world, recording, waypoints, motion and safety, by name or by path."""
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -13,7 +13,7 @@ from snakewalk.config.playback import PlaybackConfig, RepertoireConfig
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.synthesis import SynthesisConfig
 
-MotionName = Literal[
+MOTIONS: Final = (
     "walk",
     "walk-printed",
     "walk-blind",
@@ -23,9 +23,13 @@ MotionName = Literal[
     "playback",
     "repertoire",
     "source",
-]
+)
+"""Motions that need no plug-in."""
+_ALONG_WAYPOINTS: Final = frozenset({"walk", "walk-printed", "walk-blind", "kp", "serpenoid"})
+MotionName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=100)]
+"""A motion of ``MOTIONS``, or the name of a plug-in."""
 
-_FULL_OUTPUT_RAD = 885 * 128 * 2.0 * math.pi / 4096
+FULL_OUTPUT_RAD = 885 * 128 * 2.0 * math.pi / 4096
 """Position error at which a P gain of 1 gives full output: PWM 885 is 100 %, the gain is the
 register over 128, an error is counted in 4096ths of a turn (e-manual, X series)."""
 
@@ -149,6 +153,9 @@ class SafetyConfig(Strict):
     voltage_max_v: float | None = Field(
         None, gt=0.0, description="default: the robot's servo.supply_max_v"
     )
+    voltage_time_s: float = Field(
+        0.3, ge=0.0, description="how long the supply may be too low, but not at the start"
+    )
     stale_limit_s: float = Field(
         0.1, gt=0.0, description="how old a measured position, velocity or current may be"
     )
@@ -159,6 +166,11 @@ class SafetyConfig(Strict):
     watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="register 98, 20 ms steps")
     recovery: Literal["stop", "confirm", "resume"] = Field(
         "stop", description="after a vanished port or a rebooted servo: torque off, ask, or go on"
+    )
+    lost_observer: Literal["stop", "warn"] = Field(
+        "stop",
+        description="when the page, the ROS node or the gamepad, each with an E-STOP, ends or does "
+        "not respond during a run: torque off, or a warning",
     )
     recovery_time_s: float = Field(10.0, gt=0.0, description="how long it is waited for")
     overload_reboots: int = Field(
@@ -179,7 +191,7 @@ class SafetyConfig(Strict):
         """
         most_rad, limits_rad = 0.9 * self.goal_lead_rad, []
         for axis, gain in zip(robot.all_axes, robot.position_p_gains, strict=True):
-            full_rad = _FULL_OUTPUT_RAD / max(gain, 1) if axis != "p" else 0.0
+            full_rad = FULL_OUTPUT_RAD / max(gain, 1) if axis != "p" else 0.0
             limits_rad.append(min(max(self.following_limit_rad, 2.0 * full_rad), most_rad))
         return tuple(limits_rad)
 
@@ -276,7 +288,7 @@ class RunConfig(Strict):
             raise ValueError("motion gait needs a table [gait] with its name")
         if self.gait is not None and self.gait.ashore is not None and not self.waypoints_m:
             raise ValueError("gait.ashore: belongs to a gait along waypoints_m; there are none")
-        pathless = {"gait", "playback", "source"} | ({"repertoire"} if self.repertoire else set())
-        if self.motion not in pathless and not self.waypoints_m:
+        planned = self.motion == "repertoire" and not self.repertoire
+        if (planned or self.motion in _ALONG_WAYPOINTS) and not self.waypoints_m:
             raise ValueError("waypoints_m: at least one is needed")
         return self

@@ -10,6 +10,7 @@ from types import FrameType
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
 from snakewalk.controller.console.messages import plain
+from snakewalk.controller.console.safe_path import make_path_safe
 from snakewalk.drivers.errors import DriverError, PortError
 
 _ENDING = tuple(
@@ -36,6 +37,9 @@ def leave_out_avx512() -> None:
 
 def main() -> None:
     """Run the command line; bad input ends with exit code 2 and one line per fault."""
+    make_path_safe()
+    # numba reads .numba_config.yaml of the working folder; this keeps it from loading code there
+    os.environ.setdefault("NUMBA_CACHE_DIR", "")
     # Pictures are drawn without a screen, by a context of our own; MuJoCo's import fails on a
     # choice that is not installed.
     os.environ["MUJOCO_GL"] = "disable"

@@ -12,12 +12,15 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.command import plugin
 from snakewalk.controller.run.prepared_run import pose_with
 from snakewalk.controller.runlog.record import InitialPose
+from snakewalk.controller.runlog.topics import ShadowTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.studies.shadow.diagnosis import (
     LEAST_S,
     MOST_S,
+    check_level,
     diagnose,
     is_gap,
     last_part,
@@ -76,6 +79,7 @@ class ShadowAlarm:
         )
 
 
+@plugin("observer", "shadow")
 class RunShadow:
     """The shadow of a run: logs each cycle, raises the alarm, and names the cause at the end.
 
@@ -118,6 +122,16 @@ class RunShadow:
         self._first_s: float | None = None
         self._last_s = 0.0
 
+    @staticmethod
+    def check(world: WorldConfig) -> None:
+        """Reject ground on which a shadow means nothing.
+
+        Raises:
+            InputError: the ground is no level, open floor.
+
+        """
+        check_level(world)
+
     def begin(self, state: JointState) -> None:
         """Put the shadow where the joints are; quick, as torque is on."""
         if self._measured_start:
@@ -133,7 +147,12 @@ class RunShadow:
         self._last_s = deadline_s
         shadow = self._shadow.step(deadline_s - self._first_s, sent_rad)
         self._rows.append((deadline_s, sent_rad, state.current_a, state.position_rad))
-        self._log.shadow(deadline_s, shadow.position_rad, shadow.current_a)
+        self._log.add(
+            ShadowTable,
+            deadline_s,
+            position_rad=shadow.position_rad,
+            current_a=shadow.current_a,
+        )
         for text in self._alarm.update(state, shadow):
             self._log.event(deadline_s, "shadow", text, "warning")
             self._on_event("shadow", text)

@@ -8,10 +8,11 @@ import pytest
 from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.config.playback import ScheduleConfig
 from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.schedule_run import ScheduleMotion, read_schedule
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_run, prepare_schedule
+from snakewalk.controller.run.factory import prepare_run
 from snakewalk.drivers.types import BodyPose
 from tests.helpers.command import snakewalk
 
