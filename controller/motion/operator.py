@@ -32,6 +32,8 @@ KEYS = {
     "t": "torque off",
 }
 HALT_S = 0.5
+_DIRECTIONS = ("mirror", "backward", "turn_rad", "turn", "left_handed")
+"""Parameters that say which way a gait goes; another gait starts with its defaults."""
 _KEYS_MAX = 100
 """Keys and values that are carried out in a step (ours); text that is pasted is longer."""
 
@@ -178,6 +180,7 @@ class Operator:
         self._refuse("no other gait suits this robot")
 
     def _become(self, name: str, *, quietly: bool = False) -> bool:
+        before = self.motion.gait.params
         try:
             self.motion.become(make_gait(name))
         except InputError as error:
@@ -185,7 +188,15 @@ class Operator:
                 self._refuse(error.faults[0])
             return False
         self._chosen = 0
+        after = self.motion.gait.params
+        lost = [
+            each
+            for each in _DIRECTIONS
+            if getattr(before, each, 0) and getattr(after, each, 0) != getattr(before, each)
+        ]
         self._report(f"gait {name}")
+        if lost:
+            self._report(f"gait {name} does not keep {', '.join(lost)}")
         return True
 
     def _ranges(self) -> dict[str, Range]:

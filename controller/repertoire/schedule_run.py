@@ -143,7 +143,13 @@ class ScheduleRun(PathlessRun):
         return plan_without_path(self.run)
 
     def remark(self) -> str | None:
-        """Return a warning if an action is much slower, faster or wider than requested."""
+        """Return a warning if the body may move much differently than requested."""
+        recorded, world = self.repertoire.world, self.world.name
+        if world != recorded:
+            return (
+                f"{self.config.file}: recorded on world {recorded}; on {world} speeds, turns and "
+                f"even directions may differ: record there, or leave --world out"
+            )
         control = self.controller()
         found = self._first_lasting(control.is_far)
         if found is None:
